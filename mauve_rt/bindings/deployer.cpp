@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deployer.hpp"
+
+#include "mauve_rt/futex.hpp"
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+using Unlocked = py::call_guard<py::gil_scoped_release>;
+
+using PublishedSample = std::tuple<std::string, std::vector<std::byte>, time_ns_t>;
+
+py::bytes to_bytes(const void* data, std::size_t size) { return {static_cast<const char*>(data), size}; }
+
+/// A deployer with what its waits have seen, so that Python needs to carry nothing from call to call.
+class PyDeployer {
+ public:
+  PyDeployer(PyArchitecture& architecture, bool require_realtime, bool trace)
+      : architecture_(architecture.architecture),
+        deployer_(architecture_, {.require_realtime = require_realtime, .trace = trace}) {}
+  ~PyDeployer() {
+    const py::gil_scoped_release release;  // a component thread may need the interpreter to come to its end
+    deployer_.shutdown();
+  }
+  PyDeployer(const PyDeployer&) = delete;
+  PyDeployer& operator=(const PyDeployer&) = delete;
+
+  Deployer& deployer() noexcept { return deployer_; }
+
+  std::vector<PublishedSample> wait_published(time_ns_t timeout_ns) {
+    const time_ns_t until = monotonic_now_ns() + timeout_ns;
+    std::vector<PublishedSample> samples;
+    for (;;) {
+      const std::uint32_t word = architecture_.publications().word();  // before the look: what comes after is noticed
+      std::string resource;
+      std::vector<std::byte> message;
+      time_ns_t time_ns = 0;
+      while (architecture_.next_published(resource, message, time_ns)) samples.emplace_back(resource, message, time_ns);
+      if (!samples.empty() || woken() || monotonic_now_ns() >= until) return samples;
+      architecture_.publications().wait(word, until);
+    }
+  }
+
+  bool wait_change(time_ns_t timeout_ns) {
+    const time_ns_t until = monotonic_now_ns() + timeout_ns;
+    const std::uint32_t word = deployer_.wait_change(seen_change_, until);
+    const bool changed = word != seen_change_;
+    seen_change_ = word;
+    return changed;
+  }
+
+  void wake() noexcept {
+    woken_.store(true, std::memory_order_release);
+    architecture_.publications().notify();
+    architecture_.changes().bump();
+  }
+
+  bool write_resource(const std::string& name, std::string_view data) {
+    return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)));
+  }
+
+  py::tuple read_resource(const std::string& name) {
+    Resource& resource = architecture_.resource(name);
+    std::vector<std::byte> message;
+    time_ns_t time_ns = 0;
+    std::uint64_t sequence = 0;
+    {
+      const py::gil_scoped_release release;
+      resource.peek_sample(message, time_ns, sequence);
+    }
+    return py::make_tuple(to_bytes(message.data(), message.size()), sequence, time_ns);
+  }
+
+  std::vector<std::string> trace_components() const {
+    std::vector<std::string> names;
+    for (const auto& component : architecture_.components()) names.push_back(component->name());
+    return names;
+  }
+
+ private:
+  bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
+
+  Architecture& architecture_;
+  Deployer deployer_;
+  std::atomic<bool> woken_{false};  // release/acquire: set once, for good
+  std::uint32_t seen_change_{0};    // of the one thread that waits for changes
+};
+
+CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) { return {.commit_ns = commit_ns, .phase_ns = phase_ns}; }
+
+void bind_reports(py::module_& module) {
+  py::class_<StepReport>(module, "StepReport")
+      .def_readonly("step", &StepReport::step)
+      .def_readonly("component", &StepReport::component)
+      .def_readonly("from_core", &StepReport::from_core)
+      .def_readonly("to_core", &StepReport::to_core)
+      .def_readonly("prepare_ns", &StepReport::prepare_ns)
+      .def_readonly("blackout_ns", &StepReport::blackout_ns)
+      .def_readonly("missed_releases", &StepReport::missed_releases)
+      .def_readonly("phase_nominal_ns", &StepReport::phase_nominal_ns)
+      .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns);
+  py::class_<RealtimeStatus>(module, "RealtimeStatus")
+      .def_readonly("granted", &RealtimeStatus::granted)
+      .def_readonly("missing", &RealtimeStatus::missing);
+  py::class_<TraceDrain>(module, "TraceDrain")
+      .def_property_readonly(
+          "records",
+          [](const TraceDrain& self) { return to_bytes(self.records.data(), self.records.size() * sizeof(TraceRecord)); })
+      .def_readonly("written", &TraceDrain::written)
+      .def_readonly("dropped", &TraceDrain::dropped)
+      .def_readonly("monotonic_ns", &TraceDrain::monotonic_ns)
+      .def_readonly("realtime_ns", &TraceDrain::realtime_ns);
+}
+
+}  // namespace
+
+void bind_deployer(py::module_& module) {
+  bind_reports(module);
+  py::class_<PyDeployer>(module, "Deployer")
+      .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
+           py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>())
+      .def("prepare_process", [](PyDeployer& self) { self.deployer().prepare_process(); }, Unlocked())
+      .def("deploy", [](PyDeployer& self) { self.deployer().deploy(); }, Unlocked())
+      .def("shutdown", [](PyDeployer& self) { self.deployer().shutdown(); }, Unlocked())
+      .def(
+          "stop",
+          [](PyDeployer& self, const std::string& component, time_ns_t timeout_ns) {
+            self.deployer().stop(component, timeout_ns);
+          },
+          py::arg("component"), py::arg("timeout_ns") = s_to_ns(1), Unlocked())
+      .def(
+          "start",
+          [](PyDeployer& self, const std::string& component, std::optional<time_ns_t> clock_ns) {
+            self.deployer().start(component, clock_ns);
+          },
+          py::arg("component"), py::arg("clock_ns") = std::nullopt, Unlocked())
+      .def(
+          "get_time", [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
+          py::arg("component"), Unlocked())
+      .def(
+          "replace_core",
+          [](PyDeployer& self, const std::string& component, const std::string& core, time_ns_t commit_timeout_ns,
+             time_ns_t phase_timeout_ns) {
+            return self.deployer().replace_core(component, core, timeouts(commit_timeout_ns, phase_timeout_ns));
+          },
+          py::arg("component"), py::arg("core"), py::kw_only(), py::arg("commit_timeout_ns") = s_to_ns(1),
+          py::arg("phase_timeout_ns") = s_to_ns(1), Unlocked())
+      .def(
+          "set_property",
+          [](PyDeployer& self, const std::string& component, const std::string& name, const PropertyValue& value,
+             time_ns_t commit_timeout_ns) {
+            return self.deployer().set_property(component, name, value, timeouts(commit_timeout_ns, 0));
+          },
+          py::arg("component"), py::arg("name"), py::arg("value"), py::kw_only(),
+          py::arg("commit_timeout_ns") = s_to_ns(1), Unlocked())
+      .def("realtime_status", [](PyDeployer& self) { return self.deployer().realtime_status(); })
+      .def_property_readonly("epoch_ns", [](PyDeployer& self) { return self.deployer().epoch_ns(); })
+      .def("drain_trace", [](PyDeployer& self) { return self.deployer().drain_trace(); }, Unlocked())
+      .def("trace_components", &PyDeployer::trace_components)
+      .def("trace_names", [](PyDeployer&) { return TraceNames::all(); })
+      .def(
+          "wait_published",
+          [](PyDeployer& self, time_ns_t timeout_ns) {
+            std::vector<PublishedSample> samples;
+            {
+              const py::gil_scoped_release release;
+              samples = self.wait_published(timeout_ns);
+            }
+            py::list list;
+            for (const auto& [resource, message, time_ns] : samples) {
+              list.append(py::make_tuple(resource, to_bytes(message.data(), message.size()), time_ns));
+            }
+            return list;
+          },
+          py::arg("timeout_ns"))
+      .def("write_resource", &PyDeployer::write_resource, py::arg("resource"), py::arg("data"), Unlocked())
+      .def("read_resource", &PyDeployer::read_resource, py::arg("resource"))
+      .def("wait_change", &PyDeployer::wait_change, py::arg("timeout_ns"), Unlocked())
+      .def("wake", &PyDeployer::wake, Unlocked());
+}
+
+}  // namespace mauve::bindings

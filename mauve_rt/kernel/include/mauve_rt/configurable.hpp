@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// configure() / cleanup() with overridable hooks.
+#pragma once
+
+#include <string>
+
+namespace mauve {
+
+/// Something that is configured before use and cleaned up after. Ordinary threads only.
+class Configurable {
+ public:
+  virtual ~Configurable() = default;
+  Configurable() = default;
+  Configurable(const Configurable&) = delete;
+  Configurable& operator=(const Configurable&) = delete;
+
+  bool is_configured() const noexcept { return configured_; }
+
+  /// Runs the hook; does nothing when already configured. [non-rt]
+  /// Throws Error (configure_failed) with the reason and stays unconfigured when the hook throws or returns false.
+  void configure();
+  /// Runs the cleanup hook if configured. [non-rt]
+  void cleanup() noexcept;
+
+  /// What messages call this object, e.g. "core mauve_examples/Guidance".
+  virtual std::string description() const = 0;
+
+ protected:
+  /// Allocate and check here; false or an exception means that it failed.
+  virtual bool configure_hook() { return true; }
+  /// Give back what configure_hook took.
+  virtual void cleanup_hook() {}
+
+ private:
+  bool configured_{false};
+};
+
+}  // namespace mauve

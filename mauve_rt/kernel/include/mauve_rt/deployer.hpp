@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Deployer: maps components to threads, starts them on one epoch, and changes them while they run.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "mauve_rt/architecture.hpp"
+#include "mauve_rt/realtime.hpp"
+
+namespace mauve {
+
+struct DeployerOptions {
+  bool require_realtime{false};  // refuse to deploy without every right
+  bool trace{true};
+};
+
+/// What drain_trace() yields; indices are component numbers.
+struct TraceDrain {
+  std::vector<TraceRecord> records;
+  std::vector<std::uint64_t> written;
+  std::vector<std::uint64_t> dropped;
+  time_ns_t monotonic_ns{0};
+  time_ns_t realtime_ns{0};
+};
+
+/// The threads of an architecture. Ordinary threads; commands are serialised.
+class Deployer {
+ public:
+  explicit Deployer(Architecture& architecture, DeployerOptions options = {});
+  /// Shuts down.
+  ~Deployer();
+  Deployer(const Deployer&) = delete;
+  Deployer& operator=(const Deployer&) = delete;
+
+  /// Asks for the real-time rights; deploy() does it if it was not done. [setup]
+  void prepare_process();
+  /// Creates the threads, meets them at a barrier, publishes epoch = now + max(20 ms, 1 ms x components), starts all.
+  /// [setup] Throws Error: not_configured, realtime_denied; no thread is left then.
+  void deploy();
+  /// Stops every component (outputs written) in reverse order and ends the threads. [non-rt]
+  void shutdown() noexcept;
+
+  void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
+  void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
+  time_ns_t get_time(const std::string& component) const;
+  /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
+  StepReport replace_core(const std::string& component, const std::string& core, const CommitTimeouts& timeouts = {});
+  StepReport set_property(const std::string& component, const std::string& name, const PropertyValue& value,
+                          const CommitTimeouts& timeouts = {});
+
+  bool is_deployed() const noexcept { return deployed_; }
+  /// The instant that all grids are counted from; 0 before deployment.
+  time_ns_t epoch_ns() const noexcept { return epoch_ns_; }
+  const RealtimeStatus& realtime_status() const noexcept { return process_.status(); }
+
+  /// Empties every ring. [non-rt], one thread at a time.
+  TraceDrain drain_trace();
+  /// Waits until a component changed its state or core after `seen`; returns the word to pass next. [non-rt]
+  std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
+
+ private:
+  void require_deployed() const;
+  void watch() noexcept;
+
+  Architecture& architecture_;
+  DeployerOptions options_;
+  RealtimeProcess process_;
+  std::mutex command_mutex_;
+  std::atomic<bool> deployed_{false};  // seq_cst: set and cleared under the mutex, read for messages only
+  time_ns_t epoch_ns_{0};
+  std::thread watchdog_;
+  std::atomic<std::uint32_t> watchdog_stop_{0};
+};
+
+}  // namespace mauve

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Plug-ins: shells, cores, fsms, resources and data types by name, from libraries opened at run time.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/component.hpp"
+#include "mauve_rt/ring_buffer.hpp"
+#include "mauve_rt/shared_data.hpp"
+
+namespace mauve {
+
+struct ResourceParameters {
+  std::size_t capacity{0};
+  bool overwrite{false};
+};
+
+/// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at a time.
+class PluginRegistry {
+ public:
+  using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
+
+  /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call does nothing.
+  /// Throws Error (plugin) with the loader's words.
+  void load_library(const std::string& path);
+
+  template <typename ShellType>
+  void shell(const std::string& name) {
+    add_shell(name, [] { return std::make_unique<ShellType>(); });
+  }
+  /// `shell_name`: the shell it was written for.
+  template <typename CoreType>
+  void core(const std::string& name, const std::string& shell_name) {
+    add_core(name, shell_name, [] { return std::make_unique<CoreType>(); });
+  }
+  template <typename FsmType>
+  void fsm(const std::string& name, const std::string& shell_name) {
+    add_fsm(name, shell_name, [] { return std::make_unique<FsmType>(); });
+  }
+  /// A resource of the plug-in's own; `name` is its kind in architecture files.
+  template <typename ResourceType>
+  void resource(const std::string& name) {
+    add_resource(name, "", [](const ResourceParameters&) { return std::make_unique<ResourceType>(); });
+  }
+  /// A data type: makes shared_data and ring_buffer resources of it possible.
+  template <Described T>
+  void type() {
+    add_resource("shared_data", type_name<T>(),
+                 [](const ResourceParameters&) { return std::make_unique<SharedData<T>>(); });
+    add_resource("ring_buffer", type_name<T>(), [](const ResourceParameters& parameters) {
+      return std::make_unique<RingBuffer<T>>(parameters.capacity,
+                                             parameters.overwrite ? WhenFull::overwrite : WhenFull::refuse);
+    });
+  }
+
+  void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory);
+
+  std::unique_ptr<Shell> make_shell(const std::string& name) const;
+  std::unique_ptr<CoreBase> make_core(const std::string& name) const;
+  std::unique_ptr<FsmBase> make_fsm(const std::string& name) const;
+  /// Throws Error: unknown_resource (kind), unknown_type, invalid_argument (a ring without capacity).
+  std::unique_ptr<Resource> make_resource(const std::string& kind, const std::string& type,
+                                          const ResourceParameters& parameters) const;
+
+  const std::string& core_shell(const std::string& name) const;
+  const std::string& fsm_shell(const std::string& name) const;
+  /// Registered names of "shell", "core", "fsm", "resource" or "type", sorted. Throws Error (invalid_argument).
+  std::vector<std::string> names(const std::string& kind) const;
+
+ private:
+  template <typename Product>
+  struct Entry {
+    std::string shell;
+    std::function<std::unique_ptr<Product>()> make;
+  };
+  using ResourceFactory = std::function<std::unique_ptr<Resource>(const ResourceParameters&)>;
+
+  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
+  void add_fsm(const std::string& name, const std::string& shell_name,
+               std::function<std::unique_ptr<FsmBase>()> factory);
+  void add_resource(const std::string& kind, const std::string& type, ResourceFactory factory);
+
+  std::set<std::string> libraries_;
+  std::map<std::string, Entry<Shell>> shells_;
+  std::map<std::string, Entry<CoreBase>> cores_;
+  std::map<std::string, Entry<FsmBase>> fsms_;
+  std::map<std::pair<std::string, std::string>, ResourceFactory> resources_;  // by (kind, type)
+};
+
+}  // namespace mauve
+
+/// Opens the registration function of a plug-in library, once a library:
+///   MAUVE_PLUGINS(registry) { registry.core<MyCore>("my_package/MyCore", "my_package/MyShell"); }
+#define MAUVE_PLUGINS(registry) \
+  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins(mauve::PluginRegistry& registry)

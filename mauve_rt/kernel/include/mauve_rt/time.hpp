@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Time: int64 nanoseconds of CLOCK_MONOTONIC, behind a Clock interface.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace mauve {
+
+using time_ns_t = std::int64_t;
+
+constexpr time_ns_t us_to_ns(std::int64_t us) { return us * 1'000; }
+constexpr time_ns_t ms_to_ns(std::int64_t ms) { return ms * 1'000'000; }
+constexpr time_ns_t s_to_ns(std::int64_t s) { return s * 1'000'000'000; }
+
+/// Where a component's time comes from.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  /// The present instant. [rt]
+  virtual time_ns_t now_ns() const noexcept = 0;
+  /// Sleeps until the instant, or until the word no longer holds `expected`, whichever is first. [rt]
+  /// Returns true when the instant was reached. Interrupted sleeps (EINTR) are resumed.
+  virtual bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
+                           std::uint32_t expected) const noexcept = 0;
+};
+
+/// CLOCK_MONOTONIC, with absolute futex waits.
+class MonotonicClock final : public Clock {
+ public:
+  time_ns_t now_ns() const noexcept override;
+  bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
+                   std::uint32_t expected) const noexcept override;
+  /// The process's one instance. [rt]
+  static const MonotonicClock& instance() noexcept;
+};
+
+/// CLOCK_MONOTONIC now. [rt]
+time_ns_t monotonic_now_ns() noexcept;
+/// CLOCK_REALTIME now. [rt]
+time_ns_t realtime_now_ns() noexcept;
+
+/// A component's grid: the instants reference + k * period.
+struct Grid {
+  time_ns_t reference_ns{0};
+  time_ns_t period_ns{0};
+
+  /// The first instant that is not before `earliest_ns` (period 0: the reference itself, or earliest). [rt]
+  time_ns_t first_not_before(time_ns_t earliest_ns) const noexcept;
+  /// Signed distance of an instant from the nearest one of the grid. [rt]
+  time_ns_t phase_error(time_ns_t instant_ns) const noexcept;
+};
+
+}  // namespace mauve

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/configurable.hpp"
+
+#include "mauve_rt/error.hpp"
+
+namespace mauve {
+
+void Configurable::configure() {
+  if (configured_) return;
+  try {
+    if (!configure_hook()) {
+      throw Error(ErrorCode::configure_failed, "configure failed", {.element = description(), .expected = "a configure hook that returns true", .found = "false"});
+    }
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& failure) {
+    throw Error(ErrorCode::configure_failed, failure.what(), {.element = description()});
+  }
+  configured_ = true;
+}
+
+void Configurable::cleanup() noexcept {
+  if (!configured_) return;
+  configured_ = false;
+  try {
+    cleanup_hook();
+  } catch (...) {  // a clean-up that throws leaves nothing that could be mended; the object counts as cleaned up
+  }
+}
+
+}  // namespace mauve

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deployer.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/error.hpp"
+#include "mauve_rt/futex.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr time_ns_t kShortestLead = ms_to_ns(20);
+constexpr time_ns_t kLeadPerComponent = ms_to_ns(1);
+constexpr time_ns_t kWatchPeriod = ms_to_ns(5);
+constexpr time_ns_t kStopTimeout = ms_to_ns(500);
+constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
+
+/// The barrier that component threads and deployer meet at.
+class Barrier {
+ public:
+  explicit Barrier(std::size_t parties) : missing_(parties) {
+    pthread_barrier_init(&barrier_, nullptr, static_cast<unsigned>(parties));
+  }
+  ~Barrier() { pthread_barrier_destroy(&barrier_); }
+  Barrier(const Barrier&) = delete;
+  Barrier& operator=(const Barrier&) = delete;
+
+  pthread_barrier_t& get() noexcept { return barrier_; }
+  void created_one() noexcept { --missing_; }
+  void arrive() noexcept { pthread_barrier_wait(&barrier_); }
+  /// Lets those go on that have arrived, by standing in for whoever never will.
+  void stand_in() {
+    std::vector<std::thread> stand_ins;
+    for (; missing_ > 0; --missing_) stand_ins.emplace_back([this] { arrive(); });
+    for (std::thread& thread : stand_ins) thread.join();
+  }
+
+ private:
+  pthread_barrier_t barrier_{};
+  std::size_t missing_;
+};
+
+}  // namespace
+
+Deployer::Deployer(Architecture& architecture, DeployerOptions options)
+    : architecture_(architecture), options_(options) {}
+
+Deployer::~Deployer() { shutdown(); }
+
+void Deployer::prepare_process() {
+  int highest = 1;
+  for (const auto& component : architecture_.components()) {
+    highest = std::max(highest, component->task().settings().priority);
+  }
+  process_.acquire(highest, options_.require_realtime);
+}
+
+void Deployer::deploy() {
+  const std::lock_guard lock(command_mutex_);
+  if (deployed_) throw Error(ErrorCode::already_running, "the architecture is deployed already");
+  if (!architecture_.is_configured()) {
+    throw Error(ErrorCode::not_configured, "the architecture is not configured", {.remedy = "call configure() first"});
+  }
+  prepare_process();
+  const auto& components = architecture_.components();
+  Barrier barrier(components.size() + 1);
+  try {
+    for (const auto& component : components) {
+      component->task().create_thread(barrier.get(), options_.require_realtime, options_.trace);
+      barrier.created_one();
+    }
+  } catch (...) {
+    barrier.stand_in();
+    for (const auto& component : components) component->task().end_thread(kForever);
+    throw;
+  }
+  barrier.arrive();
+
+  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
+  const auto count = static_cast<time_ns_t>(components.size());
+  epoch_ns_ = monotonic_now_ns() + std::max(kShortestLead, kLeadPerComponent * count);
+  for (const auto& component : components) {
+    Task& task = component->task();
+    const time_ns_t first = epoch_ns_ + task.settings().offset_ns;
+    task.set_grid({.reference_ns = first, .period_ns = task.context().period_ns});
+    task.start_at(first);
+  }
+  for (const auto& component : components) component->task().wait_started();
+  deployed_ = true;
+  watchdog_stop_.store(0, std::memory_order_relaxed);  // relaxed: the thread is created after
+  watchdog_ = std::thread([this] { watch(); });
+}
+
+void Deployer::shutdown() noexcept {
+  const std::lock_guard lock(command_mutex_);
+  if (!deployed_) return;
+  watchdog_stop_.store(1, std::memory_order_release);
+  futex_wake_all(watchdog_stop_);
+  watchdog_.join();
+  const auto& components = architecture_.components();
+  for (auto component = components.rbegin(); component != components.rend(); ++component) {
+    try {
+      if ((*component)->task().state() == ComponentState::running) (*component)->task().stop(kStopTimeout);
+    } catch (const Error&) {  // still in a state, or faulted: ending its thread says which
+    }
+  }
+  const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
+  for (const auto& component : components) component->task().end_thread(until);
+  deployed_ = false;
+  architecture_.changes().bump();
+}
+
+void Deployer::watch() noexcept {
+  while (watchdog_stop_.load(std::memory_order_acquire) == 0) {
+    futex_wait_until(watchdog_stop_, 0, monotonic_now_ns() + kWatchPeriod);
+    for (const auto& component : architecture_.components()) component->task().check_execution(monotonic_now_ns());
+  }
+}
+
+void Deployer::require_deployed() const {
+  if (deployed_) return;
+  throw Error(ErrorCode::not_configured, "the architecture is not deployed", {.remedy = "call deploy() first"});
+}
+
+void Deployer::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
+  const std::lock_guard lock(command_mutex_);
+  require_deployed();
+  architecture_.component(component).task().start(clock_ns);
+}
+
+void Deployer::stop(const std::string& component, time_ns_t timeout_ns) {
+  const std::lock_guard lock(command_mutex_);
+  require_deployed();
+  architecture_.component(component).task().stop(timeout_ns);
+}
+
+time_ns_t Deployer::get_time(const std::string& component) const {
+  return architecture_.component(component).task().get_time();
+}
+
+StepReport Deployer::replace_core(const std::string& component_name, const std::string& core,
+                                  const CommitTimeouts& timeouts) {
+  const std::lock_guard lock(command_mutex_);
+  Component& component = architecture_.component(component_name);
+  std::unique_ptr<CoreBase> fresh = architecture_.make_core(core);
+  component.check_allowed(core);
+  return component.swap_core(std::move(fresh), timeouts);
+}
+
+StepReport Deployer::set_property(const std::string& component, const std::string& name, const PropertyValue& value,
+                                  const CommitTimeouts& timeouts) {
+  const std::lock_guard lock(command_mutex_);
+  return architecture_.component(component).set_property(name, value, timeouts);
+}
+
+TraceDrain Deployer::drain_trace() {
+  TraceDrain drain;
+  for (const auto& component : architecture_.components()) {
+    TraceRing& ring = *component->task().ring();
+    ring.drain(drain.records);
+    drain.written.push_back(ring.offered());
+    drain.dropped.push_back(ring.dropped());
+  }
+  drain.monotonic_ns = monotonic_now_ns();
+  drain.realtime_ns = realtime_now_ns();
+  return drain;
+}
+
+std::uint32_t Deployer::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept {
+  const std::atomic<std::uint32_t>& word = architecture_.changes().word;
+  while (word.load(std::memory_order_acquire) == seen) {
+    if (!futex_wait_until(word, seen, until_ns)) break;
+  }
+  return word.load(std::memory_order_acquire);
+}
+
+}  // namespace mauve

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/fsm.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "mauve_rt/error.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr const char* kDeclareRemedy = "declare it in define()";
+
+std::vector<const State*> successors(const State& state) {
+  std::vector<const State*> all;
+  for (const Transition& transition : state.transitions) all.push_back(transition.to);
+  all.push_back(state.next);
+  return all;
+}
+
+/// Refuses a loop of execution states: it would never let time pass.
+class LoopFinder {
+ public:
+  void search(const State& state) {
+    visited_[&state] = true;
+    path_.push_back(&state);
+    for (const State* next : successors(state)) {
+      if (next->is_wait) continue;
+      const auto on_path = std::find(path_.begin(), path_.end(), next);
+      if (on_path != path_.end()) refuse(on_path, *next);
+      if (!visited_[next]) search(*next);
+    }
+    path_.pop_back();
+  }
+  bool visited(const State& state) { return visited_[&state]; }
+
+ private:
+  void refuse(std::vector<const State*>::iterator from, const State& closing) const {
+    std::string loop;
+    for (auto state = from; state != path_.end(); ++state) loop += (*state)->name + " -> ";
+    throw Error(ErrorCode::loop_without_wait, "the states form a loop without a wait: " + loop + closing.name,
+                {.expected = "a wait state in every loop", .remedy = "put a wait state between two of them"});
+  }
+
+  std::map<const State*, bool> visited_;
+  std::vector<const State*> path_;
+};
+
+/// Tarjan's strongly connected components with potentials along the tree edges.
+class CycleLengths {
+ public:
+  time_ns_t gcd_from(const State& initial) {
+    visit(initial, 0);
+    time_ns_t gcd = 0;
+    for (const auto& [state, node] : nodes_) {
+      for (const State* next : successors(*state)) {
+        const Node& to = nodes_.at(next);
+        if (to.component != node.component) continue;
+        gcd = std::gcd(gcd, node.potential_ns + state->duration_ns - to.potential_ns);
+      }
+    }
+    return gcd;
+  }
+
+ private:
+  struct Node {
+    time_ns_t potential_ns;
+    int index;
+    int low;
+    int component{-1};
+  };
+
+  void visit(const State& state, time_ns_t potential_ns) {
+    const int index = static_cast<int>(nodes_.size());
+    nodes_[&state] = {potential_ns, index, index, -1};
+    stack_.push_back(&state);
+    for (const State* next : successors(state)) {
+      const auto known = nodes_.find(next);
+      if (known == nodes_.end()) {
+        visit(*next, potential_ns + state.duration_ns);
+        nodes_[&state].low = std::min(nodes_[&state].low, nodes_[next].low);
+      } else if (known->second.component < 0) {
+        nodes_[&state].low = std::min(nodes_[&state].low, known->second.index);
+      }
+    }
+    if (nodes_[&state].low != index) return;
+    const State* member = nullptr;
+    do {
+      member = stack_.back();
+      stack_.pop_back();
+      nodes_[member].component = index;
+    } while (member != &state);
+  }
+
+  std::map<const State*, Node> nodes_;
+  std::vector<const State*> stack_;
+};
+
+}  // namespace
+
+time_ns_t cycle_gcd_ns(const State& initial) {
+  LoopFinder loops;
+  std::vector<const State*> reachable{&initial};
+  for (std::size_t i = 0; i < reachable.size(); ++i) {
+    for (const State* next : successors(*reachable[i])) {
+      if (std::find(reachable.begin(), reachable.end(), next) == reachable.end()) reachable.push_back(next);
+    }
+  }
+  for (const State* state : reachable) {
+    if (!state->is_wait && !loops.visited(*state)) loops.search(*state);
+  }
+  return CycleLengths().gcd_from(initial);
+}
+
+State& FsmBase::add_state(std::string name) {
+  for (const auto& state : states_) {
+    if (state->name == name) {
+      throw Error(ErrorCode::duplicate_name, "the state is declared twice", {.element = "state " + name});
+    }
+  }
+  states_.push_back(std::make_unique<State>());
+  states_.back()->trace_id = TraceNames::intern(name);
+  states_.back()->name = std::move(name);
+  return *states_.back();
+}
+
+State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
+  if (duration_ns <= 0) {
+    throw Error(ErrorCode::bad_fsm, "a wait has no length",
+                {.element = "state " + name, .expected = "a duration > 0 ns", .found = std::to_string(duration_ns)});
+  }
+  State& state = add_state(std::move(name));
+  state.is_wait = true;
+  state.duration_ns = duration_ns;
+  return state;
+}
+
+std::size_t FsmBase::add_method(Method method) {
+  methods_.push_back(std::move(method));
+  return methods_.size() - 1;
+}
+
+CoreBinding FsmBase::bind_dynamic(DynamicCore& core) const {
+  CoreBinding binding{.object = nullptr, .dynamic = &core, .method_slots = {}};
+  for (const Method& method : methods_) {
+    const int slot = core.find_method(method.name());
+    if (slot < 0) {
+      throw Error(ErrorCode::type_mismatch, "the core lacks a method that the fsm calls",
+                  {.element = core.description(),
+                   .expected = "a method '" + method.name() + "' for " + description(),
+                   .remedy = "add the method to the core"});
+    }
+    binding.method_slots.push_back(slot);
+  }
+  return binding;
+}
+
+bool FsmBase::configure_hook() {
+  cleanup_hook();
+  define();
+  if (initial_ == nullptr) {
+    throw Error(ErrorCode::bad_fsm, "the machine has no initial state",
+                {.element = description(), .expected = "set_initial(state)", .remedy = kDeclareRemedy});
+  }
+  for (const auto& state : states_) {
+    if (state->next == nullptr) {
+      throw Error(ErrorCode::bad_fsm, "the state leads nowhere when no guard holds",
+                  {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});
+    }
+  }
+  period_ns_ = cycle_gcd_ns(*initial_);
+  return true;
+}
+
+void FsmBase::cleanup_hook() {
+  states_.clear();
+  methods_.clear();
+  initial_ = nullptr;
+  period_ns_ = 0;
+}
+
+}  // namespace mauve

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/shell.hpp"
+
+#include "mauve_rt/error.hpp"
+
+namespace mauve {
+
+namespace {
+
+template <typename Item>
+Item* find_named(const std::vector<std::unique_ptr<Item>>& items, std::string_view name) noexcept {
+  for (const auto& item : items) {
+    if (item->name() == name) return item.get();
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+PortBase* Shell::find_port(std::string_view name) const noexcept { return find_named(ports_, name); }
+PropertyBase* Shell::find_property(std::string_view name) const noexcept { return find_named(properties_, name); }
+
+void Shell::set_context(const Context* context) noexcept {
+  for (const auto& port : ports_) port->set_context(context);
+}
+
+void Shell::check_new(const std::string& name) const {
+  if (find_port(name) != nullptr || find_property(name) != nullptr) {
+    throw Error(ErrorCode::duplicate_name, "the shell declares the name twice",
+                {.element = name, .remedy = "give ports and properties names of their own"});
+  }
+}
+
+}  // namespace mauve

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Small components for the kernel's tests: one execution state that calls a function, one wait.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "mauve_rt/mauve_rt.hpp"
+
+namespace mauve::testing {
+
+struct Number {
+  double value{};
+};
+
+}  // namespace mauve::testing
+
+MAUVE_TYPE(mauve::testing::Number, "std_msgs/msg/Float64", value)
+
+namespace mauve::testing {
+
+struct TestShell : Shell {
+  Property<double>& gain = property("gain", 1.0, {.unit = "1", .description = "a factor", .minimum = 0.0, .maximum = 10.0});
+  Property<std::int64_t>& period_ms = property("period_ms", 1);
+  ReadPort<Number>& input = read_port<Number>("input", Number{7.0});
+  WritePort<Number>& output = write_port<Number>("output");
+  WritePort<Number>& held = write_port<Number>("held", {.on_commit = OutputPolicy::hold, .on_stop = OutputPolicy::hold});
+};
+
+/// Calls `work` at every activation.
+struct TestCore : Core<TestShell> {
+  std::function<void()> work = [] {};
+  std::atomic<int> runs{0};
+  std::atomic<bool> condition{false};
+  std::vector<time_ns_t> instants;  // logical clock of each activation; reserve before the start
+
+  virtual void act() {
+    runs.fetch_add(1, std::memory_order_relaxed);
+    if (instants.size() < instants.capacity()) instants.push_back(clock_ns());
+    work();
+  }
+  bool is_set() const { return condition.load(std::memory_order_relaxed); }
+  TestShell& exposed_shell() { return shell(); }
+  std::string description() const override { return "core test"; }
+};
+
+/// act -> wait(period_ms) -> act
+struct TestFsm : Fsm<TestShell, TestCore> {
+  void define() override {
+    State& run = execution("Run", "act", &TestCore::act);
+    State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+/// Spins until the condition holds; tests fail after ten seconds of it, whatever the machine does.
+template <typename Condition>
+void wait_until(Condition&& condition, const char* what) {
+  const time_ns_t until = monotonic_now_ns() + s_to_ns(10);
+  while (!condition()) {
+    ASSERT_LT(monotonic_now_ns(), until) << "gave up waiting for: " << what;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+}
+
+inline bool may_use_fifo() {
+  RealtimeProcess process;
+  process.acquire(50, false);
+  for (const std::string& line : process.status().missing) {
+    if (line.starts_with("SCHED_FIFO")) return false;
+  }
+  return true;
+}
+
+/// All records of a kind, of one component.
+inline std::vector<TraceRecord> records_of(const TraceDrain& drain, TraceKind kind, int component = 0) {
+  std::vector<TraceRecord> found;
+  for (const TraceRecord& record : drain.records) {
+    if (record.kind == static_cast<std::uint16_t>(kind) && record.component == component) found.push_back(record);
+  }
+  return found;
+}
+
+/// An architecture of test components, deployed and shut down with the fixture.
+class Deployed : public ::testing::Test {
+ protected:
+  Component& add(const std::string& name, std::int64_t period_ms = 1, TaskSettings settings = {}) {
+    if (settings.cpus.empty()) settings.cpus = {0};
+    Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name, settings);
+    component.set_property("period_ms", period_ms);
+    return component;
+  }
+  static TestCore& core(Component& component) { return component.core_as<TestCore>(); }
+  void deploy() {
+    architecture.configure();
+    deployer.deploy();
+  }
+  static void wait_runs(Component& component, int runs) {
+    TestCore& counted = core(component);
+    wait_until([&] { return counted.runs.load() >= runs; }, "the component to run");
+  }
+
+  Architecture architecture;
+  Deployer deployer{architecture};
+};
+
+}  // namespace mauve::testing

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Ports, resources, serialization.
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+
+struct Inner {
+  std::uint8_t flag{};
+  double value{};
+};
+struct Outer {
+  BoundedString<8> name;
+  std::uint16_t number{};
+  BoundedVector<Inner, 3> items;
+  std::array<std::int8_t, 3> bytes{};
+  bool last{};
+};
+
+}  // namespace mauve::testing
+
+MAUVE_TYPE(mauve::testing::Inner, "test_msgs/msg/Inner", flag, value)
+MAUVE_TYPE(mauve::testing::Outer, "test_msgs/msg/Outer", name, number, items, bytes, last)
+
+namespace mauve::testing {
+namespace {
+
+TEST(Cdr, MatchesTheWireFormatByteForByte) {
+  Outer outer;
+  outer.name.assign("ab");
+  outer.number = 0x0102;
+  outer.items.push_back({1, 2.0});
+  outer.bytes = {7, 8, 9};
+  outer.last = true;
+  std::vector<std::byte> message;
+  CdrWriter(message).put(outer);
+  std::vector<int> bytes;
+  for (const std::byte each : message) bytes.push_back(std::to_integer<int>(each));
+  EXPECT_THAT(bytes, ::testing::ElementsAre(0, 1, 0, 0,                                    // header
+                                            3, 0, 0, 0, 'a', 'b', 0,                       // string, 7 bytes
+                                            0, 2, 1,                                       // aligned to 2
+                                            0, 0, 1, 0, 0, 0,                              // length, aligned to 4
+                                            1, 0, 0, 0, 0, 0, 0, 0,                        // flag, then aligned to 8
+                                            0, 0, 0, 0, 0, 0, 0, 0x40,                     // 2.0
+                                            7, 8, 9, 1));
+  Outer back;
+  ASSERT_TRUE(CdrReader(message).get(back));
+  EXPECT_EQ("ab", back.name.view());
+  EXPECT_EQ(2.0, back.items[0].value);
+  EXPECT_TRUE(back.last);
+}
+
+TEST(Cdr, RefusesWhatIsShortOrTooLong) {
+  Outer outer;
+  outer.items.push_back({1, 2.0});
+  std::vector<std::byte> message;
+  CdrWriter(message).put(outer);
+  for (std::size_t size = 0; size < message.size(); ++size) {
+    Outer back;
+    EXPECT_FALSE(CdrReader(std::span(message).first(size)).get(back)) << size;
+  }
+  struct Wide {
+    BoundedVector<std::uint32_t, 9> items;
+  };
+  std::vector<std::byte> excessive;
+  CdrWriter writer(excessive);
+  writer.put(std::uint32_t{1'000'000});
+  BoundedVector<std::uint32_t, 9> items;
+  EXPECT_FALSE(CdrReader(excessive).get(items));
+}
+
+struct PortsFixture : ::testing::Test {
+  TestShell shell;
+  SharedData<Number> shared;
+  RingBuffer<Number> ring{2};
+};
+
+TEST_F(PortsFixture, AnUnconnectedReadPortYieldsItsDefault) {
+  const Sample<Number> sample = shell.input.read();
+  EXPECT_EQ(7.0, sample.value.value);
+  EXPECT_EQ(DataStatus::none, sample.status);
+}
+
+TEST_F(PortsFixture, StatusIsPerPort) {
+  TestShell second;
+  shell.input.connect(shared.read, "shared");
+  second.input.connect(shared.read, "shared");
+  EXPECT_EQ(DataStatus::none, shell.input.read().status);
+  shell.output.connect(shared.write, "shared");
+  shell.output.write({1.0});
+  EXPECT_EQ(DataStatus::new_data, shell.input.read().status);
+  EXPECT_EQ(DataStatus::old_data, shell.input.read().status);
+  EXPECT_EQ(DataStatus::new_data, second.input.read().status);
+}
+
+TEST_F(PortsFixture, WritersTimeIsTheLogicalClockOrTheRealOne) {
+  shell.input.connect(shared.read, "shared");
+  shell.output.connect(shared.write, "shared");
+  const time_ns_t before = monotonic_now_ns();
+  shell.output.write({1.0});
+  EXPECT_GE(shell.input.read().time_ns, before);
+  Context context;
+  context.clock_ns = 1234;
+  shell.set_context(&context);
+  shell.output.write({1.0});
+  EXPECT_EQ(1234, shell.input.read().time_ns);
+}
+
+TEST_F(PortsFixture, ARingGivesEachElementToOneReaderAndRefusesWhenFull) {
+  TestShell second;
+  shell.output.connect(ring.write, "ring");
+  shell.input.connect(ring.read, "ring");
+  second.input.connect(ring.read, "ring");
+  EXPECT_TRUE(shell.output.write({1.0}));
+  EXPECT_TRUE(shell.output.write({2.0}));
+  EXPECT_FALSE(shell.output.write({3.0}));
+  EXPECT_EQ(1U, ring.lost());
+  EXPECT_EQ(1.0, shell.input.read().value.value);
+  EXPECT_EQ(2.0, second.input.read().value.value);
+  EXPECT_EQ(DataStatus::old_data, shell.input.read().status);
+}
+
+TEST_F(PortsFixture, AnOverwritingRingKeepsTheNewest) {
+  RingBuffer<Number> overwriting(2, WhenFull::overwrite);
+  shell.output.connect(overwriting.write, "ring");
+  shell.input.connect(overwriting.read, "ring");
+  for (const double value : {1.0, 2.0, 3.0}) EXPECT_TRUE(shell.output.write({value}));
+  EXPECT_EQ(2.0, shell.input.read().value.value);
+  EXPECT_EQ(3.0, shell.input.read().value.value);
+}
+
+TEST_F(PortsFixture, ConnectingUnequalTypesOrKindsIsRefused) {
+  SharedData<Inner> other;
+  EXPECT_THROW(shell.input.connect(other.read, "other"), Error);
+  EXPECT_THROW(shell.input.connect(shared.write, "shared"), Error);
+  EXPECT_FALSE(shell.input.is_connected());
+}
+
+TEST(ArchitectureErrors, NameWhatIsThere) {
+  Architecture architecture;
+  architecture.add_component<TestShell, TestCore, TestFsm>("c");
+  architecture.add_resource<SharedData<Number>>("r");
+  const auto code = [&](const char* component, const char* port, const char* resource, const char* service) {
+    try {
+      architecture.connect(component, port, resource, service);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ErrorCode::internal;
+  };
+  EXPECT_EQ(ErrorCode::unknown_component, code("x", "input", "r", "read"));
+  EXPECT_EQ(ErrorCode::unknown_port, code("c", "inptu", "r", "read"));
+  EXPECT_EQ(ErrorCode::unknown_resource, code("c", "input", "x", "read"));
+  EXPECT_EQ(ErrorCode::unknown_service, code("c", "input", "r", "get"));
+  EXPECT_EQ(ErrorCode::type_mismatch, code("c", "input", "r", "write"));
+  EXPECT_EQ(ErrorCode::internal, code("c", "input", "r", "read"));
+  EXPECT_EQ(ErrorCode::duplicate_name, code("c", "input", "r", "read"));
+  EXPECT_THROW((architecture.add_component<TestShell, TestCore, TestFsm>("c")), Error);
+  EXPECT_THROW((architecture.add_component<TestShell, TestCore, TestFsm>("d", {.priority = 99})), Error);
+  EXPECT_THROW((architecture.add_component<TestShell, TestCore, TestFsm>("d", {.priority = 0})), Error);
+}
+
+TEST(TraceRing, CountsWhatItCannotKeep) {
+  TraceRing ring(3, 4);
+  for (int i = 0; i < 6; ++i) ring.push(TraceKind::mark, 0, i);
+  EXPECT_EQ(6U, ring.offered());
+  EXPECT_EQ(2U, ring.dropped());
+  std::vector<TraceRecord> records;
+  ring.drain(records);
+  ASSERT_EQ(4U, records.size());
+  ring.push(TraceKind::mark, 0, 6);
+  ring.drain(records);
+  EXPECT_EQ(6U, records.back().sequence) << "the gap in the sequence shows the loss";
+  EXPECT_EQ(3, records.back().component);
+}
+
+TEST(TraceRing, LosesNothingBetweenTwoThreads) {
+  TraceRing ring(0, 256);
+  std::atomic<bool> done{false};
+  std::thread producer([&] {
+    for (int i = 0; i < 100'000; ++i) ring.push_at(i, TraceKind::mark, 0, i);
+    done = true;
+  });
+  std::vector<TraceRecord> records;
+  while (!done) ring.drain(records);
+  producer.join();
+  ring.drain(records);
+  EXPECT_EQ(100'000U, records.size() + ring.dropped());
+  for (std::size_t i = 1; i < records.size(); ++i) ASSERT_LT(records[i - 1].sequence, records[i].sequence);
+  for (const TraceRecord& record : records) ASSERT_EQ(record.time_ns, record.a);
+}
+
+TEST(LatencyHistogram, QuantilesAreWithinAnEighth) {
+  LatencyHistogram histogram;
+  for (time_ns_t latency = 1; latency <= 10'000; ++latency) histogram.record(latency);
+  EXPECT_NEAR(5000.0, static_cast<double>(histogram.quantile_ns(0.5)), 5000.0 / 8);
+  EXPECT_NEAR(9900.0, static_cast<double>(histogram.quantile_ns(0.99)), 9900.0 / 8);
+  EXPECT_EQ(10'000, histogram.max_ns());
+}
+
+}  // namespace
+}  // namespace mauve::testing

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Three priorities on one CPU: the highest waits for the lowest's lock, the middle one must not come between.
+#include <pthread.h>
+#include <sched.h>
+
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+pthread_t make_thread(int priority, void* (*entry)(void*), void* argument) {
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  cpu_set_t cpus;
+  CPU_ZERO(&cpus);
+  CPU_SET(0, &cpus);
+  pthread_attr_setaffinity_np(&attributes, sizeof(cpus), &cpus);
+  pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+  pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+  const sched_param scheduling{.sched_priority = priority};
+  pthread_attr_setschedparam(&attributes, &scheduling);
+  pthread_t thread{};
+  EXPECT_EQ(0, pthread_create(&thread, &attributes, entry, argument));
+  pthread_attr_destroy(&attributes);
+  return thread;
+}
+
+void spin(time_ns_t duration) {
+  const time_ns_t until = monotonic_now_ns() + duration;
+  while (monotonic_now_ns() < until) {
+  }
+}
+
+struct Scene {
+  PiMutex mutex;
+  std::atomic<bool> low_holds{false};
+  std::atomic<bool> high_waits{false};
+  std::atomic<int> order{0};
+  int high_came{0};
+  int middle_came{0};
+};
+
+TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {
+  if (!may_use_fifo()) GTEST_SKIP() << "needs the right to SCHED_FIFO (rtprio limit)";
+  Scene scene;
+  const pthread_t low = make_thread(10, [](void* argument) -> void* {
+    auto& scene = *static_cast<Scene*>(argument);
+    scene.mutex.lock();
+    scene.low_holds = true;
+    while (!scene.high_waits) sched_yield();
+    spin(ms_to_ns(5));  // with the middle one ready to run, only an inherited priority gets this done
+    scene.mutex.unlock();
+    return nullptr;
+  }, &scene);
+  while (!scene.low_holds) std::this_thread::yield();
+  const pthread_t high = make_thread(30, [](void* argument) -> void* {
+    auto& scene = *static_cast<Scene*>(argument);
+    scene.high_waits = true;
+    scene.mutex.lock();
+    scene.high_came = ++scene.order;
+    scene.mutex.unlock();
+    return nullptr;
+  }, &scene);
+  const pthread_t middle = make_thread(20, [](void* argument) -> void* {
+    auto& scene = *static_cast<Scene*>(argument);
+    spin(ms_to_ns(50));
+    scene.middle_came = ++scene.order;
+    return nullptr;
+  }, &scene);
+  for (const pthread_t thread : {low, high, middle}) pthread_join(thread, nullptr);
+  EXPECT_EQ(1, scene.high_came);
+  EXPECT_EQ(2, scene.middle_came);
+}
+
+class Contention : public Deployed {};
+
+TEST_F(Contention, IsTracedWithItsHolder) {
+  PiMutex mutex;
+  mutex.set_trace_id(TraceNames::intern("contended_mutex"));
+  Component& component = add("c", 1);
+  std::atomic<bool> ask{false};
+  core(component).work = [&] {
+    if (!ask.exchange(false)) return;
+    mutex.lock();
+    mutex.unlock();
+  };
+  deploy();
+  mutex.lock();
+  ask = true;
+  wait_until([&] { return !ask; }, "the component to want the lock");
+  std::this_thread::sleep_for(std::chrono::milliseconds(3));
+  mutex.unlock();
+  const int runs = core(component).runs;
+  wait_runs(component, runs + 1);
+  const auto contended = records_of(deployer.drain_trace(), TraceKind::contended);
+  ASSERT_EQ(1U, contended.size());
+  EXPECT_EQ(gettid(), contended[0].a);
+  EXPECT_GT(contended[0].b, 0);
+}
+
+}  // namespace
+}  // namespace mauve::testing
