@@ -1,0 +1,51 @@
+# Where ROS is, the interpreter, pybind11, and the one folder that all Python modules of this project are installed to.
+
+# A sourced ROS names its prefixes in this variable, which CMake itself does not read.
+file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" _ament_prefixes)
+list(APPEND CMAKE_PREFIX_PATH ${_ament_prefixes})
+
+find_package(Python3 REQUIRED COMPONENTS Interpreter Development.Module)
+
+# ament computes the same folder, except where a distribution patches Python's default scheme. Setting it here keeps
+# mauve_msgs, mauve_rt and mauve_examples side by side.
+set(PYTHON_INSTALL_DIR "lib/python${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}/site-packages")
+
+if(NOT pybind11_DIR)
+  execute_process(
+    COMMAND "${Python3_EXECUTABLE}" -c "import pybind11; print(pybind11.get_cmake_dir())"
+    OUTPUT_VARIABLE _pybind11_dir OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE _result)
+  if(_result EQUAL 0)
+    set(pybind11_DIR "${_pybind11_dir}" CACHE PATH "")
+  endif()
+endif()
+# After Python3: otherwise pybind11 looks for an interpreter of its own.
+find_package(pybind11 2.11 REQUIRED)
+
+# mauve_add_python_module(<name> PACKAGE <package> SOURCES ... LIBRARIES ...): a pybind11 module inside a package.
+function(mauve_add_python_module name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;LIBRARIES")
+  set(target ${arg_PACKAGE}_${name})
+  pybind11_add_module(${target} MODULE ${arg_SOURCES})
+  set_target_properties(${target} PROPERTIES
+    OUTPUT_NAME ${name}
+    INSTALL_RPATH "$ORIGIN/../../..")  # site-packages/<package> -> lib
+  target_link_libraries(${target} PRIVATE ${arg_LIBRARIES} mauve_warnings mauve_sanitizers)
+  install(TARGETS ${target} LIBRARY DESTINATION "${PYTHON_INSTALL_DIR}/${arg_PACKAGE}")
+endfunction()
+
+# mauve_install_python_package(<package>): its Python sources, type information and data files.
+function(mauve_install_python_package package)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/${package}/" DESTINATION "${PYTHON_INSTALL_DIR}/${package}"
+    FILES_MATCHING
+    PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json"
+    PATTERN "__pycache__" EXCLUDE
+    PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE
+    PATTERN "maps" EXCLUDE PATTERN "architecture" EXCLUDE PATTERN "launch" EXCLUDE)
+endfunction()
+
+# mauve_register_package(<name>): lets `ros2 run`, `ros2 pkg` and our own plug-in search find the package.
+function(mauve_register_package name)
+  file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/ament_index/${name}" "")
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/ament_index/${name}"
+    DESTINATION share/ament_index/resource_index/packages)
+endfunction()

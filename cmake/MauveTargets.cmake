@@ -1,0 +1,39 @@
+# What every C++ target of the project shares: language, warnings, sanitizers, run-time paths.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+# For our own sources, never for generated ones.
+add_library(mauve_warnings INTERFACE)
+target_compile_options(mauve_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Werror)
+
+add_library(mauve_sanitizers INTERFACE)
+if(MAUVE_SANITIZE)
+  target_compile_options(mauve_sanitizers INTERFACE
+    -fsanitize=${MAUVE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(mauve_sanitizers INTERFACE -fsanitize=${MAUVE_SANITIZE})
+endif()
+
+# Parts are written one after the other: what is not there yet is left out.
+macro(mauve_add_part folder)
+  if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/CMakeLists.txt")
+    add_subdirectory("${folder}")
+  endif()
+endmacro()
+
+# mauve_add_programs(PATTERN <glob> LIBRARIES <targets>... [TESTS]): one executable per source, named as the file.
+# TESTS registers every GoogleTest case with ctest; cases are listed when ctest runs, not while building.
+function(mauve_add_programs)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "TESTS" "PATTERN" "LIBRARIES")
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${arg_PATTERN}")
+  foreach(source IN LISTS sources)
+    get_filename_component(name "${source}" NAME_WE)
+    add_executable(${name} "${source}")
+    target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} mauve_warnings mauve_sanitizers)
+    if(arg_TESTS)
+      gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES TIMEOUT 120)
+    endif()
+  endforeach()
+endfunction()

@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""Check the dependencies that no other tool sees.
+
+C++ includes point one way: kernel <- bindings, bridge. Examples and benchmarks use what is public only: the
+headers <mauve_rt/*.hpp>, and of the Python package nothing whose name starts with an underscore. import-linter
+checks the layers inside the Python packages; it sees no compiled module.
+
+    scripts/check_includes.py [ROOT]
+
+Prints one line per offending line and exits 1 when there is one.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+SOURCES = {".cpp", ".hpp", ".h", ".cc"}
+
+ROS = r"(rcl|rclcpp|rcutils|rcpputils|rmw|rosidl|ament|fastrtps|fastcdr)\w*/|\w+_msgs/|\w+_interfaces/"
+PYTHON = r"pybind11/|Python\.h|pyconfig\.h"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Files under `folder` must not include what matches `forbidden`."""
+
+    folder: str
+    forbidden: re.Pattern[str]
+    reason: str
+
+
+def rule(folder: str, forbidden: str, reason: str) -> Rule:
+    """Build a rule; `forbidden` is matched at the start of the included path."""
+    return Rule(folder=folder, forbidden=re.compile(forbidden), reason=reason)
+
+
+RULES = (
+    rule("mauve_rt/kernel", ROS, "the kernel does not know ROS"),
+    rule("mauve_rt/kernel", PYTHON, "the kernel does not know Python"),
+    rule("mauve_rt/kernel", r"mauve_examples/", "the kernel does not know the examples"),
+    rule("mauve_rt/bindings", ROS, "bindings translate the kernel only; ROS belongs in the bridge"),
+    rule("mauve_rt/bindings", r"mauve_examples/", "bindings do not know the examples"),
+    rule("mauve_rt/bridge", r"mauve_examples/", "the bridge does not know the examples"),
+    rule("tests/kernel", ROS + "|" + PYTHON, "kernel tests run where there is neither ROS nor Python"),
+)
+
+# Examples and benchmarks see the kernel as any user does.
+PUBLIC_ONLY = ("mauve_examples", "benchmarks")
+PRIVATE_PATH = re.compile(r"(\.\./)+mauve_rt/|.*\bkernel/|mauve_rt/(detail|internal)/|mauve_rt/.*\.(h|cpp)$")
+
+
+def includes(path: Path) -> list[tuple[int, str]]:
+    """Return (line number, included path) of every include in the file."""
+    found = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        match = INCLUDE.match(line)
+        if match:
+            found.append((number, match.group(2)))
+    return found
+
+
+def cpp_files(folder: Path) -> list[Path]:
+    """Return every C++ file under the folder, sorted."""
+    return sorted(path for path in folder.rglob("*") if path.suffix in SOURCES and path.is_file())
+
+
+def imported_names(tree: ast.Module) -> list[tuple[int, str]]:
+    """Return (line number, full dotted name) of everything a Python file imports."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(node.lineno, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found += [(node.lineno, f"{node.module}.{alias.name}") for alias in node.names]
+    return found
+
+
+def is_private(name: str) -> bool:
+    """Say whether a dotted name is a private part of mauve_rt."""
+    package, *parts = name.split(".")
+    return package == "mauve_rt" and any(part.startswith("_") and not part.endswith("__") for part in parts)
+
+
+def private_imports(root: Path, folder: str) -> list[str]:
+    """Return one line per import of a private part of mauve_rt in a folder's Python files."""
+    lines = []
+    for path in sorted((root / folder).rglob("*.py")):
+        names = imported_names(ast.parse(path.read_text(encoding="utf-8")))
+        lines += [
+            f"{path.relative_to(root)}:{number}: imports {name}: only public modules of mauve_rt"
+            for number, name in names
+            if is_private(name)
+        ]
+    return lines
+
+
+def violations(root: Path) -> list[str]:
+    """Return one line per include or import that breaks a rule."""
+    lines = []
+    for item in RULES:
+        for path in cpp_files(root / item.folder):
+            lines += [
+                f"{path.relative_to(root)}:{number}: includes {name}: {item.reason}"
+                for number, name in includes(path)
+                if item.forbidden.match(name)
+            ]
+    for folder in PUBLIC_ONLY:
+        for path in cpp_files(root / folder):
+            lines += [
+                f"{path.relative_to(root)}:{number}: includes {name}: only public headers, <mauve_rt/*.hpp>"
+                for number, name in includes(path)
+                if PRIVATE_PATH.match(name)
+            ]
+        lines += private_imports(root, folder)
+    return lines
+
+
+def main() -> int:
+    """Check the tree and return the exit status."""
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent.parent
+    found = violations(root)
+    for line in found:
+        sys.stdout.write(line + "\n")
+    sys.stdout.write(f"{len(found)} forbidden includes and imports\n")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,61 @@
+# Shared by the scripts of this folder: sourced, never run.
+# shellcheck shell=bash disable=SC2034 # variables for the scripts that source it
+
+MAUVE_ROOT="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)"
+MAUVE_VENV="$MAUVE_ROOT/.venv"
+MAUVE_BUILD="$MAUVE_ROOT/build"
+MAUVE_INSTALL="$MAUVE_ROOT/install"
+
+# Print the comment at the top of the running script.
+usage() { awk 'NR > 1 { if (!/^#/) exit; sub(/^# ?/, ""); print }' "$0"; }
+
+# Build what is not built yet (silent when all is up to date) and load the environment. Ends the script on failure.
+mauve_ready() {
+  "$MAUVE_ROOT/scripts/setup" --quiet || exit $?
+  mauve_environment
+}
+
+# Load install/setup.bash into this shell.
+mauve_environment() {
+  # shellcheck source=/dev/null
+  source "$MAUVE_INSTALL/setup.bash"
+}
+
+# Seconds since the epoch with milliseconds, as an integer of milliseconds.
+now_ms() {
+  local now=${EPOCHREALTIME/[.,]/}
+  echo $((now / 1000))
+}
+
+# 12345 -> 12.3
+seconds_of_ms() { printf '%d.%d' $(($1 / 1000)) $(($1 % 1000 / 100)); }
+
+# with_lock NAME COMMAND...: one at a time in this clone; a second caller waits and says so.
+with_lock() {
+  local lock="$MAUVE_BUILD/.$1.lock" status
+  shift
+  mkdir -p "$MAUVE_BUILD"
+  exec {lock_fd}>"$lock"
+  if ! flock -n "$lock_fd"; then
+    echo "waiting for another run in this clone" >&2
+    flock "$lock_fd"
+  fi
+  "$@"
+  status=$?
+  exec {lock_fd}>&-
+  return "$status"
+}
+
+# run_stage NAME COMMAND...: print the stage's name, its outcome and its duration; remember a failure in failed_stages.
+failed_stages=()
+run_stage() {
+  local name=$1 start outcome=ok
+  shift
+  start=$(now_ms)
+  printf '\n== %s\n' "$name"
+  if ! "$@"; then
+    outcome=FAILED
+    failed_stages+=("$name")
+  fi
+  printf '== %s: %s (%s s)\n' "$name" "$outcome" "$(seconds_of_ms $(($(now_ms) - start)))"
+}

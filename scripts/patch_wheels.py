@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""Rewrite the build machine's paths in the CMake files of the ROS 2 wheels.
+
+The wheels name the folders of the machine that built them: the interpreter's headers, numpy's headers and a
+system library. Run once after `pip install`, with the environment's own python; a second run changes nothing.
+
+    .venv/bin/python scripts/patch_wheels.py
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import sysconfig
+from pathlib import Path
+
+
+def patched(text: str, *, prefix: str, include: str) -> str:
+    """Return `text` with every path of the build machine replaced by this machine's."""
+    text = re.sub(r"/opt/python/cp\w+-cp\w+/include/python[\d.]+t?", lambda _: include, text)
+    text = re.sub(r"/opt/python/cp\w+-cp\w+", lambda _: prefix, text)
+    return text.replace("/usr/lib64/libtinyxml2.so;", "")
+
+
+def main() -> int:
+    """Patch the environment of the running interpreter and say how many files changed."""
+    prefix = Path(sys.prefix)
+    if not (prefix / "pyvenv.cfg").is_file():
+        sys.stderr.write(f"patch_wheels: {prefix} is no virtual environment; use its own python\n")
+        return 2
+    include = sysconfig.get_paths()["include"]
+    changed = 0
+    for folder in (prefix / "share", prefix / "lib" / "cmake"):
+        for path in folder.rglob("*.cmake"):
+            before = path.read_text(encoding="utf-8")
+            after = patched(before, prefix=str(prefix), include=include)
+            if after != before:
+                path.write_text(after, encoding="utf-8")
+                changed += 1
+    sys.stdout.write(f"patch_wheels: {changed} files changed\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
