@@ -2,8 +2,8 @@
 """Check the dependencies that no other tool sees.
 
 C++ includes point one way: kernel <- bindings, bridge. Examples and benchmarks use what is public only: the
-headers <mauve_rt/*.hpp>, and of the Python package nothing whose name starts with an underscore. import-linter
-checks the layers inside the Python packages; it sees no compiled module.
+headers <mauve_rt/*.hpp>, and of the Python package nothing whose name starts with an underscore.
+import-linter checks the layers inside the Python packages; it sees no compiled module.
 
     scripts/check_includes.py [ROOT]
 

@@ -16,8 +16,10 @@ constexpr time_ns_t kWatchPeriod = ms_to_ns(5);
 constexpr time_ns_t kStopTimeout = ms_to_ns(500);
 constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 
+}  // namespace
+
 /// The barrier that component threads and deployer meet at.
-class Barrier {
+class Deployer::Barrier {
  public:
   explicit Barrier(std::size_t parties) : missing_(parties) {
     pthread_barrier_init(&barrier_, nullptr, static_cast<unsigned>(parties));
@@ -41,8 +43,6 @@ class Barrier {
   std::size_t missing_;
 };
 
-}  // namespace
-
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
     : architecture_(architecture), options_(options) {}
 
@@ -64,18 +64,18 @@ void Deployer::deploy() {
   }
   prepare_process();
   const auto& components = architecture_.components();
-  Barrier barrier(components.size() + 1);
+  barrier_ = std::make_unique<Barrier>(components.size() + 1);
   try {
     for (const auto& component : components) {
-      component->task().create_thread(barrier.get(), options_.require_realtime, options_.trace);
-      barrier.created_one();
+      component->task().create_thread(barrier_->get(), options_.require_realtime, options_.trace);
+      barrier_->created_one();
     }
   } catch (...) {
-    barrier.stand_in();
+    barrier_->stand_in();
     for (const auto& component : components) component->task().end_thread(kForever);
     throw;
   }
-  barrier.arrive();
+  barrier_->arrive();
 
   // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
   const auto count = static_cast<time_ns_t>(components.size());

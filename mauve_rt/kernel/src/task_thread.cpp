@@ -135,6 +135,10 @@ bool Task::wait_for_start() noexcept {
   for (;;) {
     const std::uint32_t control = control_.load(std::memory_order_acquire);
     if ((control & kExit) != 0) return false;
+    if ((control & kCommit) != 0) {  // posted just before the park, too late for park() to see
+      refuse_pending_commit();
+      continue;
+    }
     if ((control & kStart) != 0) {
       control_.fetch_and(~kStart, std::memory_order_acq_rel);
       parked_.store(0, std::memory_order_release);
@@ -349,11 +353,11 @@ void Task::wait_condemned() const noexcept {
 
 void Task::park(ComponentState state) noexcept {
   if (state == ComponentState::faulted) write_outputs(false);
-  refuse_pending_commit();
   deferrals_ = 0;
   control_.fetch_and(~kStop, std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_release);
   publish_state(state);
+  refuse_pending_commit();  // last: who is refused finds the state that tells why
 }
 
 void Task::publish_state(ComponentState state) noexcept {

@@ -10,7 +10,8 @@
 
 namespace mauve {
 
-inline constexpr std::int64_t kNotMeasured = INT64_MIN;
+/// In place of a figure that was not measured; as mauve_msgs/msg/StepReport.NOT_MEASURED.
+inline constexpr std::int64_t kNotMeasured = -INT64_MAX;
 
 /// What one step of a reconfiguration cost; fields as mauve_msgs/msg/StepReport.
 struct StepReport {

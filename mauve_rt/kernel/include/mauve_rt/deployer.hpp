@@ -64,6 +64,8 @@ class Deployer {
   std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
 
  private:
+  class Barrier;
+
   void require_deployed() const;
   void watch() noexcept;
 
@@ -73,6 +75,7 @@ class Deployer {
   std::mutex command_mutex_;
   std::atomic<bool> deployed_{false};  // seq_cst: set and cleared under the mutex, read for messages only
   time_ns_t epoch_ns_{0};
+  std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::thread watchdog_;
   std::atomic<std::uint32_t> watchdog_stop_{0};
 };
