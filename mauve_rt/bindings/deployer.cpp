@@ -2,6 +2,7 @@
 #include "mauve_rt/deployer.hpp"
 
 #include "mauve_rt/futex.hpp"
+
 #include "translate.hpp"
 
 namespace mauve::bindings {
@@ -33,11 +34,13 @@ class PyDeployer {
     const time_ns_t until = monotonic_now_ns() + timeout_ns;
     std::vector<PublishedSample> samples;
     for (;;) {
-      const std::uint32_t word = architecture_.publications().word();  // before the look: what comes after is noticed
+      const std::uint32_t word =
+          architecture_.publications().word();  // before the look: what comes after is noticed
       std::string resource;
       std::vector<std::byte> message;
       time_ns_t time_ns = 0;
-      while (architecture_.next_published(resource, message, time_ns)) samples.emplace_back(resource, message, time_ns);
+      while (architecture_.next_published(resource, message, time_ns))
+        samples.emplace_back(resource, message, time_ns);
       if (!samples.empty() || woken() || monotonic_now_ns() >= until) return samples;
       architecture_.publications().wait(word, until);
     }
@@ -88,7 +91,9 @@ class PyDeployer {
   std::uint32_t seen_change_{0};    // of the one thread that waits for changes
 };
 
-CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) { return {.commit_ns = commit_ns, .phase_ns = phase_ns}; }
+CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
+  return {.commit_ns = commit_ns, .phase_ns = phase_ns};
+}
 
 void bind_reports(py::module_& module) {
   py::class_<StepReport>(module, "StepReport")
@@ -105,9 +110,11 @@ void bind_reports(py::module_& module) {
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);
   py::class_<TraceDrain>(module, "TraceDrain")
-      .def_property_readonly(
-          "records",
-          [](const TraceDrain& self) { return to_bytes(self.records.data(), self.records.size() * sizeof(TraceRecord)); })
+      .def_property_readonly("records",
+                             [](const TraceDrain& self) {
+                               return to_bytes(self.records.data(),
+                                               self.records.size() * sizeof(TraceRecord));
+                             })
       .def_readonly("written", &TraceDrain::written)
       .def_readonly("dropped", &TraceDrain::dropped)
       .def_readonly("monotonic_ns", &TraceDrain::monotonic_ns)
@@ -121,9 +128,12 @@ void bind_deployer(py::module_& module) {
   py::class_<PyDeployer>(module, "Deployer")
       .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
            py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>())
-      .def("prepare_process", [](PyDeployer& self) { self.deployer().prepare_process(); }, Unlocked())
-      .def("deploy", [](PyDeployer& self) { self.deployer().deploy(); }, Unlocked())
-      .def("shutdown", [](PyDeployer& self) { self.deployer().shutdown(); }, Unlocked())
+      .def(
+          "prepare_process", [](PyDeployer& self) { self.deployer().prepare_process(); }, Unlocked())
+      .def(
+          "deploy", [](PyDeployer& self) { self.deployer().deploy(); }, Unlocked())
+      .def(
+          "shutdown", [](PyDeployer& self) { self.deployer().shutdown(); }, Unlocked())
       .def(
           "stop",
           [](PyDeployer& self, const std::string& component, time_ns_t timeout_ns) {
@@ -137,27 +147,30 @@ void bind_deployer(py::module_& module) {
           },
           py::arg("component"), py::arg("clock_ns") = std::nullopt, Unlocked())
       .def(
-          "get_time", [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
+          "get_time",
+          [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
           py::arg("component"), Unlocked())
       .def(
           "replace_core",
-          [](PyDeployer& self, const std::string& component, const std::string& core, time_ns_t commit_timeout_ns,
-             time_ns_t phase_timeout_ns) {
-            return self.deployer().replace_core(component, core, timeouts(commit_timeout_ns, phase_timeout_ns));
+          [](PyDeployer& self, const std::string& component, const std::string& core,
+             time_ns_t commit_timeout_ns, time_ns_t phase_timeout_ns) {
+            return self.deployer().replace_core(component, core,
+                                                timeouts(commit_timeout_ns, phase_timeout_ns));
           },
           py::arg("component"), py::arg("core"), py::kw_only(), py::arg("commit_timeout_ns") = s_to_ns(1),
           py::arg("phase_timeout_ns") = s_to_ns(1), Unlocked())
       .def(
           "set_property",
-          [](PyDeployer& self, const std::string& component, const std::string& name, const PropertyValue& value,
-             time_ns_t commit_timeout_ns) {
+          [](PyDeployer& self, const std::string& component, const std::string& name,
+             const PropertyValue& value, time_ns_t commit_timeout_ns) {
             return self.deployer().set_property(component, name, value, timeouts(commit_timeout_ns, 0));
           },
           py::arg("component"), py::arg("name"), py::arg("value"), py::kw_only(),
           py::arg("commit_timeout_ns") = s_to_ns(1), Unlocked())
       .def("realtime_status", [](PyDeployer& self) { return self.deployer().realtime_status(); })
       .def_property_readonly("epoch_ns", [](PyDeployer& self) { return self.deployer().epoch_ns(); })
-      .def("drain_trace", [](PyDeployer& self) { return self.deployer().drain_trace(); }, Unlocked())
+      .def(
+          "drain_trace", [](PyDeployer& self) { return self.deployer().drain_trace(); }, Unlocked())
       .def("trace_components", &PyDeployer::trace_components)
       .def("trace_names", [](PyDeployer&) { return TraceNames::all(); })
       .def(

@@ -22,13 +22,14 @@ std::vector<PropertyDescription> describe_properties(const Shell& shell) {
   return describe_properties(shell, values);
 }
 
-std::vector<PropertyDescription> describe_properties(const Shell& shell, const std::vector<PropertyValue>& values) {
+std::vector<PropertyDescription> describe_properties(const Shell& shell,
+                                                     const std::vector<PropertyValue>& values) {
   std::vector<PropertyDescription> properties;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const PropertyBase& property = *shell.properties()[i];
     const PropertyOptions& options = property.options();
-    properties.push_back({property.name(), std::string(property_type_name(values[i])), values[i], options.unit,
-                          options.description, options.minimum, options.maximum});
+    properties.push_back({property.name(), std::string(property_type_name(values[i])), values[i],
+                          options.unit, options.description, options.minimum, options.maximum});
   }
   return properties;
 }
@@ -36,7 +37,8 @@ std::vector<PropertyDescription> describe_properties(const Shell& shell, const s
 ResourceDescription describe_resource(const Resource& resource) {
   ResourceDescription description{resource.name(), resource.kind(), resource.type(), {}};
   for (const ServiceBase* service : resource.services()) {
-    description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type()});
+    description.services.push_back(
+        {service->name(), std::string(to_string(service->kind())), service->type()});
   }
   return description;
 }
@@ -66,7 +68,9 @@ ComponentDescription describe_component(Component& component) {
           .reconfigurable = component.is_reconfigurable(),
           .ports = describe_ports(component.shell()),
           .properties = describe_properties(component.shell(), component.property_values()),
-          .fault = faulted ? fault.what + " (in state " + fault.where + ", at " + std::to_string(fault.when_ns) + " ns)" : "",
+          .fault = faulted ? fault.what + " (in state " + fault.where + ", at " +
+                                 std::to_string(fault.when_ns) + " ns)"
+                           : "",
           .releases = statistics.releases.load(std::memory_order_relaxed),
           .overruns = statistics.overruns.load(std::memory_order_relaxed),
           .skipped = statistics.skipped.load(std::memory_order_relaxed),

@@ -6,9 +6,10 @@ namespace mauve::bindings {
 void bind_errors(py::module_& module) {
   // Static: exceptions are translated for as long as the interpreter lives, and it never unloads the module.
   static const py::handle mauve_error = PyErr_NewExceptionWithDoc(
-      "mauve_rt._kernel.MauveError", "An error of the kernel: code, component, element, expected, found, remedy.",
-      nullptr, nullptr);
+      "mauve_rt._kernel.MauveError",
+      "An error of the kernel: code, component, element, expected, found, remedy.", nullptr, nullptr);
   module.attr("MauveError") = mauve_error;
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
   py::register_exception_translator([](std::exception_ptr pending) {
     try {
       if (pending) std::rethrow_exception(pending);

@@ -25,10 +25,11 @@ void bind_registry(py::module_& module) {
           "add_python_core",
           [](PluginRegistry& self, const std::string& name, const std::string& shell, py::object factory) {
             // Shared, and given back under the interpreter's lock wherever the registry ends.
-            const std::shared_ptr<py::object> kept(new py::object(std::move(factory)), [](py::object* object) {
-              const py::gil_scoped_acquire lock;
-              delete object;
-            });
+            const std::shared_ptr<py::object> kept(new py::object(std::move(factory)),
+                                                   [](py::object* object) {
+                                                     const py::gil_scoped_acquire lock;
+                                                     delete object;
+                                                   });
             self.add_core(name, shell, [kept] {
               const py::gil_scoped_acquire lock;
               return make_python_core(*kept);
@@ -60,8 +61,8 @@ void bind_architecture(py::module_& module) {
           "add_component",
           [](PyArchitecture& self, const std::string& name, const std::string& shell, const std::string& core,
              const std::string& fsm, int priority, const std::vector<int>& cpus, time_ns_t offset_ns,
-             time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog, std::size_t stack_bytes,
-             const std::vector<std::string>& alternatives, bool reconfigurable) {
+             time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
+             std::size_t stack_bytes, const std::vector<std::string>& alternatives, bool reconfigurable) {
             Component& component =
                 self.architecture.add_component(name, shell, core, fsm,
                                                 TaskSettings{.priority = priority,
@@ -73,45 +74,54 @@ void bind_architecture(py::module_& module) {
                                                              .stack_bytes = stack_bytes});
             component.allow(alternatives, reconfigurable);
           },
-          py::arg("name"), py::kw_only(), py::arg("shell"), py::arg("core"), py::arg("fsm"), py::arg("priority") = 50,
-          py::arg("cpus") = std::vector<int>{}, py::arg("offset_ns") = 0, py::arg("period_ns") = 0,
-          py::arg("overrun") = "skip", py::arg("max_backlog") = 10, py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
+          py::arg("name"), py::kw_only(), py::arg("shell"), py::arg("core"), py::arg("fsm"),
+          py::arg("priority") = 50, py::arg("cpus") = std::vector<int>{}, py::arg("offset_ns") = 0,
+          py::arg("period_ns") = 0, py::arg("overrun") = "skip", py::arg("max_backlog") = 10,
+          py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
           py::arg("alternatives") = std::vector<std::string>{}, py::arg("reconfigurable") = true)
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const std::string& kind, const std::string& type,
              std::size_t capacity, bool overwrite) {
             self.architecture.add_resource(
-                name, self.registry.make_resource(kind, type, {.capacity = capacity, .overwrite = overwrite}));
+                name,
+                self.registry.make_resource(kind, type, {.capacity = capacity, .overwrite = overwrite}));
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
           py::arg("overwrite") = false)
       .def(
           "connect",
-          [](PyArchitecture& self, const std::string& component, const std::string& port, const std::string& resource,
+          [](PyArchitecture& self, const std::string& component, const std::string& port,
+             const std::string& resource,
              const std::string& service) { self.architecture.connect(component, port, resource, service); },
           py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"))
       .def(
           "set_property",
-          [](PyArchitecture& self, const std::string& component, const std::string& name, const PropertyValue& value) {
+          [](PyArchitecture& self, const std::string& component, const std::string& name,
+             const PropertyValue& value) {
             self.architecture.component(component).set_property(name, value);
           },
           py::arg("component"), py::arg("name"), py::arg("value"))
       .def(
-          "publish", [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },
+          "publish",
+          [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },
           py::arg("resource"))
-      .def("configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
-      .def("cleanup", [](PyArchitecture& self) { self.architecture.cleanup(); }, Unlocked())
+      .def(
+          "configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
+      .def(
+          "cleanup", [](PyArchitecture& self) { self.architecture.cleanup(); }, Unlocked())
       .def("components",
            [](PyArchitecture& self) {
              const py::gil_scoped_release release;
              std::vector<ComponentDescription> all;
-             for (const auto& component : self.architecture.components()) all.push_back(describe_component(*component));
+             for (const auto& component : self.architecture.components())
+               all.push_back(describe_component(*component));
              return all;
            })
       .def("resources", [](PyArchitecture& self) {
         std::vector<ResourceDescription> all;
-        for (const auto& resource : self.architecture.resources()) all.push_back(describe_resource(*resource));
+        for (const auto& resource : self.architecture.resources())
+          all.push_back(describe_resource(*resource));
         return all;
       });
 }

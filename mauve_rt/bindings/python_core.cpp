@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Cores written in Python. Their methods run on the component's own thread under the interpreter's lock; that lock is
-// taken here, around the call, and nowhere while a priority-inheritance mutex is held.
+// Cores written in Python. Their methods run on the component's own thread under the interpreter's lock; that
+// lock is taken here, around the call, and nowhere while a priority-inheritance mutex is held.
 #include "translate.hpp"
 
 namespace mauve::bindings {
@@ -43,7 +43,8 @@ class ShellView {
       const py::gil_scoped_release release;
       readable = port.read_serialized(message, status, time_ns);
     }
-    if (!readable) throw py::type_error("port '" + name + "' is a " + std::string(to_string(port.kind())) + " port");
+    if (!readable)
+      throw py::type_error("port '" + name + "' is a " + std::string(to_string(port.kind())) + " port");
     return py::make_tuple(to_bytes(message), static_cast<int>(status), time_ns);
   }
   bool write(const std::string& name, const py::bytes& data) const {
@@ -109,7 +110,8 @@ class PythonCore final : public DynamicCore {
   bool test(int method) override {
     return in_python([&] { return methods_[static_cast<std::size_t>(method)]().cast<bool>(); });
   }
-  // A Python core's state moves by way of Python: adopt sees the old core's object, or None if it is no Python core.
+  // A Python core's state moves by way of Python: adopt sees the old core's object, or None if it is no
+  // Python core.
   bool adopt(const CoreBase& old) override {
     return in_python([&] {
       if (!py::hasattr(core_, "adopt")) return true;

@@ -46,7 +46,8 @@ struct PropertyDescription {
   std::optional<double> maximum;
 };
 std::vector<PropertyDescription> describe_properties(const Shell& shell);
-std::vector<PropertyDescription> describe_properties(const Shell& shell, const std::vector<PropertyValue>& values);
+std::vector<PropertyDescription> describe_properties(const Shell& shell,
+                                                     const std::vector<PropertyValue>& values);
 
 struct ServiceDescription {
   std::string name;

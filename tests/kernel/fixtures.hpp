@@ -26,11 +26,13 @@ MAUVE_TYPE(mauve::testing::Number, "std_msgs/msg/Float64", value)
 namespace mauve::testing {
 
 struct TestShell : Shell {
-  Property<double>& gain = property("gain", 1.0, {.unit = "1", .description = "a factor", .minimum = 0.0, .maximum = 10.0});
+  Property<double>& gain =
+      property("gain", 1.0, {.unit = "1", .description = "a factor", .minimum = 0.0, .maximum = 10.0});
   Property<std::int64_t>& period_ms = property("period_ms", 1);
   ReadPort<Number>& input = read_port<Number>("input", Number{7.0});
   WritePort<Number>& output = write_port<Number>("output");
-  WritePort<Number>& held = write_port<Number>("held", {.on_commit = OutputPolicy::hold, .on_stop = OutputPolicy::hold});
+  WritePort<Number>& held =
+      write_port<Number>("held", {.on_commit = OutputPolicy::hold, .on_stop = OutputPolicy::hold});
 };
 
 /// Calls `work` at every activation.
@@ -84,7 +86,8 @@ inline bool may_use_fifo() {
 inline std::vector<TraceRecord> records_of(const TraceDrain& drain, TraceKind kind, int component = 0) {
   std::vector<TraceRecord> found;
   for (const TraceRecord& record : drain.records) {
-    if (record.kind == static_cast<std::uint16_t>(kind) && record.component == component) found.push_back(record);
+    if (record.kind == static_cast<std::uint16_t>(kind) && record.component == component)
+      found.push_back(record);
   }
   return found;
 }

@@ -35,12 +35,12 @@ TEST(Cdr, MatchesTheWireFormatByteForByte) {
   CdrWriter(message).put(outer);
   std::vector<int> bytes;
   for (const std::byte each : message) bytes.push_back(std::to_integer<int>(each));
-  EXPECT_THAT(bytes, ::testing::ElementsAre(0, 1, 0, 0,                                    // header
-                                            3, 0, 0, 0, 'a', 'b', 0,                       // string, 7 bytes
-                                            0, 2, 1,                                       // aligned to 2
-                                            0, 0, 1, 0, 0, 0,                              // length, aligned to 4
-                                            1, 0, 0, 0, 0, 0, 0, 0,                        // flag, then aligned to 8
-                                            0, 0, 0, 0, 0, 0, 0, 0x40,                     // 2.0
+  EXPECT_THAT(bytes, ::testing::ElementsAre(0, 1, 0, 0,                 // header
+                                            3, 0, 0, 0, 'a', 'b', 0,    // string, 7 bytes
+                                            0, 2, 1,                    // aligned to 2
+                                            0, 0, 1, 0, 0, 0,           // length, aligned to 4
+                                            1, 0, 0, 0, 0, 0, 0, 0,     // flag, then aligned to 8
+                                            0, 0, 0, 0, 0, 0, 0, 0x40,  // 2.0
                                             7, 8, 9, 1));
   Outer back;
   ASSERT_TRUE(CdrReader(message).get(back));

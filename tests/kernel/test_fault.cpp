@@ -8,8 +8,9 @@ namespace {
 class Rule11Faults : public Deployed {
  protected:
   static void wait_fault(Component& component) {
-    wait_until([&] { return component.task().state() == ComponentState::faulted && component.task().is_parked(); },
-               "the fault");
+    wait_until(
+        [&] { return component.task().state() == ComponentState::faulted && component.task().is_parked(); },
+        "the fault");
   }
 };
 

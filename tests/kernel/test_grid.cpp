@@ -103,7 +103,8 @@ class Rule5Deployment : public Deployed {};
 TEST_F(Rule5Deployment, AllComponentsShareOneEpochPublishedAfterAllAreReady) {
   std::vector<Component*> components;
   for (int i = 0; i < 8; ++i) {
-    components.push_back(&add("c" + std::to_string(i), 1, {.priority = 40 + i, .offset_ns = us_to_ns(100) * i}));
+    components.push_back(
+        &add("c" + std::to_string(i), 1, {.priority = 40 + i, .offset_ns = us_to_ns(100) * i}));
     core(*components.back()).instants.reserve(4);
   }
   const time_ns_t before = monotonic_now_ns();
@@ -113,7 +114,8 @@ TEST_F(Rule5Deployment, AllComponentsShareOneEpochPublishedAfterAllAreReady) {
   deployer.shutdown();
   const TraceDrain drain = deployer.drain_trace();
   for (int i = 0; i < 8; ++i) {
-    EXPECT_EQ(deployer.epoch_ns() + us_to_ns(100) * i, core(*components[static_cast<std::size_t>(i)]).instants.front());
+    EXPECT_EQ(deployer.epoch_ns() + us_to_ns(100) * i,
+              core(*components[static_cast<std::size_t>(i)]).instants.front());
     const auto deployments = records_of(drain, TraceKind::deployment, i);
     ASSERT_EQ(1U, deployments.size());
     EXPECT_EQ(deployer.epoch_ns(), deployments[0].a);

@@ -43,30 +43,39 @@ struct Scene {
 TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {
   if (!may_use_fifo()) GTEST_SKIP() << "needs the right to SCHED_FIFO (rtprio limit)";
   Scene scene;
-  const pthread_t low = make_thread(10, [](void* argument) -> void* {
-    auto& scene = *static_cast<Scene*>(argument);
-    scene.mutex.lock();
-    scene.low_holds = true;
-    while (!scene.high_waits) sched_yield();
-    spin(ms_to_ns(5));  // with the middle one ready to run, only an inherited priority gets this done
-    scene.mutex.unlock();
-    return nullptr;
-  }, &scene);
+  const pthread_t low = make_thread(
+      10,
+      [](void* argument) -> void* {
+        auto& scene = *static_cast<Scene*>(argument);
+        scene.mutex.lock();
+        scene.low_holds = true;
+        while (!scene.high_waits) sched_yield();
+        spin(ms_to_ns(5));  // with the middle one ready to run, only an inherited priority gets this done
+        scene.mutex.unlock();
+        return nullptr;
+      },
+      &scene);
   while (!scene.low_holds) std::this_thread::yield();
-  const pthread_t high = make_thread(30, [](void* argument) -> void* {
-    auto& scene = *static_cast<Scene*>(argument);
-    scene.high_waits = true;
-    scene.mutex.lock();
-    scene.high_came = ++scene.order;
-    scene.mutex.unlock();
-    return nullptr;
-  }, &scene);
-  const pthread_t middle = make_thread(20, [](void* argument) -> void* {
-    auto& scene = *static_cast<Scene*>(argument);
-    spin(ms_to_ns(50));
-    scene.middle_came = ++scene.order;
-    return nullptr;
-  }, &scene);
+  const pthread_t high = make_thread(
+      30,
+      [](void* argument) -> void* {
+        auto& scene = *static_cast<Scene*>(argument);
+        scene.high_waits = true;
+        scene.mutex.lock();
+        scene.high_came = ++scene.order;
+        scene.mutex.unlock();
+        return nullptr;
+      },
+      &scene);
+  const pthread_t middle = make_thread(
+      20,
+      [](void* argument) -> void* {
+        auto& scene = *static_cast<Scene*>(argument);
+        spin(ms_to_ns(50));
+        scene.middle_came = ++scene.order;
+        return nullptr;
+      },
+      &scene);
   for (const pthread_t thread : {low, high, middle}) pthread_join(thread, nullptr);
   EXPECT_EQ(1, scene.high_came);
   EXPECT_EQ(2, scene.middle_came);

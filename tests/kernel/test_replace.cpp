@@ -67,7 +67,8 @@ TEST_F(Rule9Replace, AThousandTimesAtRandomPhasesMissesNoRelease) {
   int missed = 0;
   for (int i = 0; i < 1000; ++i) {
     std::this_thread::sleep_for(std::chrono::microseconds(phase_us(random)));
-    const StepReport report = component.swap_core(std::make_unique<Successor>(), {.commit_ns = s_to_ns(10), .phase_ns = s_to_ns(10)});
+    const StepReport report = component.swap_core(std::make_unique<Successor>(),
+                                                  {.commit_ns = s_to_ns(10), .phase_ns = s_to_ns(10)});
     ASSERT_EQ(0, report.phase_nominal_ns);
     missed += static_cast<int>(report.missed_releases);
   }

@@ -13,6 +13,7 @@ namespace {
 template <typename Items>
 std::vector<std::string> names_of(const Items& items) {
   std::vector<std::string> names;
+  names.reserve(items.size());
   for (const auto& item : items) names.push_back(item->name());
   return names;
 }
@@ -45,17 +46,20 @@ Component& Architecture::add_component(const std::string& name, std::unique_ptr<
                                        std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
                                        const TaskSettings& settings) {
   require_new(find_in(components_, name) != nullptr, "component", name);
-  auto component = std::make_unique<Component>(name, static_cast<std::uint16_t>(components_.size()), changes_);
+  auto component =
+      std::make_unique<Component>(name, static_cast<std::uint16_t>(components_.size()), changes_);
   component->set_settings(settings);
   component->set_parts(std::move(shell), std::move(core), std::move(fsm));
   components_.push_back(std::move(component));
   return *components_.back();
 }
 
-Component& Architecture::add_component(const std::string& name, const std::string& shell, const std::string& core,
-                                       const std::string& fsm, const TaskSettings& settings) {
+Component& Architecture::add_component(const std::string& name, const std::string& shell,
+                                       const std::string& core, const std::string& fsm,
+                                       const TaskSettings& settings) {
   const PluginRegistry& registry = require_registry();
-  return add_component(name, registry.make_shell(shell), registry.make_core(core), registry.make_fsm(fsm), settings);
+  return add_component(name, registry.make_shell(shell), registry.make_core(core), registry.make_fsm(fsm),
+                       settings);
 }
 
 void Architecture::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
@@ -100,16 +104,17 @@ void Architecture::connect(Component& component, const std::string& port_name, R
   }
 }
 
-void Architecture::connect(const std::string& component_name, const std::string& port, const std::string& resource_name,
-                           const std::string& service) {
+void Architecture::connect(const std::string& component_name, const std::string& port,
+                           const std::string& resource_name, const std::string& service) {
   connect(component(component_name), port, resource(resource_name), service);
 }
 
 void Architecture::publish(const std::string& name) {
   Resource& published = resource(name);
   if (!published.is_serializable()) {
-    throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
-                {.element = "resource " + name, .expected = "shared_data or ring_buffer", .found = published.kind()});
+    throw Error(
+        ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
+        {.element = "resource " + name, .expected = "shared_data or ring_buffer", .found = published.kind()});
   }
   published.set_notifier(&publications_);
   published_.push_back({&published, 0});
@@ -117,21 +122,24 @@ void Architecture::publish(const std::string& name) {
 
 Component& Architecture::component(const std::string& name) const {
   if (Component* found = find_in(components_, name)) return *found;
-  throw Error(ErrorCode::unknown_component, "there is no such component",
-              {.element = "component " + name, .expected = "one of " + join(names_of(components_)), .found = name});
+  throw Error(
+      ErrorCode::unknown_component, "there is no such component",
+      {.element = "component " + name, .expected = "one of " + join(names_of(components_)), .found = name});
 }
 
 Resource& Architecture::resource(const std::string& name) const {
   if (Resource* found = find_in(resources_, name)) return *found;
-  throw Error(ErrorCode::unknown_resource, "there is no such resource",
-              {.element = "resource " + name, .expected = "one of " + join(names_of(resources_)), .found = name});
+  throw Error(
+      ErrorCode::unknown_resource, "there is no such resource",
+      {.element = "resource " + name, .expected = "one of " + join(names_of(resources_)), .found = name});
 }
 
 std::unique_ptr<CoreBase> Architecture::make_core(const std::string& implementation) const {
   return require_registry().make_core(implementation);
 }
 
-bool Architecture::next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns) {
+bool Architecture::next_published(std::string& resource, std::vector<std::byte>& message,
+                                  time_ns_t& time_ns) {
   for (Published& published : published_) {
     if (!published.resource->next_sample(message, time_ns, published.seen)) continue;
     resource = published.resource->name();
@@ -152,7 +160,8 @@ bool Architecture::configure_hook() {
 }
 
 void Architecture::cleanup_hook() {
-  for (auto component = components_.rbegin(); component != components_.rend(); ++component) (*component)->cleanup();
+  for (auto component = components_.rbegin(); component != components_.rend(); ++component)
+    (*component)->cleanup();
   for (auto resource = resources_.rbegin(); resource != resources_.rend(); ++resource) (*resource)->cleanup();
 }
 

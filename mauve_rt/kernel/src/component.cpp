@@ -42,7 +42,9 @@ class CoreSwap final : public CommitAction {
 class PropertySwap final : public CommitAction {
  public:
   PropertySwap(PropertyBase& property, PropertyValue& value)
-      : property_(property), value_(value), trace_id_(TraceNames::intern("set_property " + property.name())) {}
+      : property_(property),
+        value_(value),
+        trace_id_(TraceNames::intern("set_property " + property.name())) {}
   void take() noexcept override { property_.swap(value_); }
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 
@@ -59,7 +61,8 @@ Component::Component(std::string name, std::uint16_t number, ChangeSignal& chang
 
 Component::~Component() { cleanup(); }
 
-void Component::set_parts(std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm) {
+void Component::set_parts(std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core,
+                          std::unique_ptr<FsmBase> fsm) {
   shell_ = std::move(shell);
   core_ = std::move(core);
   fsm_ = std::move(fsm);
@@ -86,7 +89,8 @@ void Component::show_core() {
 
 void Component::show_property(const PropertyBase& property, PropertyValue value) {
   const auto& all = shell_->properties();
-  const auto place = std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.get() == &property; });
+  const auto place =
+      std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.get() == &property; });
   const std::lock_guard lock(shown_mutex_);
   shown_properties_[static_cast<std::size_t>(place - all.begin())] = std::move(value);
 }
@@ -137,10 +141,14 @@ PropertyBase& Component::require_property(const std::string& name) {
   std::vector<std::string> known;
   for (const auto& property : shell_->properties()) known.push_back(property->name());
   throw Error(ErrorCode::unknown_property, "the shell has no such property",
-              {.component = name_, .element = "property " + name, .expected = "one of " + join(known), .found = name});
+              {.component = name_,
+               .element = "property " + name,
+               .expected = "one of " + join(known),
+               .found = name});
 }
 
-StepReport Component::set_property(const std::string& name, const PropertyValue& value, const CommitTimeouts& timeouts) {
+StepReport Component::set_property(const std::string& name, const PropertyValue& value,
+                                   const CommitTimeouts& timeouts) {
   const time_ns_t began = monotonic_now_ns();
   PropertyBase& property = require_property(name);
   PropertyValue checked = property.checked(value);
@@ -184,13 +192,16 @@ void Component::configure_core() {
 void Component::prepare(CoreBase& core, CoreBinding& binding) {
   if (!core.bind_shell(*shell_)) {
     throw Error(ErrorCode::type_mismatch, "the core was written for another shell",
-                {.component = name_, .element = core.description(), .expected = "a core for " + shell_->description()});
+                {.component = name_,
+                 .element = core.description(),
+                 .expected = "a core for " + shell_->description()});
   }
   core.set_context(&task_.context());
   binding = fsm_->bind_core(core);
   if (binding.object == nullptr && binding.dynamic == nullptr) {
-    throw Error(ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
-                {.component = name_, .element = core.description(), .expected = "a core for " + fsm_->description()});
+    throw Error(
+        ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
+        {.component = name_, .element = core.description(), .expected = "a core for " + fsm_->description()});
   }
   core.configure();
 }
@@ -281,7 +292,9 @@ bool Component::configure_hook() {
   require_parked("configure");
   if (!fsm_->bind_shell(*shell_)) {
     throw Error(ErrorCode::type_mismatch, "the fsm was written for another shell",
-                {.component = name_, .element = fsm_->description(), .expected = "an fsm for " + shell_->description()});
+                {.component = name_,
+                 .element = fsm_->description(),
+                 .expected = "an fsm for " + shell_->description()});
   }
   try {
     shell_->configure();

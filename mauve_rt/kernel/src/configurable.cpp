@@ -9,7 +9,9 @@ void Configurable::configure() {
   if (configured_) return;
   try {
     if (!configure_hook()) {
-      throw Error(ErrorCode::configure_failed, "configure failed", {.element = description(), .expected = "a configure hook that returns true", .found = "false"});
+      throw Error(
+          ErrorCode::configure_failed, "configure failed",
+          {.element = description(), .expected = "a configure hook that returns true", .found = "false"});
     }
   } catch (const Error&) {
     throw;
@@ -24,7 +26,8 @@ void Configurable::cleanup() noexcept {
   configured_ = false;
   try {
     cleanup_hook();
-  } catch (...) {  // a clean-up that throws leaves nothing that could be mended; the object counts as cleaned up
+  } catch (
+      ...) {  // a clean-up that throws leaves nothing that could be mended; the object counts as cleaned up
   }
 }
 

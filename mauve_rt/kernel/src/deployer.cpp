@@ -60,7 +60,8 @@ void Deployer::deploy() {
   const std::lock_guard lock(command_mutex_);
   if (deployed_) throw Error(ErrorCode::already_running, "the architecture is deployed already");
   if (!architecture_.is_configured()) {
-    throw Error(ErrorCode::not_configured, "the architecture is not configured", {.remedy = "call configure() first"});
+    throw Error(ErrorCode::not_configured, "the architecture is not configured",
+                {.remedy = "call configure() first"});
   }
   prepare_process();
   const auto& components = architecture_.components();
@@ -102,7 +103,7 @@ void Deployer::shutdown() noexcept {
   for (auto component = components.rbegin(); component != components.rend(); ++component) {
     try {
       if ((*component)->task().state() == ComponentState::running) (*component)->task().stop(kStopTimeout);
-    } catch (const Error&) {  // still in a state, or faulted: ending its thread says which
+    } catch (const Error&) {  // still in a state, or faulted by now: joining its thread is the answer
     }
   }
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
@@ -114,13 +115,15 @@ void Deployer::shutdown() noexcept {
 void Deployer::watch() noexcept {
   while (watchdog_stop_.load(std::memory_order_acquire) == 0) {
     futex_wait_until(watchdog_stop_, 0, monotonic_now_ns() + kWatchPeriod);
-    for (const auto& component : architecture_.components()) component->task().check_execution(monotonic_now_ns());
+    for (const auto& component : architecture_.components())
+      component->task().check_execution(monotonic_now_ns());
   }
 }
 
 void Deployer::require_deployed() const {
   if (deployed_) return;
-  throw Error(ErrorCode::not_configured, "the architecture is not deployed", {.remedy = "call deploy() first"});
+  throw Error(ErrorCode::not_configured, "the architecture is not deployed",
+              {.remedy = "call deploy() first"});
 }
 
 void Deployer::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
@@ -148,8 +151,8 @@ StepReport Deployer::replace_core(const std::string& component_name, const std::
   return component.swap_core(std::move(fresh), timeouts);
 }
 
-StepReport Deployer::set_property(const std::string& component, const std::string& name, const PropertyValue& value,
-                                  const CommitTimeouts& timeouts) {
+StepReport Deployer::set_property(const std::string& component, const std::string& name,
+                                  const PropertyValue& value, const CommitTimeouts& timeouts) {
   const std::lock_guard lock(command_mutex_);
   return architecture_.component(component).set_property(name, value, timeouts);
 }

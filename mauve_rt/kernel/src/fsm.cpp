@@ -15,6 +15,7 @@ constexpr const char* kDeclareRemedy = "declare it in define()";
 
 std::vector<const State*> successors(const State& state) {
   std::vector<const State*> all;
+  all.reserve(state.transitions.size() + 1);
   for (const Transition& transition : state.transitions) all.push_back(transition.to);
   all.push_back(state.next);
   return all;
@@ -128,8 +129,9 @@ State& FsmBase::add_state(std::string name) {
 
 State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
   if (duration_ns <= 0) {
-    throw Error(ErrorCode::bad_fsm, "a wait has no length",
-                {.element = "state " + name, .expected = "a duration > 0 ns", .found = std::to_string(duration_ns)});
+    throw Error(
+        ErrorCode::bad_fsm, "a wait has no length",
+        {.element = "state " + name, .expected = "a duration > 0 ns", .found = std::to_string(duration_ns)});
   }
   State& state = add_state(std::move(name));
   state.is_wait = true;
@@ -166,8 +168,9 @@ bool FsmBase::configure_hook() {
   }
   for (const auto& state : states_) {
     if (state->next == nullptr) {
-      throw Error(ErrorCode::bad_fsm, "the state leads nowhere when no guard holds",
-                  {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});
+      throw Error(
+          ErrorCode::bad_fsm, "the state leads nowhere when no guard holds",
+          {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});
     }
   }
   period_ns_ = cycle_gcd_ns(*initial_);

@@ -10,15 +10,18 @@ namespace mauve {
 namespace {
 
 template <typename Entries>
-const auto& require_entry(const Entries& entries, const std::string& name, ErrorCode code, const std::string& what) {
+const auto& require_entry(const Entries& entries, const std::string& name, ErrorCode code,
+                          const std::string& what) {
   if (const auto found = entries.find(name); found != entries.end()) return found->second;
   std::vector<std::string> known;
+  known.reserve(entries.size());
   for (const auto& [key, entry] : entries) known.push_back(key);
-  throw Error(code, "there is no such " + what,
-              {.element = what + " " + name,
-               .expected = "one of " + join(known),
-               .found = name,
-               .remedy = "check the name, and that its package is installed and lists it among its plug-ins"});
+  throw Error(
+      code, "there is no such " + what,
+      {.element = what + " " + name,
+       .expected = "one of " + join(known),
+       .found = name,
+       .remedy = "check the name, and that its package is installed and lists it among its plug-ins"});
 }
 
 template <typename Entries, typename Key, typename Entry>
@@ -84,7 +87,8 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
     throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
                 {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
   }
-  if (const auto found = resources_.find({kind, type}); found != resources_.end()) return found->second(parameters);
+  if (const auto found = resources_.find({kind, type}); found != resources_.end())
+    return found->second(parameters);
   const bool known_kind = kind == "shared_data" || kind == "ring_buffer";
   throw Error(known_kind ? ErrorCode::unknown_type : ErrorCode::unknown_resource,
               known_kind ? "the data type is not registered" : "there is no such kind of resource",

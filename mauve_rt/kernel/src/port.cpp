@@ -7,10 +7,14 @@ namespace mauve {
 
 std::string_view to_string(PortKind kind) noexcept {
   switch (kind) {
-    case PortKind::read: return "read";
-    case PortKind::write: return "write";
-    case PortKind::call: return "call";
-    case PortKind::event: return "event";
+    case PortKind::read:
+      return "read";
+    case PortKind::write:
+      return "write";
+    case PortKind::call:
+      return "call";
+    case PortKind::event:
+      return "event";
   }
   return "unknown";
 }
@@ -20,11 +24,12 @@ void PortBase::connect(ServiceBase& service, const std::string& resource_name) {
     const auto shown = [](PortKind kind, const std::string& type) {
       return std::string(to_string(kind)) + (type.empty() ? "" : " of " + type);
     };
-    throw Error(ErrorCode::type_mismatch, "the port does not fit the service",
-                {.element = "port " + name_,
-                 .expected = shown(kind_, type_),
-                 .found = shown(service.kind(), service.type()) + " at " + resource_name + "." + service.name(),
-                 .remedy = "connect it to a service of equal kind and type"});
+    throw Error(
+        ErrorCode::type_mismatch, "the port does not fit the service",
+        {.element = "port " + name_,
+         .expected = shown(kind_, type_),
+         .found = shown(service.kind(), service.type()) + " at " + resource_name + "." + service.name(),
+         .remedy = "connect it to a service of equal kind and type"});
   }
   base_ = &service;
   resource_name_ = resource_name;

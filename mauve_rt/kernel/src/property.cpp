@@ -65,7 +65,8 @@ PropertyValue Property<T>::checked(const PropertyValue& value) const {
                  .found = std::string(property_type_name(value)) + " " + to_string(value),
                  .remedy = "write the value as the property's type"});
   }
-  if constexpr (std::same_as<T, double> || std::same_as<T, std::int64_t>) check_range(static_cast<double>(*converted));
+  if constexpr (std::same_as<T, double> || std::same_as<T, std::int64_t>)
+    check_range(static_cast<double>(*converted));
   return *converted;
 }
 

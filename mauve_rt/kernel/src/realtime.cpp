@@ -47,7 +47,8 @@ void RealtimeProcess::acquire(int priority, bool require) {
   lock_memory();
   hold_cpu_latency();
   if (require && !status_.granted) {
-    throw Error(ErrorCode::realtime_denied, "real time is required and was not granted: " + join(status_.missing),
+    throw Error(ErrorCode::realtime_denied,
+                "real time is required and was not granted: " + join(status_.missing),
                 {.remedy = "grant the rights, or do not require real time"});
   }
 }
@@ -69,9 +70,11 @@ void RealtimeProcess::check_fifo(int priority) {
   }
   rlimit limit{};
   getrlimit(RLIMIT_RTPRIO, &limit);
-  status_.deny("SCHED_FIFO priority " + std::to_string(priority) + " (the rtprio limit is " + limit_text(limit.rlim_cur) +
+  status_.deny("SCHED_FIFO priority " + std::to_string(priority) + " (the rtprio limit is " +
+               limit_text(limit.rlim_cur) +
                "): components run as SCHED_OTHER and can be late by milliseconds; to grant it add the line "
-               "'@realtime - rtprio 98' to /etc/security/limits.d/mauve.conf, add the user to group realtime, log in anew");
+               "'@realtime - rtprio 98' to /etc/security/limits.d/mauve.conf, add the user to group "
+               "realtime, log in anew");
 }
 
 void RealtimeProcess::lock_memory() {
@@ -82,7 +85,8 @@ void RealtimeProcess::lock_memory() {
   locked_ = allowed && mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
   if (locked_) return;
   status_.deny("locked memory (the memlock limit is " + limit_text(limit.rlim_cur) +
-               " bytes): page faults can delay components; to grant it add the line '@realtime - memlock unlimited' to "
+               " bytes): page faults can delay components; to grant it add the line '@realtime - memlock "
+               "unlimited' to "
                "/etc/security/limits.d/mauve.conf, add the user to group realtime, log in anew");
 }
 
@@ -94,9 +98,10 @@ void RealtimeProcess::hold_cpu_latency() {
   const std::string reason = std::strerror(errno);
   if (latency_fd_ >= 0) close(latency_fd_);
   latency_fd_ = -1;
-  status_.deny(std::string(path) + " (" + reason +
-               "): deep idle states can double the wake-up latency; to grant it add the udev rule "
-               "'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' and add the user to group realtime");
+  status_.deny(
+      std::string(path) + " (" + reason +
+      "): deep idle states can double the wake-up latency; to grant it add the udev rule "
+      "'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' and add the user to group realtime");
 }
 
 }  // namespace mauve

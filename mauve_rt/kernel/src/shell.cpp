@@ -18,7 +18,9 @@ Item* find_named(const std::vector<std::unique_ptr<Item>>& items, std::string_vi
 }  // namespace
 
 PortBase* Shell::find_port(std::string_view name) const noexcept { return find_named(ports_, name); }
-PropertyBase* Shell::find_property(std::string_view name) const noexcept { return find_named(properties_, name); }
+PropertyBase* Shell::find_property(std::string_view name) const noexcept {
+  return find_named(properties_, name);
+}
 
 void Shell::set_context(const Context* context) noexcept {
   for (const auto& port : ports_) port->set_context(context);

@@ -18,12 +18,18 @@ constexpr time_ns_t kStartMargin = us_to_ns(200);
 
 std::string_view to_string(ComponentState state) noexcept {
   switch (state) {
-    case ComponentState::unconfigured: return "UNCONFIGURED";
-    case ComponentState::stopped: return "STOPPED";
-    case ComponentState::running: return "RUNNING";
-    case ComponentState::held: return "HELD";
-    case ComponentState::stopping: return "STOPPING";
-    case ComponentState::faulted: return "FAULTED";
+    case ComponentState::unconfigured:
+      return "UNCONFIGURED";
+    case ComponentState::stopped:
+      return "STOPPED";
+    case ComponentState::running:
+      return "RUNNING";
+    case ComponentState::held:
+      return "HELD";
+    case ComponentState::stopping:
+      return "STOPPING";
+    case ComponentState::faulted:
+      return "FAULTED";
   }
   return "UNCONFIGURED";
 }
@@ -89,7 +95,8 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
 void Task::start(std::optional<time_ns_t> clock_ns) {
   const std::lock_guard lock(command_mutex_);
   switch (state()) {
-    case ComponentState::stopped: break;
+    case ComponentState::stopped:
+      break;
     case ComponentState::unconfigured:
       throw Error(ErrorCode::not_configured, "the component is not configured",
                   {.component = name_, .remedy = "configure it first"});
@@ -115,7 +122,8 @@ void Task::wait_started() noexcept {
   while (state_.load(std::memory_order_acquire) == kStopped) futex_wait_until(state_, kStopped, kForever);
 }
 
-void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns, const std::string& remedy) const {
+void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
+                               const std::string& remedy) const {
   throw Error(ErrorCode::timeout, what,
               {.component = name_,
                .element = "state " + current_state(),
@@ -128,11 +136,13 @@ void Task::stop(time_ns_t timeout_ns) {
   const std::lock_guard lock(command_mutex_);
   auto seen = static_cast<std::uint32_t>(ComponentState::running);
   // acq_rel: only who turns RUNNING into STOPPING goes on; a fault in between wins
-  const bool running = state_.compare_exchange_strong(seen, static_cast<std::uint32_t>(ComponentState::stopping),
-                                                      std::memory_order_acq_rel);
+  const bool running = state_.compare_exchange_strong(
+      seen, static_cast<std::uint32_t>(ComponentState::stopping), std::memory_order_acq_rel);
   if (!running && static_cast<ComponentState>(seen) != ComponentState::stopping) {
     throw Error(ErrorCode::not_running, "the component is not running",
-                {.component = name_, .expected = "RUNNING", .found = std::string(to_string(static_cast<ComponentState>(seen)))});
+                {.component = name_,
+                 .expected = "RUNNING",
+                 .found = std::string(to_string(static_cast<ComponentState>(seen)))});
   }
   changes_.bump();
   control_.fetch_or(kStop, std::memory_order_acq_rel);
@@ -145,7 +155,8 @@ void Task::stop(time_ns_t timeout_ns) {
     throw_state_running("the stop stays pending", timeout_ns, "it takes effect when the state ends");
   }
   if (state() == ComponentState::faulted) {
-    throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault_.what, {.component = name_});
+    throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault_.what,
+                {.component = name_});
   }
 }
 
@@ -154,7 +165,9 @@ bool Task::commit(Commit& commit, time_ns_t timeout_ns) {
   const ComponentState now = state();
   if (now == ComponentState::stopping) {
     throw Error(ErrorCode::timeout, "the component is STOPPING",
-                {.component = name_, .element = "state " + current_state(), .remedy = "try again when it has stopped"});
+                {.component = name_,
+                 .element = "state " + current_state(),
+                 .remedy = "try again when it has stopped"});
   }
   if (now == ComponentState::faulted) {
     throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault_.what,
@@ -181,7 +194,8 @@ bool Task::commit(Commit& commit, time_ns_t timeout_ns) {
   }
   if (commit.refusal) std::rethrow_exception(commit.refusal);
   if (commit.not_running) {
-    throw Error(ErrorCode::faulted, "the component parked before the change: " + fault_.what, {.component = name_});
+    throw Error(ErrorCode::faulted, "the component parked before the change: " + fault_.what,
+                {.component = name_});
   }
   changes_.bump();
   return commit.committed;
@@ -203,10 +217,12 @@ bool Task::check_execution(time_ns_t now_ns) {
   const State* state = current_.load(std::memory_order_relaxed);
   if (began == 0 || state == nullptr || state->max_execution_ns == 0) return false;
   if (now_ns - began <= state->max_execution_ns) return false;
-  if (execution_began_ns_.load(std::memory_order_acquire) != began) return false;  // another execution than the state's
+  if (execution_began_ns_.load(std::memory_order_acquire) != began)
+    return false;  // another execution than the state's
   std::uint32_t nobody = 0;
   if (!condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) return false;
-  fault_ = {.what = "the state ran longer than its declared " + std::to_string(state->max_execution_ns / 1000) + " us",
+  fault_ = {.what = "the state ran longer than its declared " +
+                    std::to_string(state->max_execution_ns / 1000) + " us",
             .where = state->name,
             .when_ns = now_ns};
   const sched_param ordinary{};

@@ -26,7 +26,8 @@ constexpr int kMaxDeferrals = 3;
   std::size_t stack_bytes = 0;
   pthread_attr_getstack(&attributes, &lowest, &stack_bytes);
   pthread_attr_destroy(&attributes);
-  const auto left = static_cast<std::size_t>(static_cast<char*>(__builtin_frame_address(0)) - static_cast<char*>(lowest));
+  const auto left =
+      static_cast<std::size_t>(static_cast<char*>(__builtin_frame_address(0)) - static_cast<char*>(lowest));
   constexpr std::size_t kPage = 4096;
   const std::size_t size = std::min(kPrefaultedStackBytes, left / 2);
   auto* pages = static_cast<volatile char*>(__builtin_alloca(size));
@@ -85,7 +86,8 @@ void Task::create_thread(pthread_barrier_t& barrier, bool require_realtime, bool
                  .remedy = "raise the rtprio limit, or do not require real time"});
   }
   if (result != 0) {
-    throw Error(ErrorCode::invalid_argument, std::string("the system refuses the thread: ") + std::strerror(result),
+    throw Error(ErrorCode::invalid_argument,
+                std::string("the system refuses the thread: ") + std::strerror(result),
                 {.component = name_, .remedy = "check priority, cpus and stack_bytes"});
   }
   has_thread_ = true;
@@ -154,7 +156,8 @@ void Task::run_machine() {
   set_clock_ns(start_at_ns_);
   current_.store(initial, std::memory_order_relaxed);
   publish_state(ComponentState::running);
-  trace(TraceKind::deployment, 0, grid_.reference_ns - settings_.offset_ns, settings_.offset_ns, context_.period_ns);
+  trace(TraceKind::deployment, 0, grid_.reference_ns - settings_.offset_ns, settings_.offset_ns,
+        context_.period_ns);
   trace(TraceKind::start, 0, start_at_ns_);
   if (!sleep_until_clock(*initial)) return park_stopped();
 
@@ -190,7 +193,8 @@ const State* Task::execute(const State& state) {
   }
   execution_began_ns_.store(0, std::memory_order_release);
   trace(TraceKind::state_end, state.trace_id);
-  if (PiMutex::held_by_this_thread() != 0) throw std::logic_error("a lock is still held at the end of the state");
+  if (PiMutex::held_by_this_thread() != 0)
+    throw std::logic_error("a lock is still held at the end of the state");
   return condemned_.load(std::memory_order_acquire) == 0 ? next : nullptr;
 }
 
@@ -214,7 +218,8 @@ void Task::handle_overrun(const State& state, time_ns_t now_ns) {
   }
   trace(TraceKind::overrun, state.trace_id, missed, now_ns, skipped);
   if (settings_.overrun == OverrunPolicy::fault) throw std::runtime_error("overrun, and its policy is fault");
-  if (settings_.overrun == OverrunPolicy::catch_up && (now_ns - missed) / period + 1 > settings_.max_backlog) {
+  if (settings_.overrun == OverrunPolicy::catch_up &&
+      (now_ns - missed) / period + 1 > settings_.max_backlog) {
     throw std::runtime_error("overrun: more instants are owed than max_backlog allows");
   }
 }
@@ -236,7 +241,8 @@ bool Task::sleep_until_clock(const State& state) {
   return true;
 }
 
-/// With less time left than the change may take, it is better made after the release that is due; but not put off for ever.
+/// With less time left than the change may take, it is better made after the release that is due; but not put
+/// off for ever.
 bool Task::may_commit_now() noexcept {
   const time_ns_t left = clock_ns() - clock_.now_ns();
   return left > commit_budget_ns_.load(std::memory_order_relaxed) || deferrals_ >= kMaxDeferrals;
@@ -272,7 +278,8 @@ void Task::carry_out(Commit& commit, const State* state) noexcept {
   commit.parked_ns = parked;
   if (in_flight) {
     commit.pending_ns = clock_ns();
-    if (active_ring_ != nullptr) active_ring_->push_at(parked, TraceKind::parked, state->trace_id, clock_ns());
+    if (active_ring_ != nullptr)
+      active_ring_->push_at(parked, TraceKind::parked, state->trace_id, clock_ns());
     state_.store(static_cast<std::uint32_t>(ComponentState::held), std::memory_order_release);
     write_outputs(true);
   }
@@ -295,7 +302,8 @@ void Task::carry_out(Commit& commit, const State* state) noexcept {
     }
     commit.armed_ns = clock_.now_ns();
     if (active_ring_ != nullptr) {
-      active_ring_->push_at(commit.armed_ns, TraceKind::armed, state->trace_id, clock_ns(), commit.committed ? 1 : 0);
+      active_ring_->push_at(commit.armed_ns, TraceKind::armed, state->trace_id, clock_ns(),
+                            commit.committed ? 1 : 0);
     }
   } else {
     commit.armed_ns = parked;  // a parked component has no blackout

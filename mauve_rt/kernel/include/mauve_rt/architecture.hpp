@@ -28,9 +28,11 @@ class Architecture final : public Configurable {
     return add_component(name, std::make_unique<ShellType>(), std::make_unique<CoreType>(),
                          std::make_unique<FsmType>(), settings);
   }
-  Component& add_component(const std::string& name, std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core,
-                           std::unique_ptr<FsmBase> fsm, const TaskSettings& settings);
-  /// Adds a component of registered parts. [setup] Throws Error: unknown_shell, unknown_core, unknown_fsm besides.
+  Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
+                           std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
+                           const TaskSettings& settings);
+  /// Adds a component of registered parts. [setup] Throws Error: unknown_shell, unknown_core, unknown_fsm
+  /// besides.
   Component& add_component(const std::string& name, const std::string& shell, const std::string& core,
                            const std::string& fsm, const TaskSettings& settings);
 
@@ -44,7 +46,8 @@ class Architecture final : public Configurable {
   }
   void add_resource(const std::string& name, std::unique_ptr<Resource> resource);
 
-  /// Connects a port to a service. [setup] Throws Error: unknown_port, unknown_service, type_mismatch, duplicate_name.
+  /// Connects a port to a service. [setup] Throws Error: unknown_port, unknown_service, type_mismatch,
+  /// duplicate_name.
   void connect(Component& component, const std::string& port, Resource& resource, const std::string& service);
   void connect(const std::string& component, const std::string& port, const std::string& resource,
                const std::string& service);
@@ -62,7 +65,8 @@ class Architecture final : public Configurable {
 
   ChangeSignal& changes() noexcept { return changes_; }
 
-  /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one thread.
+  /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one
+  /// thread.
   bool next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns);
   Notifier& publications() noexcept { return publications_; }
 
@@ -81,7 +85,8 @@ class Architecture final : public Configurable {
   Notifier publications_;
   std::vector<Published> published_;
   std::vector<std::unique_ptr<Resource>> resources_;
-  std::vector<std::unique_ptr<Component>> components_;  // after the resources: ports go before what they connect to
+  std::vector<std::unique_ptr<Component>>
+      components_;  // after the resources: ports go before what they connect to
 };
 
 }  // namespace mauve

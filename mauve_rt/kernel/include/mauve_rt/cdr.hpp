@@ -17,7 +17,8 @@
 
 #include "mauve_rt/bounded.hpp"
 
-static_assert(std::endian::native == std::endian::little, "CDR is written little-endian as the machine holds it");
+static_assert(std::endian::native == std::endian::little,
+              "CDR is written little-endian as the machine holds it");
 
 namespace mauve {
 
@@ -95,7 +96,8 @@ class CdrWriter {
   std::vector<std::byte>& buffer_;
 };
 
-/// Deserializes in place, without allocation; every getter returns false on a short or excessive message. [rt]
+/// Deserializes in place, without allocation; every getter returns false on a short or excessive message.
+/// [rt]
 class CdrReader {
  public:
   explicit CdrReader(std::span<const std::byte> data) : data_(data) {
@@ -178,9 +180,9 @@ class CdrReader {
 
 /// Declares a struct's identity and its mapping to a ROS message, once, in message order, at global scope:
 ///   MAUVE_TYPE(my::Point, "geometry_msgs/msg/Point", x, y, z)
-#define MAUVE_TYPE(type, type_name, ...)                                                            \
-  template <>                                                                                       \
-  struct mauve::TypeTraits<type> {                                                                  \
-    static constexpr std::string_view name = type_name;                                             \
-    static constexpr auto fields() { return std::make_tuple(MAUVE_MEMBERS(type, __VA_ARGS__)); }    \
+#define MAUVE_TYPE(type, type_name, ...)                                                         \
+  template <>                                                                                    \
+  struct mauve::TypeTraits<type> {                                                               \
+    static constexpr std::string_view name = type_name;                                          \
+    static constexpr auto fields() { return std::make_tuple(MAUVE_MEMBERS(type, __VA_ARGS__)); } \
   };

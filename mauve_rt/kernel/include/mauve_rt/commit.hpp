@@ -10,8 +10,8 @@
 
 namespace mauve {
 
-/// What a commit does. Prepared on an ordinary thread; the two calls run on the component's thread, or on the caller's
-/// while the component is parked.
+/// What a commit does. Prepared on an ordinary thread; the two calls run on the component's thread, or on the
+/// caller's while the component is parked.
 class CommitAction {
  public:
   virtual ~CommitAction() = default;
@@ -23,27 +23,29 @@ class CommitAction {
   virtual std::uint32_t trace_id() const noexcept { return 0; }
 };
 
-/// One commit under way. Owned by its requester; the component's thread holds a pointer to it only between taking it out
-/// of its task's slot and setting `done` (or, for the release that follows, `released`), so it cannot outlive the owner.
+/// One commit under way. Owned by its requester; the component's thread holds a pointer to it only between
+/// taking it out of its task's slot and setting `done` (or, for the release that follows, `released`), so it
+/// cannot outlive the owner.
 ///
-/// | member                 | written by                             | read by               | order                      |
+/// | member                 | written by                             | read by               | order |
 /// |------------------------|----------------------------------------|-----------------------|----------------------------|
-/// | results                | component's thread, before done        | requester, after done | through done               |
-/// | release_*              | component's thread, before released    | requester, after it   | through released           |
-/// | done, released (futex) | component's thread                     | requester             | release / acquire          |
+/// | results                | component's thread, before done        | requester, after done | through done |
+/// | release_*              | component's thread, before released    | requester, after it   | through
+/// released           | | done, released (futex) | component's thread                     | requester |
+/// release / acquire          |
 struct Commit {
   explicit Commit(CommitAction& what) : action(what) {}
 
   CommitAction& action;
 
   bool committed{false};
-  bool not_running{false};        // the component parked before it could
-  std::exception_ptr refusal{};   // when adopt threw
+  bool not_running{false};       // the component parked before it could
+  std::exception_ptr refusal{};  // when adopt threw
   time_ns_t parked_ns{0};
   time_ns_t armed_ns{0};
   time_ns_t adopt_ns{0};
   time_ns_t take_ns{0};
-  time_ns_t pending_ns{0};        // the instant pending at the park; 0: the component was parked already
+  time_ns_t pending_ns{0};  // the instant pending at the park; 0: the component was parked already
   std::atomic<std::uint32_t> done{0};
 
   time_ns_t release_nominal_ns{0};  // of the release that follows

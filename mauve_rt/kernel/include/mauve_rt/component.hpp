@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Component: a shell, a core and an fsm, run by a task; its core and properties can be replaced while it runs.
+// Component: a shell, a core and an fsm, run by a task; its core and properties can be replaced while it
+// runs.
 #pragma once
 
 #include <memory>
@@ -33,11 +34,11 @@ struct CommitTimeouts {
 
 /// One component of an architecture. Its functions are for ordinary threads; its parts run on its task.
 ///
-/// | member                   | written by                                    | read by             | under             |
+/// | member                   | written by                                    | read by             | under |
 /// |--------------------------|-----------------------------------------------|---------------------|-------------------|
-/// | core_, binding_          | commanders, parked; the task in a commit      | the task            | parking, commits  |
-/// | shown_core_, _properties | who changed core or property, after the fact  | any ordinary thread | shown_mutex_      |
-/// | the rest                 | [setup]                                       | anyone              | -                 |
+/// | core_, binding_          | commanders, parked; the task in a commit      | the task            |
+/// parking, commits  | | shown_core_, _properties | who changed core or property, after the fact  | any
+/// ordinary thread | shown_mutex_      | | the rest                 | [setup] | anyone              | - |
 class Component final : public Configurable {
  public:
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
@@ -76,10 +77,13 @@ class Component final : public Configurable {
   void check_allowed(const std::string& core_implementation) const;
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
-  /// Throws Error: unknown_property, type_mismatch, out_of_range, not_reconfigurable (while running), timeout.
-  StepReport set_property(const std::string& name, const PropertyValue& value, const CommitTimeouts& timeouts = {});
+  /// Throws Error: unknown_property, type_mismatch, out_of_range, not_reconfigurable (while running),
+  /// timeout.
+  StepReport set_property(const std::string& name, const PropertyValue& value,
+                          const CommitTimeouts& timeouts = {});
 
-  // Listing 3 of the paper: replacing the core of a stopped component. Throw Error (already_running) otherwise.
+  // Listing 3 of the paper: replacing the core of a stopped component. Throw Error (already_running)
+  // otherwise.
 
   void cleanup_core();
   template <typename CoreType, typename... Args>
@@ -93,8 +97,8 @@ class Component final : public Configurable {
   void configure_core();
 
   /// Replaces the core in flight: prepare, commit inside a wait, retire the old one. [non-rt]
-  /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted; the old core
-  /// then goes on as if nothing had been asked.
+  /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted; the
+  /// old core then goes on as if nothing had been asked.
   StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {});
 
  private:

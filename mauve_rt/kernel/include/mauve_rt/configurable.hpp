@@ -17,7 +17,8 @@ class Configurable {
   bool is_configured() const noexcept { return configured_; }
 
   /// Runs the hook; does nothing when already configured. [non-rt]
-  /// Throws Error (configure_failed) with the reason and stays unconfigured when the hook throws or returns false.
+  /// Throws Error (configure_failed) with the reason and stays unconfigured when the hook throws or returns
+  /// false.
   void configure();
   /// Runs the cleanup hook if configured. [non-rt]
   void cleanup() noexcept;

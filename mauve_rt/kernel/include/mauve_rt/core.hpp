@@ -22,7 +22,8 @@ class CoreBase : public Configurable {
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
   /// Moves the old core's state over; cannot fail. [rt]
   virtual void take(CoreBase& /*old*/) noexcept {}
-  /// The time adopt and take need together; a commit with less left before the next release waits for the one after.
+  /// The time adopt and take need together; a commit with less left before the next release waits for the one
+  /// after.
   virtual time_ns_t budget_ns() const noexcept { return us_to_ns(200); }
 
   virtual void set_context(const Context* context) noexcept { context_ = context; }
@@ -62,7 +63,8 @@ class Core : public CoreBase {
   ShellType* shell_{nullptr};
 };
 
-/// A core whose methods are found by name, e.g. one written in Python. It serves any fsm whose method names it has.
+/// A core whose methods are found by name, e.g. one written in Python. It serves any fsm whose method names
+/// it has.
 class DynamicCore : public CoreBase {
  public:
   /// The number of a method, or -1 when the core has none of that name. [non-rt]

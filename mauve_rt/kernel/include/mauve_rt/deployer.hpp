@@ -39,8 +39,8 @@ class Deployer {
 
   /// Asks for the real-time rights; deploy() does it if it was not done. [setup]
   void prepare_process();
-  /// Creates the threads, meets them at a barrier, publishes epoch = now + max(20 ms, 1 ms x components), starts all.
-  /// [setup] Throws Error: not_configured, realtime_denied; no thread is left then.
+  /// Creates the threads, meets them at a barrier, publishes epoch = now + max(20 ms, 1 ms x components),
+  /// starts all. [setup] Throws Error: not_configured, realtime_denied; no thread is left then.
   void deploy();
   /// Stops every component (outputs written) in reverse order and ends the threads. [non-rt]
   void shutdown() noexcept;
@@ -49,7 +49,8 @@ class Deployer {
   void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
   time_ns_t get_time(const std::string& component) const;
   /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
-  StepReport replace_core(const std::string& component, const std::string& core, const CommitTimeouts& timeouts = {});
+  StepReport replace_core(const std::string& component, const std::string& core,
+                          const CommitTimeouts& timeouts = {});
   StepReport set_property(const std::string& component, const std::string& name, const PropertyValue& value,
                           const CommitTimeouts& timeouts = {});
 

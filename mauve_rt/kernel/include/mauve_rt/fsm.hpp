@@ -15,9 +15,9 @@ namespace mauve {
 
 /// A core as one fsm sees it: resolved before the core is put in, so that putting it in is a pointer swap.
 struct CoreBinding {
-  void* object{nullptr};           // of the fsm's core type, when it is a C++ core
-  DynamicCore* dynamic{nullptr};   // otherwise
-  std::vector<int> method_slots;   // of dynamic, by method number
+  void* object{nullptr};          // of the fsm's core type, when it is a C++ core
+  DynamicCore* dynamic{nullptr};  // otherwise
+  std::vector<int> method_slots;  // of dynamic, by method number
 };
 
 /// A method of the core, by name and by pointer, whichever the core at hand needs.
@@ -48,7 +48,8 @@ class Method {
   }
   /// Evaluates the guard. [rt] as far as the core is.
   bool test(const CoreBinding& core) const {
-    return core.dynamic != nullptr ? core.dynamic->test(core.method_slots[number_]) : call_(storage_, core.object);
+    return core.dynamic != nullptr ? core.dynamic->test(core.method_slots[number_])
+                                   : call_(storage_, core.object);
   }
 
  private:
@@ -81,11 +82,11 @@ struct State {
 
   std::string name;
   bool is_wait{false};
-  time_ns_t duration_ns{0};          // of a wait
-  std::size_t action{kNone};         // of an execution state
-  time_ns_t max_execution_ns{0};     // declared bound of an execution state; 0: none
+  time_ns_t duration_ns{0};             // of a wait
+  std::size_t action{kNone};            // of an execution state
+  time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   std::vector<Transition> transitions;  // the first whose guard holds is taken
-  State* next{nullptr};              // otherwise this one
+  State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
 };
 
@@ -143,7 +144,8 @@ class Fsm : public FsmBase {
     return shell_ != nullptr;
   }
   CoreBinding bind_core(CoreBase& core) const override {
-    if (auto* typed = dynamic_cast<CoreType*>(&core)) return {.object = typed, .dynamic = nullptr, .method_slots = {}};
+    if (auto* typed = dynamic_cast<CoreType*>(&core))
+      return {.object = typed, .dynamic = nullptr, .method_slots = {}};
     if (auto* dynamic = dynamic_cast<DynamicCore*>(&core)) return bind_dynamic(*dynamic);
     return {};
   }
@@ -174,9 +176,9 @@ class Fsm : public FsmBase {
 };
 
 /// The greatest common divisor of the cycle lengths of what is reachable from a state.
-/// One depth-first search gives the strongly connected components (Tarjan 1972) and the potentials; every edge inside a
-/// component then contributes |potential(u) + length(u) - potential(v)|.
-/// Throws Error: loop_without_wait naming the loop.
+/// One depth-first search gives the strongly connected components (Tarjan 1972) and the potentials; every
+/// edge inside a component then contributes |potential(u) + length(u) - potential(v)|. Throws Error:
+/// loop_without_wait naming the loop.
 time_ns_t cycle_gcd_ns(const State& initial);
 
 }  // namespace mauve

@@ -16,8 +16,10 @@ template <typename R, typename... Args>
 class FunctionRef<R(Args...)> {
  public:
   template <typename Callable>
-    requires(!std::is_same_v<std::remove_cvref_t<Callable>, FunctionRef> && std::is_invocable_r_v<R, Callable&, Args...>)
-  FunctionRef(Callable&& callable) noexcept  // NOLINT: implicit, so that a lambda can be passed where one is asked for
+    requires(!std::is_same_v<std::remove_cvref_t<Callable>, FunctionRef> &&
+             std::is_invocable_r_v<R, Callable&, Args...>)
+  FunctionRef(Callable&& callable) noexcept  // NOLINT: implicit, so that a lambda can be passed where one is
+                                             // asked for
       : object_(const_cast<void*>(static_cast<const void*>(std::addressof(callable)))),
         call_([](void* object, Args... args) -> R {
           return (*static_cast<std::remove_reference_t<Callable>*>(object))(std::forward<Args>(args)...);

@@ -13,7 +13,8 @@ inline constexpr time_ns_t kForever = INT64_MAX;
 
 /// Sleeps while the word holds `expected`, at most until the instant. [rt]
 /// Returns false at the instant, true when the word changed or a wake came (re-check the word).
-bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected, time_ns_t until_ns) noexcept;
+bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
+                      time_ns_t until_ns) noexcept;
 
 /// Wakes every thread that sleeps on the word. [rt]
 void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept;

@@ -20,13 +20,14 @@ struct ResourceParameters {
   bool overwrite{false};
 };
 
-/// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at a time.
+/// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at
+/// a time.
 class PluginRegistry {
  public:
   using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
 
-  /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call does nothing.
-  /// Throws Error (plugin) with the loader's words.
+  /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call
+  /// does nothing. Throws Error (plugin) with the loader's words.
   void load_library(const std::string& path);
 
   template <typename ShellType>
@@ -69,7 +70,8 @@ class PluginRegistry {
 
   const std::string& core_shell(const std::string& name) const;
   const std::string& fsm_shell(const std::string& name) const;
-  /// Registered names of "shell", "core", "fsm", "resource" or "type", sorted. Throws Error (invalid_argument).
+  /// Registered names of "shell", "core", "fsm", "resource" or "type", sorted. Throws Error
+  /// (invalid_argument).
   std::vector<std::string> names(const std::string& kind) const;
 
  private:
@@ -96,5 +98,8 @@ class PluginRegistry {
 
 /// Opens the registration function of a plug-in library, once a library:
 ///   MAUVE_PLUGINS(registry) { registry.core<MyCore>("my_package/MyCore", "my_package/MyShell"); }
-#define MAUVE_PLUGINS(registry) \
-  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins(mauve::PluginRegistry& registry)
+// NOLINTBEGIN(bugprone-macro-parentheses): a parameter's name cannot stand in parentheses
+#define MAUVE_PLUGINS(registry)                                                  \
+  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins( \
+      mauve::PluginRegistry& registry)
+// NOLINTEND(bugprone-macro-parentheses)

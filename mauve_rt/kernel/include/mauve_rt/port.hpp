@@ -27,12 +27,13 @@ struct OutputOptions {
 
 /// A port seen without its type. Connected while the component is not running.
 ///
-/// | member                    | written by                      | read by                 | order                       |
+/// | member                    | written by                      | read by                 | order |
 /// |---------------------------|---------------------------------|-------------------------|-----------------------------|
-/// | service_, resource_name_  | connect(), component parked     | component's thread, any | parking publishes it        |
-/// | context_                  | [setup]                         | component's thread      | -                           |
-/// | closed_                   | the watchdog                    | component's thread      | release/acquire: what the   |
-/// |                           |                                 |                         | watchdog wrote stays last   |
+/// | service_, resource_name_  | connect(), component parked     | component's thread, any | parking
+/// publishes it        | | context_                  | [setup]                         | component's thread
+/// | -                           | | closed_                   | the watchdog                    |
+/// component's thread      | release/acquire: what the   | |                           | | | watchdog wrote
+/// stays last   |
 class PortBase {
  public:
   PortBase(std::string name, PortKind kind, std::string type)
@@ -63,7 +64,8 @@ class PortBase {
   void reopen() noexcept { closed_.store(false, std::memory_order_release); }
 
   /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
-  virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/, time_ns_t& /*time*/) {
+  virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
+                               time_ns_t& /*time*/) {
     return false;
   }
   /// A write of a serialized message; false when malformed or no write port. [non-rt]
@@ -167,7 +169,8 @@ class CallPort<R(Args...)> final : public PortBase {
  public:
   CallPort(std::string name, std::string type) : PortBase(std::move(name), PortKind::call, std::move(type)) {}
 
-  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected (check is_connected()).
+  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected (check
+  /// is_connected()).
   R operator()(Args... args) {
     if (service_ == nullptr) throw std::logic_error("call port '" + name() + "' is not connected");
     const ServiceSpan span(trace_id_);

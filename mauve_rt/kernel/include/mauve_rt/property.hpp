@@ -14,8 +14,8 @@ namespace mauve {
 using PropertyValue = std::variant<bool, std::int64_t, double, std::string>;
 
 template <typename T>
-concept PropertyType =
-    std::same_as<T, bool> || std::same_as<T, std::int64_t> || std::same_as<T, double> || std::same_as<T, std::string>;
+concept PropertyType = std::same_as<T, bool> || std::same_as<T, std::int64_t> || std::same_as<T, double> ||
+                       std::same_as<T, std::string>;
 
 /// "bool", "int", "float" or "str", as architecture files have them. [rt]
 std::string_view property_type_name(const PropertyValue& value) noexcept;
@@ -37,7 +37,8 @@ struct PropertyOptions {
 /// | name_, options_  | constructor                                                 | anyone             |
 class PropertyBase {
  public:
-  PropertyBase(std::string name, PropertyOptions options) : name_(std::move(name)), options_(std::move(options)) {}
+  PropertyBase(std::string name, PropertyOptions options)
+      : name_(std::move(name)), options_(std::move(options)) {}
   virtual ~PropertyBase() = default;
 
   const std::string& name() const noexcept { return name_; }
@@ -66,7 +67,9 @@ class Property final : public PropertyBase {
 
   /// The value in force since the component last left a wait. [rt]
   const T& value() const noexcept { return value_; }
-  operator const T&() const noexcept { return value_; }  // NOLINT: reads like the value, as in the paper's listings
+  operator const T&() const noexcept {
+    return value_;
+  }  // NOLINT: reads like the value, as in the paper's listings
 
   PropertyValue boxed() const override { return value_; }
   PropertyValue checked(const PropertyValue& value) const override;

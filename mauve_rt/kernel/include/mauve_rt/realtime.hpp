@@ -14,8 +14,8 @@ struct RealtimeStatus {
   void deny(std::string line);
 };
 
-/// Locks memory (MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) where the limit allows it and holds /dev/cpu_dma_latency at 0
-/// for as long as the object lives.
+/// Locks memory (MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) where the limit allows it and holds
+/// /dev/cpu_dma_latency at 0 for as long as the object lives.
 class RealtimeProcess {
  public:
   RealtimeProcess() = default;
@@ -24,7 +24,8 @@ class RealtimeProcess {
   RealtimeProcess& operator=(const RealtimeProcess&) = delete;
 
   /// Asks for everything; a second call does nothing. Call before any component thread exists. [setup]
-  /// `priority`: the highest one needed. Throws Error (realtime_denied) when `require` and anything is denied.
+  /// `priority`: the highest one needed. Throws Error (realtime_denied) when `require` and anything is
+  /// denied.
   void acquire(int priority, bool require);
   const RealtimeStatus& status() const noexcept { return status_; }
 

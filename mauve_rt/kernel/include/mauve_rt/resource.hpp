@@ -15,15 +15,16 @@ namespace mauve {
 
 /// Tells one waiting thread that some published resource was written.
 ///
-/// | member    | written by            | order                                                                        |
+/// | member    | written by            | order |
 /// |-----------|-----------------------|------------------------------------------------------------------------------|
-/// | word_     | writers               | seq_cst with waiters_: either the writer sees the waiter or it sees the word  |
-/// | waiters_  | the thread that waits | seq_cst: likewise                                                            |
+/// | word_     | writers               | seq_cst with waiters_: either the writer sees the waiter or it sees
+/// the word  | | waiters_  | the thread that waits | seq_cst: likewise |
 class Notifier {
  public:
   /// Wakes the waiter if one sleeps. [rt]
   void notify() noexcept;
-  /// Sleeps until notified after `seen` was returned, or until the instant; returns the word to pass next. [non-rt]
+  /// Sleeps until notified after `seen` was returned, or until the instant; returns the word to pass next.
+  /// [non-rt]
   std::uint32_t wait(std::uint32_t seen, time_ns_t until_ns) noexcept;
   /// [rt]
   std::uint32_t word() const noexcept { return word_.load(std::memory_order_seq_cst); }
@@ -57,14 +58,17 @@ class Resource : public Configurable {
   /// Whether the three below do anything.
   virtual bool is_serializable() const noexcept { return false; }
   /// The next sample not seen yet (`seen` is kept by the caller); a ring's element is removed. [non-rt]
-  virtual bool next_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/, std::uint64_t& /*seen*/) {
+  virtual bool next_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
+                           std::uint64_t& /*seen*/) {
     return false;
   }
   /// Looks at the newest sample without removing it; false when there is none. [non-rt]
-  virtual bool peek_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/, std::uint64_t& /*sequence*/) {
+  virtual bool peek_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
+                           std::uint64_t& /*sequence*/) {
     return false;
   }
-  /// Writes a serialized message, stamped with the real clock; false when malformed or there is no room. [non-rt]
+  /// Writes a serialized message, stamped with the real clock; false when malformed or there is no room.
+  /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/) { return false; }
 
  protected:

@@ -16,7 +16,8 @@ enum class PortKind : std::uint8_t { read = 1, write = 2, call = 3, event = 4 };
 /// "read", "write", "call" or "event". [rt]
 std::string_view to_string(PortKind kind) noexcept;
 
-/// What a read found, seen from the port that reads: nothing yet, what it had read before, or something newer.
+/// What a read found, seen from the port that reads: nothing yet, what it had read before, or something
+/// newer.
 enum class DataStatus : std::uint8_t { none = 0, old_data = 1, new_data = 2 };
 
 /// A value with its status and its writer's time.
@@ -28,7 +29,9 @@ struct Sample {
 
   bool is_new() const noexcept { return status == DataStatus::new_data; }
   /// Age against a later instant; 0 when nothing was written yet. [rt]
-  time_ns_t age_ns(time_ns_t now_ns) const noexcept { return status == DataStatus::none ? 0 : now_ns - time_ns; }
+  time_ns_t age_ns(time_ns_t now_ns) const noexcept {
+    return status == DataStatus::none ? 0 : now_ns - time_ns;
+  }
 };
 
 /// The identity of a type: MAUVE_TYPE's name.
@@ -75,11 +78,13 @@ class WriteService : public ServiceBase {
 template <typename Signature>
 class CallService;
 
-/// A call of the resource's own; its type is a name given by who declares it, e.g. "mauve_examples/MapVisitor".
+/// A call of the resource's own; its type is a name given by who declares it, e.g.
+/// "mauve_examples/MapVisitor".
 template <typename R, typename... Args>
 class CallService<R(Args...)> : public ServiceBase {
  public:
-  CallService(std::string name, std::string type) : ServiceBase(std::move(name), PortKind::call, std::move(type)) {}
+  CallService(std::string name, std::string type)
+      : ServiceBase(std::move(name), PortKind::call, std::move(type)) {}
   /// [rt] as far as the resource says so.
   virtual R call(Args... args) = 0;
 };

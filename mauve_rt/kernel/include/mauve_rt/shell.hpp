@@ -46,7 +46,9 @@ class Shell : public Configurable {
   CallPort<Signature>& call_port(std::string name, std::string type) {
     return add(ports_, std::make_unique<CallPort<Signature>>(std::move(name), std::move(type)));
   }
-  EventPort& event_port(std::string name) { return add(ports_, std::make_unique<EventPort>(std::move(name))); }
+  EventPort& event_port(std::string name) {
+    return add(ports_, std::make_unique<EventPort>(std::move(name)));
+  }
 
   Property<bool>& property(std::string name, bool initial, PropertyOptions options = {}) {
     return add_property(std::move(name), initial, std::move(options));
@@ -67,7 +69,8 @@ class Shell : public Configurable {
  private:
   template <typename T>
   Property<T>& add_property(std::string name, T initial, PropertyOptions options) {
-    return add(properties_, std::make_unique<Property<T>>(std::move(name), std::move(initial), std::move(options)));
+    return add(properties_,
+               std::make_unique<Property<T>>(std::move(name), std::move(initial), std::move(options)));
   }
   template <typename Base, typename Item>
   Item& add(std::vector<std::unique_ptr<Base>>& items, std::unique_ptr<Item> item) {

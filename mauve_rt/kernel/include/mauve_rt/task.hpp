@@ -30,10 +30,10 @@ enum class OverrunPolicy : std::uint8_t {
 };
 
 struct TaskSettings {
-  int priority{50};          // SCHED_FIFO, 1 to 98; 99 is kept for the conductor of transactions
-  std::vector<int> cpus{};   // empty: any
-  time_ns_t offset_ns{0};    // instants are epoch + offset + k * period
-  time_ns_t period_ns{0};    // 0: the gcd of the FSM's cycles
+  int priority{50};         // SCHED_FIFO, 1 to 98; 99 is kept for the conductor of transactions
+  std::vector<int> cpus{};  // empty: any
+  time_ns_t offset_ns{0};   // instants are epoch + offset + k * period
+  time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
   OverrunPolicy overrun{OverrunPolicy::skip};
   std::int64_t max_backlog{10};
   std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 128 KiB are prefaulted
@@ -60,24 +60,27 @@ struct ChangeSignal {
 
 /// The thread of one component.
 ///
-/// | member                          | written by                            | read by      | under / order                      |
+/// | member                          | written by                            | read by      | under / order |
 /// |---------------------------------|---------------------------------------|--------------|------------------------------------|
-/// | control_ (futex word)           | commanders set bits, the thread clears| the thread   | acq_rel: a bit hands over its data |
-/// | state_ (futex word)             | the thread (watchdog: faulted)        | anyone       | release/acquire: publishes fault_  |
-/// | commit_                         | commanders put in; who takes out owns | both         | acq_rel: hands over the commit     |
-/// | commit_budget_ns_               | commanders, before commit_            | the thread   | relaxed: control_ orders it        |
-/// | awaiting_release_               | the thread puts in; who takes out owns| both         | acq_rel: likewise                  |
-/// | parked_, ended_ (futex word)    | the thread                            | commanders   | release/acquire: all it wrote      |
-/// | start_at_ns_                    | commanders, thread parked             | the thread   | control_'s kStart bit              |
-/// | current_, context_, statistics_ | the thread                            | anyone       | relaxed: lone facts                |
-/// | core_, fsm_, shell_             | commanders, thread parked; commits    | the thread   | parking                            |
-/// | fault_                          | who set condemned_, before state_     | anyone after | state_                             |
-/// | condemned_                      | the thread or the watchdog, first wins| both         | acq_rel: one writer of fault_      |
-/// | facts_                          | the thread, before the barrier        | anyone after | barrier                            |
-/// | command_mutex_                  | ordinary threads only: one command at a time                                            |
+/// | control_ (futex word)           | commanders set bits, the thread clears| the thread   | acq_rel: a bit
+/// hands over its data | | state_ (futex word)             | the thread (watchdog: faulted)        | anyone
+/// | release/acquire: publishes fault_  | | commit_                         | commanders put in; who takes
+/// out owns | both         | acq_rel: hands over the commit     | | commit_budget_ns_               |
+/// commanders, before commit_            | the thread   | relaxed: control_ orders it        | |
+/// awaiting_release_               | the thread puts in; who takes out owns| both         | acq_rel: likewise
+/// | | parked_, ended_ (futex word)    | the thread                            | commanders   |
+/// release/acquire: all it wrote      | | start_at_ns_                    | commanders, thread parked | the
+/// thread   | control_'s kStart bit              | | current_, context_, statistics_ | the thread | anyone |
+/// relaxed: lone facts                | | core_, fsm_, shell_             | commanders, thread parked;
+/// commits    | the thread   | parking                            | | fault_                          | who
+/// set condemned_, before state_     | anyone after | state_                             | | condemned_ | the
+/// thread or the watchdog, first wins| both         | acq_rel: one writer of fault_      | | facts_ | the
+/// thread, before the barrier        | anyone after | barrier                            | | command_mutex_
+/// | ordinary threads only: one command at a time                                            |
 class Task {
  public:
-  Task(std::string name, std::uint16_t number, ChangeSignal& changes, const Clock& clock = MonotonicClock::instance());
+  Task(std::string name, std::uint16_t number, ChangeSignal& changes,
+       const Clock& clock = MonotonicClock::instance());
   ~Task();
   Task(const Task&) = delete;
   Task& operator=(const Task&) = delete;
@@ -88,8 +91,9 @@ class Task {
   const TaskSettings& settings() const noexcept { return settings_; }
   Context& context() noexcept { return context_; }
 
-  /// Creates the thread, which prefaults its stack, reads back its rights and meets the barrier, then parks. [setup]
-  /// Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied) when told so.
+  /// Creates the thread, which prefaults its stack, reads back its rights and meets the barrier, then parks.
+  /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
+  /// when told so.
   void create_thread(pthread_barrier_t& barrier, bool require_realtime, bool trace);
   /// Tells the thread to end, then joins it; false when it was still in user code at the instant. [non-rt]
   bool end_thread(time_ns_t until_ns) noexcept;
@@ -113,17 +117,19 @@ class Task {
   time_ns_t get_time() const noexcept { return context_.instant_ns.load(std::memory_order_relaxed); }
 
   /// Carries out the action inside the component's wait, or here and now when it is parked. [non-rt]
-  /// Returns false when adopt returned false; rethrows what it threw. Throws Error (timeout) naming the state still
-  /// running; nothing was changed then.
+  /// Returns false when adopt returned false; rethrows what it threw. Throws Error (timeout) naming the state
+  /// still running; nothing was changed then.
   bool commit(Commit& commit, time_ns_t timeout_ns);
   /// Waits for the release that follows a commit; false when it had not come by the instant. [non-rt]
   bool wait_release(Commit& commit, time_ns_t until_ns) noexcept;
 
-  /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component FAULTED,
-  /// writes its outputs and takes the thread's priority away. Returns whether it did. [non-rt]
+  /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component
+  /// FAULTED, writes its outputs and takes the thread's priority away. Returns whether it did. [non-rt]
   bool check_execution(time_ns_t now_ns);
 
-  ComponentState state() const noexcept { return static_cast<ComponentState>(state_.load(std::memory_order_acquire)); }
+  ComponentState state() const noexcept {
+    return static_cast<ComponentState>(state_.load(std::memory_order_acquire));
+  }
   /// For configure and cleanup of the component. [non-rt]
   void set_state(ComponentState state) noexcept;
   /// Forgets a fault, for configure; the thread must be parked. [non-rt]
@@ -162,12 +168,16 @@ class Task {
   void write_outputs(bool commit) noexcept;
   void publish_state(ComponentState state) noexcept;
   void read_back_thread();
-  void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0, std::int64_t c = 0) noexcept {
+  void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
+             std::int64_t c = 0) noexcept {
     if (active_ring_ != nullptr) active_ring_->push(kind, name, a, b, c);
   }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
-  void set_clock_ns(time_ns_t instant) noexcept { context_.clock_ns.store(instant, std::memory_order_relaxed); }
-  [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns, const std::string& remedy) const;
+  void set_clock_ns(time_ns_t instant) noexcept {
+    context_.clock_ns.store(instant, std::memory_order_relaxed);
+  }
+  [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
+                                        const std::string& remedy) const;
 
   std::string name_;
   ChangeSignal& changes_;

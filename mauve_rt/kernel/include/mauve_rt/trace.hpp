@@ -60,19 +60,20 @@ class TraceNames {
 /// |----------|------------|--------------------------------------------------------------------------------|
 /// | head_    | producer   | release: publishes the record written before; the drain acquires               |
 /// | tail_    | consumer   | release: frees the place only after the copy; the producer acquires            |
-/// | offered_ | producer   | relaxed: a count; its reader takes whatever is newest                           |
-/// | dropped_ | producer   | relaxed: likewise                                                              |
+/// | offered_ | producer   | relaxed: a count; its reader takes whatever is newest | | dropped_ | producer |
+/// relaxed: likewise                                                              |
 class TraceRing {
  public:
   /// Capacity is rounded up to a power of two; all pages are touched. [setup]
   explicit TraceRing(std::uint16_t component, std::size_t capacity = 4096);
 
   /// Records an event now, or at the time given; counted as dropped when the ring is full. [rt]
-  void push(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0, std::int64_t c = 0) noexcept {
+  void push(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
+            std::int64_t c = 0) noexcept {
     push_at(monotonic_now_ns(), kind, name, a, b, c);
   }
-  void push_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
-               std::int64_t c = 0) noexcept;
+  void push_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0,
+               std::int64_t b = 0, std::int64_t c = 0) noexcept;
 
   /// Appends all records to the vector and frees their places. [non-rt], one thread at a time.
   void drain(std::vector<TraceRecord>& into);
@@ -95,7 +96,8 @@ class TraceRing {
 };
 
 /// Records an event of the user's own on the calling component's thread; nothing elsewhere. [rt]
-inline void trace_mark(std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0, std::int64_t c = 0) noexcept {
+inline void trace_mark(std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
+                       std::int64_t c = 0) noexcept {
   if (TraceRing* ring = TraceRing::of_this_thread()) ring->push(TraceKind::mark, name, a, b, c);
 }
 
