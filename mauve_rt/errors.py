@@ -1,0 +1,121 @@
+"""Typed errors. Every one is a `MauveError`: a code, where it is, what was expected and found, and what to do about it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mauve_rt._kernel import MauveError
+
+__all__ = [
+    "ArchitectureFileError",
+    "MauveError",
+    "ParameterError",
+    "PluginError",
+    "Problem",
+    "error_code",
+    "one_line",
+]
+
+
+class PluginError(MauveError):
+    """A plug-in that is not installed, cannot be loaded or is declared wrongly. `code` is "plugin"."""
+
+    def __init__(self, text: str, *, element: str = "", remedy: str = "") -> None:
+        super().__init__(f"{text}; {remedy}" if remedy else text)
+        _describe(self, code="plugin", element=element, remedy=remedy)
+
+
+class ParameterError(MauveError):
+    """A parameter or argument of the command line that cannot be used. `code` is "invalid_argument"."""
+
+    def __init__(self, text: str, *, element: str = "") -> None:
+        super().__init__(text)
+        _describe(self, code="invalid_argument", element=element)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """One thing wrong in an architecture file. Lines and columns count from 1."""
+
+    line: int
+    column: int
+    what: str
+    expected: str = ""
+    found: str = ""
+    remedy: str = ""
+    component: str = ""
+    element: str = ""
+    code: str = "invalid_argument"
+
+    def text(self) -> str:
+        """One line without the place: `what: expected ..., found ...; remedy`."""
+        facts = [f"expected {self.expected}"] if self.expected else []
+        if self.found:
+            facts.append(f"found {self.found}")
+        text = self.what + (": " + ", ".join(facts) if facts else "")
+        return one_line(f"{text}; {self.remedy}" if self.remedy else text)
+
+
+class ArchitectureFileError(MauveError):
+    """An architecture file that cannot be used.
+
+    `str()` is one line about the first problem, `FILE:LINE:COLUMN: what (component.element): expected ..., found ...;
+    remedy`; `problems` has all that were found, in the order of the file.
+    """
+
+    file: Path
+    line: int
+    column: int
+    problems: tuple[Problem, ...]
+
+    def __init__(self, file: Path, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(sorted(problems, key=lambda problem: (problem.line, problem.column)))
+        first = self.problems[0]
+        super().__init__(self.render(file, first))
+        self.file, self.line, self.column = file, first.line, first.column
+        _describe(
+            self,
+            code=first.code,
+            component=first.component,
+            element=first.element,
+            expected=first.expected,
+            found=first.found,
+            remedy=first.remedy,
+        )
+
+    @staticmethod
+    def render(file: Path, problem: Problem) -> str:
+        """The line that tells of one problem."""
+        return f"{file}:{problem.line}:{problem.column}: {problem.text()}"
+
+    def lines(self) -> list[str]:
+        """One line for every problem."""
+        return [self.render(self.file, problem) for problem in self.problems]
+
+
+def error_code(error: BaseException) -> str:
+    """The code of an error: of a `MauveError` its own, of anything else "internal"."""
+    return str(getattr(error, "code", "internal")) if isinstance(error, MauveError) else "internal"
+
+
+def one_line(text: str) -> str:
+    """The text with every run of white space made one blank."""
+    return " ".join(text.split())
+
+
+def _describe(
+    error: MauveError,
+    *,
+    code: str,
+    component: str = "",
+    element: str = "",
+    expected: str = "",
+    found: str = "",
+    remedy: str = "",
+) -> None:
+    error.code = code
+    error.component = component
+    error.element = element
+    error.expected = expected
+    error.found = found
+    error.remedy = remedy

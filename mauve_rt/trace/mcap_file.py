@@ -1,0 +1,201 @@
+"""An MCAP file that is a finished one after every flush.
+
+On disk, always:
+
+    magic, Header | Chunk, MessageIndex..., Chunk, MessageIndex..., | DataEnd, summary, summary offsets,
+    Footer, magic
+                                                                      '------------------- the tail
+                                                                      ----------------'
+
+A flush turns the waiting messages into one chunk and writes it, followed by the new tail, over the old
+tail, in one pwrite. The file is complete before and after it; a process killed between two flushes leaves
+all that was flushed. (A kill that hits the inside of that one system call, some tens of microseconds, can
+leave it half done: the kernel gives up a write between two pages when a fatal signal is pending. Power loss
+is another matter: nothing here waits for the disk.)
+
+The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
+the file. Format: https://mcap.dev/spec. Records are built by the mcap library where they are small;
+messages are not.
+"""
+
+import os
+import struct
+import zlib
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    DataEnd,
+    Footer,
+    Header,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_chunk import Counts, PendingChunk, serialized
+
+MAGIC = b"\x89MCAP0\r\n"
+
+
+class McapFile:
+    """Writes one MCAP file. For one thread at a time."""
+
+    def __init__(self, path: Path, *, profile: str, library: str) -> None:
+        """Create the file, which is a complete empty one when this returns.
+
+        Raises:
+            TraceError: it exists already or cannot be written.
+
+        """
+        self.path = path
+        self.flushed = Counts()
+        """What the file on disk holds now."""
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._chunk = PendingChunk()
+        self._chunk_indexes = bytearray()
+        self._chunk_count = 0
+        self._tail = b""
+        start = MAGIC + serialized(Header(profile, library))
+        self._data_end = len(start)
+        self._data_crc = zlib.crc32(start)
+        self._tail = self._build_tail(self.flushed, self._data_end, self._data_crc)
+        self._descriptor = -1
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            _write_all(self._descriptor, start + self._tail, 0)
+        except OSError as error:
+            self.abort()
+            msg = f"bag file {path}: cannot be created ({error.strerror})"
+            raise TraceError(msg) from error
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of messages that wait for the next flush."""
+        return len(self._chunk.records)
+
+    def add_schema(self, name: str, *, encoding: str, data: bytes) -> int:
+        """Declare a schema; returns its id."""
+        schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
+        self._schemas.append(schema)
+        self._chunk.records += serialized(schema)
+        return schema.id
+
+    def add_channel(self, topic: str, *, schema_id: int, encoding: str, metadata: dict[str, str]) -> int:
+        """Declare a channel; returns its id."""
+        channel = Channel(
+            id=len(self._channels) + 1,
+            topic=topic,
+            message_encoding=encoding,
+            metadata=metadata,
+            schema_id=schema_id,
+        )
+        self._channels.append(channel)
+        self._chunk.records += serialized(channel)
+        return channel.id
+
+    def add_message(self, channel_id: int, log_time_ns: int, data: bytes) -> None:
+        """Keep a message for the next flush. Log time in ns of CLOCK_REALTIME."""
+        self._chunk.add(channel_id, log_time_ns, data)
+
+    def flush(self) -> None:
+        """Write what waits; the file is complete before and after.
+
+        Raises:
+            TraceError: the system refused, e.g. the disk is full. What was flushed before is still there
+            and complete.
+
+        """
+        chunk = self._chunk
+        if not chunk.records:
+            return
+        block, index = chunk.build(self._data_end)
+        flushed = self.flushed.plus(chunk.counts)
+        data_end = self._data_end + len(block)
+        data_crc = zlib.crc32(block, self._data_crc)
+        old_indexes = len(self._chunk_indexes)
+        self._chunk_indexes += index
+        self._chunk_count += 1
+        tail = self._build_tail(flushed, data_end, data_crc)
+        try:
+            _write_all(self._descriptor, block + tail, self._data_end)
+        except OSError as error:
+            del self._chunk_indexes[old_indexes:]
+            self._chunk_count -= 1
+            kept = self._restore_tail()
+            msg = f"bag file {self.path}: writing failed ({error.strerror}); {kept}"
+            raise TraceError(msg) from error
+        self._tail, self._data_end, self._data_crc, self.flushed = tail, data_end, data_crc, flushed
+        self._chunk = PendingChunk()
+
+    def close(self) -> None:
+        """Flush and close.
+
+        Raises:
+            TraceError: as flush; the file is closed all the same.
+
+        """
+        try:
+            self.flush()
+        finally:
+            self.abort()
+
+    def abort(self) -> None:
+        """Close without writing what waits; the file stays as the last flush left it. May be called again."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
+
+    def _build_tail(self, counts: Counts, data_end: int, data_crc: int) -> bytes:
+        end = serialized(DataEnd(data_crc))
+        summary_start = data_end + len(end)
+        groups = (
+            (Opcode.SCHEMA, serialized(*self._schemas)),
+            (Opcode.CHANNEL, serialized(*self._channels)),
+            (Opcode.STATISTICS, serialized(self._statistics(counts))),
+            (Opcode.CHUNK_INDEX, bytes(self._chunk_indexes)),
+        )
+        at = summary_start
+        offsets = []
+        for opcode, group in groups:
+            if group:
+                offsets.append(SummaryOffset(group_opcode=opcode, group_start=at, group_length=len(group)))
+            at += len(group)
+        summary = b"".join(group for _, group in groups) + serialized(*offsets)
+        footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
+        crc = zlib.crc32(footer, zlib.crc32(summary))
+        return b"".join((end, summary, footer, struct.pack("<I", crc), MAGIC))
+
+    def _statistics(self, counts: Counts) -> Statistics:
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=counts.by_channel,
+            chunk_count=self._chunk_count,
+            message_count=counts.messages,
+            message_end_time=counts.end_ns,
+            message_start_time=counts.start_ns,
+            metadata_count=0,
+            schema_count=len(self._schemas),
+        )
+
+    def _restore_tail(self) -> str:
+        """Put the old tail back after a write that failed halfway (its blocks are there already)."""
+        try:
+            _write_all(self._descriptor, self._tail, self._data_end)
+            os.ftruncate(self._descriptor, self._data_end + len(self._tail))
+        except OSError as error:
+            return f"the old end could not be put back either ({error.strerror}): the file needs repair"
+        return f"the file is complete up to the flush before, {self.flushed.messages} messages"
+
+
+def _write_all(descriptor: int, data: bytes, offset: int) -> None:
+    """One pwrite; more only where the system took less (a full disk, which then says so, or over 2 GB)."""
+    rest = memoryview(data)
+    while rest:
+        written = os.pwrite(descriptor, rest, offset)
+        rest = rest[written:]
+        offset += written

@@ -1,0 +1,158 @@
+"""A trace in memory: records per component, what they mean, what is missing."""
+
+import heapq
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.records import Kind, Records
+
+_SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
+
+
+class Deployment(NamedTuple):
+    """The grid of a component's instants from time_ns on: epoch_ns + offset_ns + k * period_ns."""
+
+    time_ns: int
+    epoch_ns: int
+    offset_ns: int
+    period_ns: int
+    """g; 0 for a sporadic component, which has no grid."""
+
+    def phase_ns(self, instant_ns: int) -> int:
+        """Instant minus the nearest instant of the grid: in [-g/2, g/2), 0 without a grid."""
+        if self.period_ns <= 0:
+            return 0
+        half = self.period_ns // 2
+        return (instant_ns - self.epoch_ns - self.offset_ns + half) % self.period_ns - half
+
+
+class Loss(NamedTuple):
+    """What is known about records that are not in the bag."""
+
+    written: int
+    """Records the component ever offered, by the last batch."""
+    received: int
+    dropped: int
+    """Of the written ones, lost because the ring was full, by the last batch."""
+    gaps: int
+    """Sequence numbers missing before the last one received."""
+
+    @property
+    def lost(self) -> int:
+        """Records known to be lost."""
+        return max(self.dropped, self.gaps)
+
+
+class Message(NamedTuple):
+    """A message of another topic than the trace itself."""
+
+    topic: str
+    log_time_ns: int
+    """CLOCK_REALTIME"""
+    monotonic_ns: int
+    """The same instant on the records' clock, by the clock pair of its flush."""
+    msg: Any
+
+
+MessageSource = Callable[[tuple[str, ...]], Iterator[Message]]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Records of one executor, or of several merged ones."""
+
+    records: dict[str, Records]
+    """Per component, in the order of their sequence numbers. Times in ns of CLOCK_MONOTONIC."""
+    names: tuple[str, ...]
+    """What `name` of a record refers to."""
+    losses: dict[str, Loss]
+    clock_pairs: npt.NDArray[np.int64]
+    """(n, 2): CLOCK_MONOTONIC and CLOCK_REALTIME at each drain."""
+    message_source: MessageSource = field(repr=False, default=lambda _: iter(()))
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components."""
+        return tuple(self.records)
+
+    @property
+    def lost(self) -> int:
+        """Records known to be lost, of all components."""
+        return sum(loss.lost for loss in self.losses.values())
+
+    def of(self, component: str, *kinds: Kind) -> Records:
+        """Records of one component, of these kinds (all when none is named).
+
+        Raises:
+            TraceError: there is no such component in the trace.
+
+        """
+        if component not in self.records:
+            known = ", ".join(self.records) or "none"
+            msg = f"component '{component}': not in the trace, which has {known}"
+            raise TraceError(msg)
+        records = self.records[component]
+        return records[np.isin(records["kind"], kinds)] if kinds else records
+
+    def name(self, index: int) -> str:
+        """Word that a record's `name` stands for; `name <index>` when the bag ends before telling it."""
+        return self.names[index] if 0 <= index < len(self.names) else f"name {index}"
+
+    def deployments(self, component: str) -> list[Deployment]:
+        """Grids of a component in the order of time; a component deployed again has more than one."""
+        rows = self.of(component, Kind.DEPLOYMENT)
+        return [Deployment(int(r["time_ns"]), int(r["a"]), int(r["b"]), int(r["c"])) for r in rows]
+
+    def deployment_at(self, component: str, time_ns: int) -> Deployment | None:
+        """Return the grid in force at a time: the last before it, else the first; None when there is none."""
+        grids = self.deployments(component)
+        earlier = [grid for grid in grids if grid.time_ns <= time_ns]
+        return earlier[-1] if earlier else next(iter(grids), None)
+
+    def messages(self, *topics: str) -> Iterator[Message]:
+        """Messages of these topics (all but the trace's own when none is named), by log time."""
+        return self.message_source(topics)
+
+
+def merge_traces(traces: Mapping[str, Trace]) -> Trace:
+    """Return one trace of several executors; components are named <key>/<component>.
+
+    Raises:
+        TraceError: they were recorded on machines, or after boots, with different monotonic clocks.
+
+    """
+    offsets = {key: _clock_offset_ns(trace) for key, trace in traces.items() if len(trace.clock_pairs)}
+    if offsets and max(offsets.values()) - min(offsets.values()) > _SAME_CLOCK_NS:
+        found = ", ".join(f"{key}: {offset / 1e9:.3f} s" for key, offset in offsets.items())
+        msg = f"traces of different monotonic clocks cannot be merged (realtime - monotonic: {found})"
+        raise TraceError(msg)
+    names = tuple(dict.fromkeys(name for trace in traces.values() for name in trace.names))
+    position = {name: index for index, name in enumerate(names)}
+    records: dict[str, Records] = {}
+    losses: dict[str, Loss] = {}
+    for key, trace in traces.items():
+        renumbering = np.array([position[name] for name in trace.names], dtype=np.uint32)
+        for component, rows in trace.records.items():
+            merged = rows.copy()
+            known = rows["name"] < len(renumbering)
+            merged["name"][known] = renumbering[rows["name"][known]]
+            merged["name"][~known] = len(names)
+            records[f"{key}/{component}"] = merged
+            losses[f"{key}/{component}"] = trace.losses[component]
+
+    def messages(topics: tuple[str, ...]) -> Iterator[Message]:
+        sources = (trace.messages(*topics) for trace in traces.values())
+        return heapq.merge(*sources, key=lambda message: message.log_time_ns)
+
+    pairs = np.concatenate([trace.clock_pairs for trace in traces.values()] or [np.empty((0, 2), np.int64)])
+    return Trace(records, names, losses, pairs[np.argsort(pairs[:, 1], kind="stable")], messages)
+
+
+def _clock_offset_ns(trace: Trace) -> int:
+    monotonic_ns, realtime_ns = trace.clock_pairs[-1]
+    return int(realtime_ns - monotonic_ns)

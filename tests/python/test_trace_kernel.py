@@ -1,0 +1,92 @@
+"""The kernel's records, recorded and read back, tell the same as the kernel's own counters and reports."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from mauve_rt import _kernel
+from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reconfigurations import reconfigurations
+from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.statistics import all_statistics
+from mauve_rt.trace.trace import Trace
+
+PERIODS_MS = {"fast": 2, "slow": 20}
+CORES = ("Backwards", "Counter", "Reluctant", "Backwards")
+
+
+class Run:
+    """Two components for a moment; the core of one replaced while they run, once refused."""
+
+    def __init__(self, prefix: Path, directory: Path) -> None:
+        registry = _kernel.PluginRegistry()
+        registry.load_library(str(prefix / "lib" / "libexecutor_tests.so"))
+        architecture = _kernel.Architecture(registry)
+        names = {"shell": "Shell", "core": "", "fsm": "Fsm"}
+        plugins = {kind: f"executor_tests/Counter{suffix}" for kind, suffix in names.items()}
+        alternatives = [f"executor_tests/{core}" for core in CORES]
+        for component, period_ms in PERIODS_MS.items():
+            architecture.add_component(component, **plugins, alternatives=alternatives)
+            architecture.set_property(component, "period_ms", period_ms)
+        architecture.configure()
+        deployer = _kernel.Deployer(architecture)
+        recorder = Recorder(deployer, directory, node_name="/robot/executor")
+        recorder.start()
+        deployer.deploy()
+        self.epoch_ns = deployer.epoch_ns
+        self.reports = []
+        for core in CORES:
+            time.sleep(0.05)
+            if core == "Reluctant":
+                with pytest.raises(_kernel.MauveError):
+                    deployer.replace_core("slow", "executor_tests/Reluctant")
+            else:
+                self.reports.append(deployer.replace_core("slow", f"executor_tests/{core}"))
+        deployer.stop("fast")
+        deployer.start("fast")
+        time.sleep(0.05)
+        deployer.shutdown()
+        recorder.stop()
+        self.components = {one.name: one for one in architecture.components()}
+        self.trace: Trace = read_bag(directory)
+
+
+@pytest.fixture(scope="module")
+def run(plugin_prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return Run(plugin_prefix, tmp_path_factory.mktemp("trace") / "bag")
+
+
+def test_every_record_is_there(run: Run):
+    assert run.trace.components == tuple(PERIODS_MS)
+    for loss in run.trace.losses.values():
+        assert loss.received == loss.written > 0
+        assert loss.lost == 0
+
+
+def test_counts_are_the_kernels(run: Run):
+    for name, found in all_statistics(run.trace).items():
+        told = run.components[name]
+        assert (found.releases, found.overruns, found.skipped) == (told.releases, told.overruns, told.skipped)
+        assert found.faults == 0
+        assert found.wakeup.min_ns >= 0
+
+
+def test_deployment_tells_the_grid(run: Run):
+    for name, period_ms in PERIODS_MS.items():
+        grids = run.trace.deployments(name)
+        assert {grid[1:] for grid in grids} == {(run.epoch_ns, 0, period_ms * 1_000_000)}
+        nominal_ns = run.trace.of(name, Kind.RELEASE)["a"]
+        assert {grids[0].phase_ns(int(instant)) for instant in nominal_ns} == {0}
+
+
+def test_swaps_are_as_the_kernel_reported_them(run: Run):
+    found = reconfigurations(run.trace)
+    assert [one.committed for one in found] == [True, True, False, True]
+    assert all(one.complete and one.component == "slow" for one in found)
+    for one, told in zip([one for one in found if one.committed], run.reports, strict=True):
+        assert one.what == told.step
+        assert (one.blackout_ns, one.missed_releases) == (told.blackout_ns, told.missed_releases)
+        assert (one.phase_nominal_ns, one.phase_actual_ns) == (told.phase_nominal_ns, told.phase_actual_ns)
+        assert one.parked_ns + one.adopt_ns + one.take_ns <= one.armed_ns

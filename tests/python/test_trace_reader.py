@@ -1,0 +1,118 @@
+"""Reading a bag back: what is in it, what is missing from it, and what is not a bag with a trace."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mauve_rt.trace import TraceError
+from mauve_rt.trace.bag import BagWriter
+from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.trace import Deployment, Loss, Trace, merge_traces
+
+
+@pytest.fixture(autouse=True)
+def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    share = tmp_path / "prefix" / "share"
+    shutil.copytree(Path(__file__).parents[2] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+
+
+def record(source: SyntheticSource, directory: Path) -> Trace:
+    recorder = Recorder(source, directory, node_name="/robot/executor")
+    recorder.start()
+    recorder.stop()
+    return read_bag(directory)
+
+
+def test_a_bag_moved_elsewhere_needs_nothing_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    source = SyntheticSource(["a"])
+    source.add("a", Kind.MARK, 7, name="hello", a=1, b=-2, c=3)
+    record(source, tmp_path / "bag")
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    (row,) = read_bag(shutil.move(tmp_path / "bag", tmp_path / "else")).of("a", Kind.MARK)
+    assert [int(row[key]) for key in ("time_ns", "a", "b", "c")] == [7, 1, -2, 3]
+
+
+def test_deployments_tell_the_grid_in_force(tmp_path: Path):
+    source = SyntheticSource(["a"])
+    source.add("a", Kind.DEPLOYMENT, 10, a=1000, b=5, c=100)
+    source.add("a", Kind.DEPLOYMENT, 50_000, a=60_000, b=0, c=0)
+    trace = record(source, tmp_path / "bag")
+    first, second = trace.deployments("a")
+    assert first == Deployment(10, 1000, 5, 100)
+    assert [trace.deployment_at("a", time) for time in (0, 10, 49_999, 50_000)] == [
+        first,
+        first,
+        first,
+        second,
+    ]
+    assert [first.phase_ns(instant) for instant in (1005, 1054, 1055, 1104, 905)] == [0, 49, -50, -1, 0]
+    assert second.phase_ns(123) == 0
+
+
+def test_loss_is_known_from_sequences_and_counters(tmp_path: Path):
+    source = SyntheticSource(["whole", "gap", "tail"])
+    for component in source.components:
+        source.add(component, Kind.MARK, 1)
+    source.drop("gap", 3)
+    source.drop("tail", 2)
+    for component in ("whole", "gap"):
+        source.add(component, Kind.MARK, 2)
+    trace = record(source, tmp_path / "bag")
+    assert trace.losses == {
+        "whole": Loss(written=2, received=2, dropped=0, gaps=0),
+        "gap": Loss(written=5, received=2, dropped=3, gaps=3),
+        "tail": Loss(written=3, received=1, dropped=2, gaps=0),
+    }
+    assert trace.lost == 5
+
+
+def test_an_unknown_component_is_named_with_the_known_ones(tmp_path: Path):
+    trace = record(SyntheticSource(["a", "b"]), tmp_path / "bag")
+    with pytest.raises(TraceError, match="component 'c': not in the trace, which has a, b"):
+        trace.of("c")
+
+
+def test_robots_merge_on_one_clock(tmp_path: Path):
+    traces = {}
+    for index, robot in enumerate(("robot_1", "robot_2")):
+        source = SyntheticSource(["control"])
+        source.add("control", Kind.STATE_BEGIN, 10 + index, name=f"only_{robot}")
+        source.add("control", Kind.STATE_END, 20 + index, name="both")
+        traces[robot] = record(source, tmp_path / robot)
+    merged = merge_traces(traces)
+    assert merged.components == ("robot_1/control", "robot_2/control")
+    words = [[merged.name(row["name"]) for row in merged.of(component)] for component in merged.components]
+    assert words == [["only_robot_1", "both"], ["only_robot_2", "both"]]
+    assert len(merged.clock_pairs) == sum(len(trace.clock_pairs) for trace in traces.values())
+
+
+def test_robots_of_different_clocks_do_not_merge(tmp_path: Path):
+    first = record(SyntheticSource(["a"]), tmp_path / "bag_1")
+    second = record(SyntheticSource(["a"], realtime_offset_ns=0), tmp_path / "bag_2")
+    with pytest.raises(TraceError, match="different monotonic clocks"):
+        merge_traces({"x": first, "y": second})
+
+
+def test_what_is_no_bag_is_refused(tmp_path: Path):
+    with pytest.raises(TraceError, match="not there"):
+        read_bag(tmp_path / "nothing")
+    with pytest.raises(TraceError, match=r"no \.mcap file in it"):
+        read_bag(tmp_path)
+    (tmp_path / "x.mcap").write_bytes(b"something else entirely, and long enough for a footer")
+    with pytest.raises(TraceError, match=r"x\.mcap: cannot be read"):
+        read_bag(tmp_path / "x.mcap")
+    (tmp_path / "y.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(TraceError, match=r"y\.mcap: cannot be read"):
+        read_bag(tmp_path / "y.mcap")
+
+
+def test_a_bag_without_a_trace_is_refused(tmp_path: Path):
+    BagWriter(tmp_path / "bag").close()
+    with pytest.raises(TraceError, match="found no topic of type mauve_msgs/msg/TraceBatch"):
+        read_bag(tmp_path / "bag")

@@ -1,0 +1,184 @@
+"""The recorder: what it is given is in the bag, on one time base; nothing it meets harms the executor."""
+
+import resource
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from mauve_rt.trace import TraceError
+from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.recorder import DROPPED_MESSAGES, Recorder
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.synthetic import SyntheticSource
+
+NODE = "/robot_1/executor"
+TEXT = "mauve_test_msgs/msg/Text"
+HELLO = b"\0\1\0\0\6\0\0\0hello\0"
+
+
+@pytest.fixture(autouse=True)
+def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    share = tmp_path / "prefix" / "share"
+    shutil.copytree(Path(__file__).parents[2] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    (share / "mauve_test_msgs" / "msg").mkdir(parents=True)
+    (share / "mauve_test_msgs" / "msg" / "Text.msg").write_text("string data\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+
+
+@pytest.fixture
+def source() -> SyntheticSource:
+    return SyntheticSource(["control", "guidance"])
+
+
+@pytest.fixture
+def errors() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def recorder(tmp_path: Path, source: SyntheticSource, errors: list[str]) -> Iterator[Recorder]:
+    made = Recorder(
+        source,
+        tmp_path / "bag",
+        node_name=NODE,
+        flush_period_s=0.02,
+        queue_bytes=10_000,
+        on_error=errors.append,
+    )
+    yield made
+    made.stop()
+
+
+def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+    end_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end_s, "waited in vain"
+        time.sleep(0.005)
+
+
+def custom_data(directory: Path) -> dict[str, str]:
+    return YAML(typ="safe").load((directory / "metadata.yaml").read_text())["rosbag2_bagfile_information"][
+        "custom_data"
+    ]
+
+
+def test_records_and_words_are_in_the_bag(recorder: Recorder, source: SyntheticSource):
+    recorder.start()
+    source.cycle("control", 1000, states={"update": 5}, wait_ns=20)
+    wait_until(lambda: len(read_bag(recorder.directory).records.get("control", ())) == 4)
+    source.cycle("guidance", 2000, states={"planning": 7}, wait_ns=100)
+    recorder.stop()
+    trace = read_bag(recorder.directory)
+    assert trace.components == ("control", "guidance")
+    assert [Kind(kind).name for kind in trace.of("guidance")["kind"]] == [
+        "RELEASE", "STATE_BEGIN", "STATE_END", "WAIT",
+    ]  # fmt: skip
+    (begin,) = trace.of("guidance", Kind.STATE_BEGIN)
+    assert trace.name(begin["name"]) == "planning"
+    assert trace.lost == 0
+
+
+def test_messages_lie_on_the_time_base_of_the_records(recorder: Recorder, source: SyntheticSource):
+    source.now_ns = 5_000_000
+    recorder.start()
+    assert recorder.record("/robot_1/words", TEXT, HELLO, monotonic_ns=4_999_000)
+    recorder.stop()
+    (message,) = read_bag(recorder.directory).messages()
+    assert (message.topic, message.msg.data) == ("/robot_1/words", "hello")
+    assert message.log_time_ns == 4_999_000 + source.realtime_offset_ns
+    assert message.monotonic_ns == 4_999_000
+
+
+def test_messages_from_many_threads_all_arrive(recorder: Recorder):
+    recorder.start()
+
+    def send(topic: str) -> None:
+        for number in range(50):
+            recorder.record(topic, TEXT, HELLO, monotonic_ns=number)
+
+    threads = [threading.Thread(target=send, args=(f"/robot_1/words_{index}",)) for index in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    recorder.stop()
+    found = [message.topic for message in read_bag(recorder.directory).messages()]
+    assert len(found) + recorder.dropped_messages == 200
+    assert len(set(found)) == 4
+
+
+def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path: Path, source: SyntheticSource):
+    recorder = Recorder(source, tmp_path / "bag", node_name=NODE, flush_period_s=60, queue_bytes=40)
+    recorder.start()
+    time.sleep(0.2)  # the first flush is immediate
+    taken = [recorder.record("/w", TEXT, HELLO, monotonic_ns=0) for _ in range(5)]
+    recorder.stop()
+    assert taken == [True, True, False, False, False]
+    assert recorder.dropped_messages == 3
+    assert len(list(read_bag(recorder.directory).messages())) == 2
+    assert custom_data(recorder.directory) == {DROPPED_MESSAGES: "3"}
+
+
+def test_a_type_that_is_not_installed_is_told_once_and_the_rest_is_recorded(
+    recorder: Recorder, errors: list[str]
+):
+    recorder.start()
+    for _ in range(3):
+        recorder.record("/w", "far/msg/Away", HELLO, monotonic_ns=0)
+        recorder.record("/robot_1/words", TEXT, HELLO, monotonic_ns=0)
+    recorder.stop()
+    assert len(errors) == 1
+    assert "topic /w is not recorded: message type 'far/msg/Away'" in errors[0]
+    assert recorder.dropped_messages == 3
+    assert len(list(read_bag(recorder.directory).messages())) == 3
+
+
+def test_a_full_disk_ends_the_recording_and_says_so_once(
+    recorder: Recorder, source: SyntheticSource, errors: list[str]
+):
+    recorder.start()
+    source.cycle("control", 1000, states={}, wait_ns=20)
+    wait_until(lambda: len(read_bag(recorder.directory).records.get("control", ())) == 2)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, hard))
+    try:
+        for number in range(300):
+            source.cycle("control", 2000 + 20 * number, states={}, wait_ns=20)
+        wait_until(lambda: not recorder.recording)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not recorder.record("/robot_1/words", TEXT, HELLO, monotonic_ns=0)
+    recorder.stop()
+    assert len(errors) == 1
+    assert "recording stopped: bag file" in errors[0]
+    assert "File too large" in errors[0]
+    assert len(read_bag(recorder.directory).records["control"]) >= 2
+
+
+def test_a_fault_of_the_source_ends_the_recording_only(
+    recorder: Recorder, source: SyntheticSource, errors: list[str], monkeypatch: pytest.MonkeyPatch
+):
+    recorder.start()
+
+    def broken() -> None:
+        raise RuntimeError("no deployer")
+
+    monkeypatch.setattr(source, "drain_trace", broken)
+    wait_until(lambda: errors)
+    assert errors == ["recording stopped: no deployer"]
+    assert not recorder.recording
+    read_bag(recorder.directory)
+
+
+def test_stop_may_come_twice_or_without_a_start(tmp_path: Path, source: SyntheticSource):
+    recorder = Recorder(source, tmp_path / "bag", node_name=NODE)
+    recorder.stop()
+    recorder.stop()
+    assert not recorder.recording
+    with pytest.raises(TraceError, match="exists already"):
+        Recorder(source, tmp_path / "bag", node_name=NODE)
