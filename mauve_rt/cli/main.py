@@ -1,0 +1,50 @@
+"""`mauve VERB ...`, for machines without the ros2 command line.
+
+    mauve list /robot_1/executor
+    mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration
+
+Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such executor.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+import argcomplete
+
+from mauve_rt import __version__
+from mauve_rt.cli.verbs import BAD_USAGE, VERBS
+from mauve_rt.errors import MauveError, one_line
+
+_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb; returns the exit status."""
+    parser = build_parser()
+    argcomplete.autocomplete(parser)
+    args = parser.parse_args(arguments)
+    try:
+        return int(args.run(args))
+    except MauveError as error:
+        print(f"mauve: {one_line(str(error))}", file=sys.stderr)
+        return BAD_USAGE
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command's arguments."""
+    description = "Look at MAUVE executors and reconfigure them while they run."
+    parser = argparse.ArgumentParser(prog="mauve", description=description)
+    parser.add_argument("--version", action="version", version=__version__)
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for verb in VERBS:
+        subparser = verbs.add_parser(verb.name, help=verb.help, description=verb.help)
+        verb.add_arguments(subparser)
+        subparser.set_defaults(run=verb.main)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

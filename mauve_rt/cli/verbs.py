@@ -1,0 +1,197 @@
+"""The verbs of `mauve`, each with `add_arguments(parser)` and `main(args) -> exit status`."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mauve_rt.errors import ArchitectureFileError, one_line
+
+OK, REFUSED, BAD_USAGE = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb of the command."""
+
+    name: str
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    main: Callable[[argparse.Namespace], int]
+
+
+def _add_executor(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("executor", type=_absolute, help="the executor's node, e.g. /robot_1/executor")
+    parser.add_argument("--json", action="store_true", help="print the reply as JSON")
+
+
+def _add_request(parser: argparse.ArgumentParser) -> None:
+    _add_executor(parser)
+    parser.add_argument("component", help="name of the component")
+    parser.add_argument("--cause", default="", help="why, for the record")
+    parser.add_argument("--request-id", default="", help="a repeated id returns the first outcome")
+    parser.add_argument("--expected-epoch", type=int, default=0, metavar="N", help="refuse at any other epoch")
+
+
+def _add_timed_request(parser: argparse.ArgumentParser) -> None:
+    _add_request(parser)
+    parser.add_argument("--timeout", type=float, default=0.0, metavar="S", help="seconds to wait for it (default 1)")
+
+
+def _add_replace_core(parser: argparse.ArgumentParser) -> None:
+    _add_timed_request(parser)
+    parser.add_argument("core", help="the new core, package/Class")
+
+
+def _list(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import ListComponents  # noqa: PLC0415 - ROS takes its time to load
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import print_components, print_json  # noqa: PLC0415
+
+    with connected() as client:
+        reply = client.call(ListComponents, f"{args.executor}/list_components", ListComponents.Request())
+    (print_json if args.json else print_components)(reply)
+    return OK
+
+
+def _stop(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import Stop  # noqa: PLC0415
+
+    return _request(args, Stop, "stop", timeout_s=args.timeout)
+
+
+def _start(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import Start  # noqa: PLC0415
+
+    return _request(args, Start, "start")
+
+
+def _replace_core(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import ReplaceCore  # noqa: PLC0415
+
+    return _request(args, ReplaceCore, "replace_core", core=args.core, commit_timeout_s=args.timeout)
+
+
+def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import print_json, report_lines  # noqa: PLC0415
+
+    request = service_type.Request(
+        request_id=args.request_id,
+        expected_epoch=max(args.expected_epoch, 0),
+        requested_by="mauve",
+        cause=args.cause,
+        component=args.component,
+        **fields,
+    )
+    with connected() as client:
+        reply = client.call(service_type, f"{args.executor}/{name}", request)
+    if args.json:
+        print_json(reply)
+    elif reply.success:
+        print("\n  ".join([reply.message, *report_lines(reply.report)]))
+    else:
+        code = next(
+            (word for word in dir(service_type.Response) if word.isupper() and getattr(service_type.Response, word) == reply.code),
+            str(reply.code),
+        )
+        print(f"refused, {code} ({reply.code}): {reply.message}", file=sys.stderr)
+    return OK if reply.success else REFUSED
+
+
+def _nodes(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import print_json  # noqa: PLC0415
+
+    with connected() as client:
+        found = client.find_executors()
+    if args.json:
+        print_json(found)
+    else:
+        print("\n".join(found) if found else "no executor on this machine", file=sys.stdout if found else sys.stderr)
+    return OK if found else BAD_USAGE
+
+
+def _events(args: argparse.Namespace) -> int:
+    from mauve_msgs.msg import ReconfigurationEvent  # noqa: PLC0415
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import event_line, print_json, report_lines  # noqa: PLC0415
+
+    def heard(event: Any) -> None:
+        if args.json:
+            print_json(event)
+        else:
+            print("\n  ".join([event_line(event), *report_lines(event.report)]))
+        sys.stdout.flush()
+
+    try:
+        with connected() as client:
+            client.listen(ReconfigurationEvent, f"{args.executor}/events", heard)
+    except KeyboardInterrupt:
+        pass
+    return OK
+
+
+def _check(args: argparse.Namespace) -> int:
+    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
+    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
+
+    try:
+        model = load_architecture(args.file)
+        architecture = build(model, PluginRegistry())
+        configure(model, architecture)
+        architecture.cleanup()
+    except ArchitectureFileError as error:
+        print("\n".join(error.lines()), file=sys.stderr)
+        return BAD_USAGE
+    counts = (len(model.components), len(model.resources), len(model.connections))
+    print(f"{args.file}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found")
+    return OK
+
+
+def _plugins(args: argparse.Namespace) -> int:
+    from rich import box  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
+    from mauve_rt.model import PluginIndex  # noqa: PLC0415
+
+    index = PluginIndex.installed()
+    rows = sorted((plugin.kind, plugin.name, plugin.shell, plugin.target, str(plugin.prefix)) for plugin in index)
+    fields = ("kind", "name", "shell", "target", "prefix")
+    if args.json:
+        print_json([dict(zip(fields, row, strict=True)) for row in rows])
+    else:
+        table = Table(*fields[:4], box=box.SIMPLE_HEAD, pad_edge=False)
+        for row in rows:
+            table.add_row(*row[:4])
+        console().print(table)
+    for complaint in index.complaints:
+        print(one_line(complaint), file=sys.stderr)
+    return OK
+
+
+def _add_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, help="architecture file")
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _absolute(name: str) -> str:
+    return "/" + name.strip("/")
+
+
+VERBS = (
+    Verb("list", "show an executor's components", _add_executor, _list),
+    Verb("stop", "stop a component", _add_timed_request, _stop),
+    Verb("start", "start a stopped component", _add_request, _start),
+    Verb("replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core),
+    Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
+    Verb("nodes", "show the executors", _add_json, _nodes),
+    Verb("check", "check an architecture file without starting anything", _add_file, _check),
+    Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
+)

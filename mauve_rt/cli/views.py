@@ -1,0 +1,108 @@
+"""What the verbs print: tables for people, JSON for programs."""
+
+import array
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+STATES = ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")  # as mauve_msgs/msg/ComponentInfo
+_STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
+_WIDE = 160
+
+
+def as_plain(message: Any) -> Any:
+    """A ROS message as values that JSON has."""
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: as_plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, bytes):
+        return list(message)
+    if isinstance(message, array.array) or hasattr(message, "tolist"):
+        return message.tolist()
+    if isinstance(message, Sequence) and not isinstance(message, str):
+        return [as_plain(item) for item in message]
+    return message
+
+
+def print_json(value: Any) -> None:
+    """Indented JSON on stdout."""
+    print(json.dumps(as_plain(value), indent=2, ensure_ascii=False))
+
+
+def component_table(reply: Any) -> Table:
+    """The components of a ListComponents reply."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ("component", "state", "period", "priority", "cpus", "releases", "overruns"):
+        table.add_column(column, no_wrap=True)
+    table.add_column("core, others it takes", overflow="fold")
+    for component in reply.components:
+        state = STATES[component.state]
+        others = component.alternatives if component.reconfigurable else ["(protected)"]
+        table.add_row(
+            component.name,
+            f"[{_STYLES.get(state, 'default')}]{state}[/]",
+            duration(component.period_ns),
+            str(component.priority) if component.policy == "SCHED_FIFO" else "-",
+            ",".join(str(cpu) for cpu in component.cpus) or "any",
+            str(component.releases),
+            str(component.overruns),
+            "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)]),
+        )
+    return table
+
+
+def console() -> Console:
+    """Standard output; wide enough for every table where it is no terminal."""
+    return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
+
+
+def print_components(reply: Any) -> None:
+    """Table, faults, and what is missing for real time."""
+    out = console()
+    out.print(component_table(reply))
+    for component in reply.components:
+        if component.fault:
+            out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
+    for line in reply.realtime.missing:
+        out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
+    out.print(f"epoch {reply.epoch}", style="dim")
+
+
+def report_lines(report: Sequence[Any]) -> list[str]:
+    """What each step cost, in words."""
+    lines = []
+    for step in report:
+        facts = []
+        if step.blackout_ns != type(step).NOT_MEASURED:
+            facts = [f"prepared in {duration(step.prepare_ns)}", f"blackout {duration(step.blackout_ns)}"]
+            facts.append(f"missed releases {step.missed_releases}")
+        if step.phase_actual_ns != type(step).NOT_MEASURED:
+            facts.append(f"next release {duration(step.phase_actual_ns)} off the grid")
+        if facts:
+            lines.append(f"{step.step}: {', '.join(facts)}")
+    return lines
+
+
+def event_line(event: Any) -> str:
+    """One line about a ReconfigurationEvent."""
+    outcome = f"done, epoch {event.epoch}" if event.success else f"refused ({event.code}): {event.message}"
+    who = f" by {event.requested_by}" if event.requested_by else ""
+    why = f" because {event.cause}" if event.cause else ""
+    stamp = f"{event.stamp.sec}.{event.stamp.nanosec // 1_000_000:03d}"
+    return f"{stamp} {event.request}{who}{why}: {outcome}"
+
+
+def duration(nanoseconds: int) -> str:
+    """`5 us`, `2.5 ms`, `1 s`; `-` for none."""
+    size = abs(nanoseconds)
+    if size == 0:
+        return "-"
+    for unit, factor in (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)):
+        if size >= factor:
+            return f"{nanoseconds / factor:.4g} {unit}"
+    return f"{nanoseconds} ns"

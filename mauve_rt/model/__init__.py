@@ -1,0 +1,20 @@
+"""The architecture file: schema, loading, checks, and building the kernel's architecture from it."""
+
+from mauve_rt.model.architecture_file import ArchitectureModel, Connection, Overrides, load_architecture
+from mauve_rt.model.build import allowed_cores, build, configure
+from mauve_rt.model.message_types import message_class
+from mauve_rt.model.plugins import Plugin, PluginIndex, PluginLoader
+
+__all__ = [
+    "ArchitectureModel",
+    "Connection",
+    "Overrides",
+    "Plugin",
+    "PluginIndex",
+    "PluginLoader",
+    "allowed_cores",
+    "build",
+    "configure",
+    "load_architecture",
+    "message_class",
+]

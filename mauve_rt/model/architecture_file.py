@@ -1,0 +1,189 @@
+"""Loading an architecture file and the checks that need nothing but the file and this machine."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.schema import GIVEN_RESOURCES, ComponentModel, FileModel, PropertyValue, ResourceModel
+from mauve_rt.model.schema_errors import owner, schema_problems
+from mauve_rt.model.substitution import substituted_property
+from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.yaml_file import Location, YamlFile
+
+
+@dataclass(frozen=True, kw_only=True)
+class Connection:
+    """One line of `connections`."""
+
+    component: str
+    port: str
+    resource: str
+    service: str
+    location: Location
+
+
+class ArchitectureModel:
+    """A loaded architecture file: what it says, checked as far as the file alone tells, and where it says it."""
+
+    def __init__(self, file: YamlFile, content: FileModel, overrides: "Overrides") -> None:
+        self.file = file
+        self.path: Path = file.path
+        self.namespace = overrides.namespace or content.executor.namespace
+        self.peers = list(content.executor.peers if overrides.peers is None else overrides.peers)
+        self.require_realtime = content.executor.require_realtime
+        self.components: dict[str, ComponentModel] = dict(content.components)
+        self.resources: dict[str, ResourceModel] = dict(content.resources)
+        self.connections = [
+            Connection(
+                component=port.split(".")[0],
+                port=port.split(".")[1],
+                resource=service.split(".")[0],
+                service=service.split(".")[1],
+                location=("connections", index),
+            )
+            for index, (port, service) in enumerate(content.connections)
+        ]
+        self._overridden = dict(overrides.properties)
+
+    def problem(self, location: Location, what: str, *, key: bool = False, **facts: str) -> Problem:
+        """A problem at an element of the file; names the component and element of its own accord."""
+        component, element = owner(location)
+        return self.file.problem(location, what, key=key, **{"component": component, "element": element, **facts})
+
+    def properties(self, component: str) -> dict[str, PropertyValue]:
+        """The properties of a component as it gets them: overridden, places replaced, paths made absolute.
+
+        Raises:
+            ArchitectureFileError: `$(share PACKAGE)` names a package that is not installed, or an unknown `$(...)`.
+        """
+        values = {}
+        for name, value in self.components[component].properties.items():
+            values[name] = self._substituted(component, name, value, self.path.resolve().parent)
+        for (owning, name), value in self._overridden.items():
+            if owning == component:
+                values[name] = self._substituted(component, name, value, Path.cwd())
+        return values
+
+    def property_place(self, component: str, name: str) -> Location:
+        """Where a property of a component is set."""
+        return ("components", component, "properties", name)
+
+    def property_words(self, component: str, name: str) -> str:
+        """How to call a property in a message."""
+        parameter = f" (parameter {component}.{name})" if (component, name) in self._overridden else ""
+        return f"property '{name}' of component '{component}'{parameter}"
+
+    def _substituted(self, component: str, name: str, value: PropertyValue, folder: Path) -> PropertyValue:
+        try:
+            return substituted_property(name, value, folder=folder, model=self)
+        except LookupError as error:
+            what = f"bad {self.property_words(component, name)}"
+            problem = self.problem(self.property_place(component, name), what, found=str(error.args[0]))
+            raise ArchitectureFileError(self.path, [problem]) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overrides:
+    """What the command line says instead of the file, so that one file serves several robots.
+
+    A relative path in an overriding property is relative to the current folder.
+    """
+
+    namespace: str = ""  # empty: as in the file
+    peers: Sequence[str] | None = None  # None: as in the file
+    properties: Mapping[tuple[str, str], PropertyValue] = field(default_factory=dict)  # by (component, property)
+
+
+def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -> ArchitectureModel:
+    """Read a file and check all of it that can be checked without plug-ins.
+
+    Properties are checked by `build`, which knows the shells.
+
+    Raises:
+        ArchitectureFileError: with every problem found; `str()` tells of the first.
+    """
+    file = YamlFile(path)
+    try:
+        content = FileModel.model_validate(file.data)
+    except ValidationError as error:
+        raise ArchitectureFileError(file.path, schema_problems(file, error)) from None
+    model = ArchitectureModel(file, content, overrides or Overrides())
+    problems = [*_override_problems(model, overrides or Overrides()), *_component_problems(model), *_resource_problems(model), *_connection_problems(model)]
+    if problems:
+        raise ArchitectureFileError(file.path, problems)
+    return model
+
+
+def online_cpus() -> frozenset[int]:
+    """Numbers of the CPUs this machine has switched on."""
+    try:
+        text = Path("/sys/devices/system/cpu/online").read_text(encoding="ascii").strip()
+        ranges = [part.partition("-") for part in text.split(",")]
+        return frozenset(cpu for low, _, high in ranges for cpu in range(int(low), int(high or low) + 1))
+    except (OSError, ValueError):
+        return frozenset(range(os.cpu_count() or 1))
+
+
+def _override_problems(model: ArchitectureModel, overrides: Overrides) -> Iterator[Problem]:
+    for component, name in overrides.properties:
+        if component not in model.components:
+            what = f"parameter '{component}.{name}' sets a property of an unknown component"
+            remedy = did_you_mean(component, model.components)
+            yield model.problem(("components",), what, key=True, remedy=remedy, code="unknown_component")
+
+
+def _component_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    online = online_cpus()
+    for name, component in model.components.items():
+        if name in model.resources:
+            what = f"'{name}' is the name of a component and of a resource"
+            yield model.problem(("resources", name), what, key=True, remedy="rename one", code="duplicate_name")
+        for index, cpu in enumerate(component.cpus or ()):
+            if cpu not in online:
+                yield model.problem(
+                    ("components", name, "cpus", index),
+                    f"component '{name}' asks for a CPU that this machine does not have",
+                    expected=f"one of {', '.join(str(cpu) for cpu in sorted(online))}",
+                    found=str(cpu),
+                    remedy="leave cpus out to allow every CPU",
+                    code="out_of_range",
+                )
+
+
+def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    for name, resource in model.resources.items():
+        location = ("resources", name)
+        if resource.kind == "ring_buffer" and resource.capacity is None:
+            what = f"resource '{name}' has no capacity"
+            yield model.problem(location, what, expected="capacity: how many elements the ring_buffer holds")
+        if resource.kind in GIVEN_RESOURCES and not resource.type:
+            yield model.problem(location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point")
+        for key in ("capacity", "overwrite"):
+            if resource.kind != "ring_buffer" and key in resource.model_fields_set:
+                what = f"resource '{name}' of kind {resource.kind} has no {key}"
+                yield model.problem((*location, key), what, key=True, remedy="only a ring_buffer has one")
+
+
+def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    first: dict[tuple[str, str], int] = {}
+    for connection in model.connections:
+        at_port, at_service = (*connection.location, 0), (*connection.location, 1)
+        if connection.component not in model.components:
+            what = f"connection from unknown component '{connection.component}'"
+            remedy = did_you_mean(connection.component, model.components)
+            yield model.problem(at_port, what, remedy=remedy, code="unknown_component")
+        if connection.resource not in model.resources:
+            what = f"connection to unknown resource '{connection.resource}'"
+            remedy = did_you_mean(connection.resource, model.resources)
+            yield model.problem(at_service, what, remedy=remedy, code="unknown_resource")
+        port = (connection.component, connection.port)
+        line = model.file.position(connection.location)[0]
+        if port in first:
+            what = f"port '{connection.component}.{connection.port}' is connected twice"
+            remedy = f"a port connects to one service; see line {first[port]}"
+            yield model.problem(at_port, what, remedy=remedy, code="duplicate_name")
+        first.setdefault(port, line)

@@ -1,0 +1,161 @@
+"""What an architecture file says, held against the plug-ins it names."""
+
+from collections.abc import Iterator, Mapping
+
+from mauve_rt._kernel import PortDescription, PropertyDescription, ResourceDescription, ShellDescription
+from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Problem
+from mauve_rt.model.architecture_file import ArchitectureModel, Connection
+from mauve_rt.model.message_types import message_class
+from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.schema import GIVEN_RESOURCES, PropertyValue
+from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.model.yaml_file import Location
+
+
+class Checks:
+    """One pass over a model; loads the plug-ins that it names."""
+
+    def __init__(self, model: ArchitectureModel, loader: PluginLoader) -> None:
+        self._model = model
+        self._loader = loader
+        self._shells: dict[str, ShellDescription] = {}  # by component
+        self._resources: dict[str, ResourceDescription] = {}
+
+    def problems(self) -> list[Problem]:
+        """Everything wrong; empty: the architecture can be built."""
+        found: list[Problem] = []
+        for component in self._model.components:
+            found += self._component(component)
+            found += self._properties(component)
+        for resource in self._model.resources:
+            found += self._resource(resource)
+        for connection in self._model.connections:
+            found += self._connection(connection)
+        return found
+
+    def _component(self, name: str) -> Iterator[Problem]:
+        component = self._model.components[name]
+        place: Location = ("components", name)
+        registry = self._loader.registry
+        missing = [*self._plugin("shell", component.shell, (*place, "shell"))]
+        yield from missing
+        if not missing:
+            self._shells[name] = registry.describe_shell(component.shell)
+        for kind, plugin, written_for in (
+            ("core", component.core, registry.core_shell),
+            ("fsm", component.fsm, registry.fsm_shell),
+        ):
+            missing = [*self._plugin(kind, plugin, (*place, kind))]
+            yield from missing
+            if not missing:
+                yield from self._same_shell(name, plugin, written_for(plugin), (*place, kind))
+        alternatives = component.alternatives if isinstance(component.alternatives, list) else []
+        for index, core in enumerate(alternatives):
+            at = (*place, "alternatives", index)
+            missing = [*self._plugin("core", core, at)]
+            yield from missing
+            if not missing:
+                yield from self._same_shell(name, core, registry.core_shell(core), at)
+
+    def _plugin(self, kind: str, name: str, place: Location) -> Iterator[Problem]:
+        try:
+            self._loader.require(kind, name)
+        except PluginError as error:
+            yield self._model.problem(place, str(error), code=f"unknown_{kind}")
+
+    def _same_shell(self, component: str, plugin: str, shell: str, place: Location) -> Iterator[Problem]:
+        wanted = self._model.components[component].shell
+        if shell != wanted and component in self._shells:
+            what = f"'{plugin}' does not fit component '{component}'"
+            expected, found = f"one written for shell {wanted}", f"one for {shell}"
+            yield self._model.problem(place, what, expected=expected, found=found, code="type_mismatch")
+
+    def _properties(self, name: str) -> Iterator[Problem]:
+        shell = self._shells.get(name)
+        if shell is None:
+            return
+        known = {description.name: description for description in shell.properties}
+        try:
+            values = self._model.properties(name)
+        except ArchitectureFileError as error:
+            yield from error.problems
+            return
+        for key, value in values.items():
+            place = self._model.property_place(name, key)
+            if key not in known:
+                what = f"unknown {self._model.property_words(name, key)}"
+                remedy = did_you_mean(key, known)
+                yield self._model.problem(place, what, key=True, remedy=remedy, code="unknown_property")
+            elif facts := property_mismatch(known[key], value):
+                yield self._model.problem(place, f"bad {self._model.property_words(name, key)}", **facts)
+
+    def _resource(self, name: str) -> Iterator[Problem]:
+        resource = self._model.resources[name]
+        place: Location = ("resources", name)
+        try:
+            if resource.kind not in GIVEN_RESOURCES:
+                missing = [*self._plugin("resource", resource.kind, (*place, "kind"))]
+                yield from missing
+                if missing:
+                    return
+            if resource.type:
+                self._loader.require_type(resource.type)
+            self._resources[name] = self._loader.registry.describe_resource(resource.kind, resource.type)
+        except MauveError as error:
+            what = f"bad type '{resource.type}' of resource '{name}': {error}"
+            remedy = did_you_mean(resource.type, self._loader.names("type")) if error.code == "unknown_type" else ""
+            yield self._model.problem((*place, "type"), what, remedy=remedy, code=error.code)
+            return
+        if resource.topic is not None and message_class(self._resources[name].type) is None:
+            what = f"resource '{name}' is bound to topic '{resource.topic.name}', but its type is no ROS message"
+            expected = "an installed message type such as geometry_msgs/msg/Point"
+            found = shown(self._resources[name].type)
+            yield self._model.problem((*place, "topic"), what, key=True, expected=expected, found=found)
+
+    def _connection(self, connection: Connection) -> Iterator[Problem]:
+        shell = self._shells.get(connection.component)
+        resource = self._resources.get(connection.resource)
+        at_port, at_service = (*connection.location, 0), (*connection.location, 1)
+        ports = {port.name: port for port in shell.ports} if shell else {}
+        services = {service.name: service for service in resource.services} if resource else {}
+        if shell and connection.port not in ports:
+            what = f"component '{connection.component}' has no port '{connection.port}'"
+            yield self._model.problem(at_port, what, remedy=did_you_mean(connection.port, ports), code="unknown_port")
+        if resource and connection.service not in services:
+            what = f"resource '{connection.resource}' has no service '{connection.service}'"
+            remedy = did_you_mean(connection.service, services)
+            yield self._model.problem(at_service, what, remedy=remedy, code="unknown_service")
+        port, service = ports.get(connection.port), services.get(connection.service)
+        if resource and port and service and (port.kind, port.type) != (service.kind, service.type):
+            fitting = [other.name for other in resource.services if (other.kind, other.type) == (port.kind, port.type)]
+            yield self._model.problem(
+                at_service,
+                f"port '{connection.component}.{port.name}' does not fit '{connection.resource}.{service.name}'",
+                expected=f"a service of {_signature(port)}",
+                found=f"one of kind {service.kind} and type {service.type}",
+                remedy=f"connect it to {connection.resource}.{fitting[0]}" if fitting else "",
+                code="type_mismatch",
+            )
+
+
+def property_mismatch(known: PropertyDescription, value: PropertyValue) -> Mapping[str, str]:
+    """Expected and found where a value does not suit a property; empty where it does."""
+    kind = {bool: "bool", int: "int", float: "float", str: "str"}[type(value)]
+    if kind != known.type and (kind, known.type) != ("int", "float"):
+        wanted = {"bool": "true or false", "int": "a whole number", "float": "a number", "str": "text"}[known.type]
+        remedy = "put it in quotes" if known.type == "str" else ""
+        return {"expected": wanted, "found": shown(value), "remedy": remedy, "code": "type_mismatch"}
+    if isinstance(value, str | bool):
+        return {}
+    low = known.minimum is not None and not value >= known.minimum
+    high = known.maximum is not None and not value <= known.maximum
+    if not low and not high:
+        return {}
+    unit = f" {known.unit}" if known.unit not in ("", "1") else ""
+    bounds = [f"at least {known.minimum:g}{unit}"] if known.minimum is not None else []
+    bounds += [f"at most {known.maximum:g}{unit}"] if known.maximum is not None else []
+    return {"expected": " and ".join(bounds), "found": f"{value:g}", "code": "out_of_range"}
+
+
+def _signature(port: PortDescription) -> str:
+    return f"kind {port.kind} and type {port.type}"

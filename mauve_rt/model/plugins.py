@@ -1,0 +1,174 @@
+"""Plug-ins: which shells, cores, fsms, resources and types are installed, and how to load them.
+
+A package lists its classes in the ament index resource `mauve_rt_plugins/<package>`, one line each:
+
+    # kind; name; shell; library or module:Class
+    shell; mauve_examples/GuidanceShell; ; mauve_examples
+    core; mauve_examples/Guidance; mauve_examples/GuidanceShell; mauve_examples
+    core; my_package/PyGuidance; mauve_examples/GuidanceShell; my_package.cores:PyGuidance
+
+Only what an architecture file names is ever loaded: no request from outside makes a process import anything.
+"""
+
+import importlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from mauve_rt._kernel import PluginRegistry
+from mauve_rt.errors import MauveError, PluginError, one_line
+from mauve_rt.model import ament_index
+from mauve_rt.model.words import did_you_mean
+
+INDEX_RESOURCE = "mauve_rt_plugins"
+KINDS = ("shell", "core", "fsm", "resource", "type")
+_FIELDS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plugin:
+    """One line of an index file."""
+
+    kind: str
+    name: str
+    shell: str  # of cores and fsms: the shell they were written for
+    target: str  # name of a library (PREFIX/lib/lib<target>.so), or module:Class
+    prefix: Path
+
+    @property
+    def is_python(self) -> bool:
+        """Whether it is a class of a Python module."""
+        return ":" in self.target
+
+    @property
+    def library(self) -> Path:
+        """The file of a C++ plug-in."""
+        return self.prefix / "lib" / f"lib{self.target}.so"
+
+
+def parse_index(text: str, *, prefix: Path, origin: str) -> tuple[list[Plugin], list[str]]:
+    """The plug-ins of one index file, and one line about each line of it that is none."""
+    plugins, complaints = [], []
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].strip()
+        if not content:
+            continue
+        words = [word.strip() for word in content.split(";")]
+        where = f"{origin}:{number}:1"
+        if len(words) != _FIELDS:
+            complaints.append(f"{where}: expected 'kind; name; shell; library or module:Class', found '{content}'")
+        elif words[0] not in KINDS:
+            complaints.append(f"{where}: unknown kind '{words[0]}'; {did_you_mean(words[0], KINDS)}")
+        elif not words[1] or not words[3] or (words[0] in ("core", "fsm") and not words[2]):
+            complaints.append(f"{where}: a {words[0]} needs a name, a library or module:Class, and a core or fsm a shell")
+        elif ":" in words[3] and words[0] != "core":
+            complaints.append(f"{where}: only cores can be written in Python, found a {words[0]}")
+        else:
+            kind, name, shell, target = words
+            plugins.append(Plugin(kind=kind, name=name, shell=shell, target=target, prefix=prefix))
+    return plugins, complaints
+
+
+class PluginIndex:
+    """Everything that is installed, by kind and name; nothing of it is loaded."""
+
+    def __init__(self, plugins: Iterable[Plugin] = (), complaints: Iterable[str] = ()) -> None:
+        self._plugins: dict[tuple[str, str], Plugin] = {}
+        for plugin in plugins:
+            self._plugins.setdefault((plugin.kind, plugin.name), plugin)
+        self.complaints = list(complaints)
+
+    @classmethod
+    def installed(cls) -> Self:
+        """What the ament index lists now."""
+        plugins: list[Plugin] = []
+        complaints: list[str] = []
+        for _, prefix, file in ament_index.resources(INDEX_RESOURCE):
+            try:
+                text = file.read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                complaints.append(one_line(f"{file}:1:1: cannot be read: {error}"))
+                continue
+            found, wrong = parse_index(text, prefix=prefix, origin=str(file))
+            plugins += found
+            complaints += wrong
+        return cls(plugins, complaints)
+
+    def find(self, kind: str, name: str) -> Plugin | None:
+        """The plug-in of that kind and name."""
+        return self._plugins.get((kind, name))
+
+    def names(self, kind: str) -> list[str]:
+        """Names of one kind, sorted."""
+        return sorted(name for of_kind, name in self._plugins if of_kind == kind)
+
+    def cores_of(self, shell: str) -> list[str]:
+        """Names of the cores written for a shell, sorted."""
+        return sorted(plugin.name for plugin in self if plugin.kind == "core" and plugin.shell == shell)
+
+    def __iter__(self) -> "Iterable[Plugin]":  # type: ignore[override]
+        return iter(self._plugins.values())
+
+
+class PluginLoader:
+    """Loads plug-ins into a registry the first time somebody needs them. Not thread-safe: for setting up."""
+
+    def __init__(self, registry: PluginRegistry, index: PluginIndex) -> None:
+        self.registry = registry
+        self.index = index
+        self._python_cores: set[str] = set()
+
+    def names(self, kind: str) -> list[str]:
+        """What is installed or built in."""
+        return sorted({*self.index.names(kind), *self.registry.names(kind)})
+
+    def require(self, kind: str, name: str) -> None:
+        """Make sure that the registry knows a plug-in, loading its library or module if it does not.
+
+        Raises:
+            PluginError: not installed, cannot be loaded, or the library does not have it.
+        """
+        if name in self.registry.names(kind):
+            return
+        plugin = self.index.find(kind, name)
+        if plugin is None:
+            remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
+            raise PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
+        if plugin.is_python:
+            self._add_python_core(plugin)
+        else:
+            self._load_library(plugin)
+        if name not in self.registry.names(kind):
+            remedy = "correct the package's list of plug-ins"
+            raise PluginError(f"{plugin.library} has no {kind} '{name}'", element=name, remedy=remedy)
+
+    def require_type(self, name: str) -> None:
+        """As `require("type", name)`, but leaves a type that nothing lists to the registry's own words."""
+        if self.index.find("type", name) is not None:
+            self.require("type", name)
+
+    def _load_library(self, plugin: Plugin) -> None:
+        if not plugin.library.is_file():
+            remedy = "build and install the package again"
+            raise PluginError(f"{plugin.kind} '{plugin.name}': no library {plugin.library}", remedy=remedy)
+        try:
+            self.registry.load_library(str(plugin.library))
+        except MauveError as error:
+            raise PluginError(f"{plugin.kind} '{plugin.name}': {error}", element=plugin.name) from None
+
+    def _add_python_core(self, plugin: Plugin) -> None:
+        self.require("shell", plugin.shell)
+        self.registry.add_python_core(plugin.name, plugin.shell, _factory(plugin))
+
+
+def _factory(plugin: Plugin) -> Callable[[object], object]:
+    from mauve_rt.cores import Shell  # noqa: PLC0415 - needs ROS, which the architecture file does not
+
+    module_name, _, class_name = plugin.target.partition(":")
+    try:
+        core_class = getattr(importlib.import_module(module_name), class_name)
+    except Exception as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
+        text = f"core '{plugin.name}': cannot load {plugin.target}: {type(error).__name__}: {error}"
+        raise PluginError(one_line(text), element=plugin.name) from None
+    return lambda view: core_class(Shell(view))

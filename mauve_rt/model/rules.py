@@ -1,0 +1,167 @@
+"""The rules file of a supervisor: schema, loading, checks.
+
+    mauve: 1
+    executor: executor              # relative to the supervisor's namespace
+    rules:
+      - name: link_lost
+        when: {silence: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 1.0}}
+        for_s: 0.0                  # the condition must hold so long before `do`
+        do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
+        undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
+        cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
+
+Names of topics and of the executor are resolved against the supervisor's namespace, as ROS 2 does.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.schema import Identifier, RosName
+from mauve_rt.model.words import shown
+from mauve_rt.model.yaml_file import Location, YamlFile
+
+Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+MessageType = Annotated[str, Field(pattern=r"^[a-z]\w*/msg/[A-Z]\w*$")]
+StepKind = Literal[
+    "replace_core",
+    "replace_fsm",
+    "replace_shell",
+    "set_property",
+    "connect",
+    "disconnect",
+    "add_component",
+    "remove_component",
+    "add_resource",
+    "remove_resource",
+    "start",
+    "stop",
+]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Step(_Model):
+    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
+
+    kind: StepKind
+    target: Identifier
+    name: str = ""
+    value: str = ""  # YAML text
+
+    @field_validator("value", mode="before")
+    @classmethod
+    def _text_of_a_scalar(cls, value: object) -> object:
+        if isinstance(value, bool):
+            return str(value).lower()
+        return str(value) if isinstance(value, int | float) else value
+
+    @model_validator(mode="after")
+    def _names_what_it_needs(self) -> "Step":
+        if not self.name and self.kind not in ("start", "stop", "remove_component", "remove_resource"):
+            raise ValueError(f"a step of kind '{self.kind}' needs a name")
+        return self
+
+
+class Silence(_Model):
+    """Holds while the last sample on `topic` (before a first one: the arming) is older than a limit."""
+
+    topic: RosName
+    type: MessageType
+    longer_than_s: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class When(_Model):
+    """What a rule waits for: exactly one kind of condition."""
+
+    silence: Silence
+
+
+class Undo(_Model):
+    """What a rule does once its condition has been false for `for_s` seconds without a break."""
+
+    for_s: Seconds = 0.0
+    do: Annotated[list[Step], Field(min_length=1)]
+
+
+class Rule(_Model):
+    """One condition and what to do about it. Times in seconds."""
+
+    name: Identifier
+    when: When
+    for_s: Seconds = 0.0
+    do: Annotated[list[Step], Field(min_length=1)]
+    undo: Undo | None = None
+    cooldown_s: Seconds = 0.0
+
+    def targets(self) -> set[str]:
+        """Components that must run before the rule is armed: those of which it replaces or sets something."""
+        kinds = ("replace_core", "replace_fsm", "replace_shell", "set_property")
+        return {step.target for step in self.do if step.kind in kinds}
+
+
+class Rules(_Model):
+    """A whole rules file."""
+
+    mauve: Literal[1]
+    executor: RosName = "executor"
+    rules: Annotated[list[Rule], Field(min_length=1)]
+
+
+class RulesFile:
+    """A checked rules file: `rules`, and `error()` for what only its user can check, e.g. installed types."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Read and check a rules file.
+
+        Raises:
+            ArchitectureFileError: it cannot be read, is no YAML or breaks the schema;
+                `FILE:LINE:COLUMN: what`, one line.
+        """
+        self._file = YamlFile(path)
+        try:
+            self.rules = Rules.model_validate(self._file.data)
+        except ValidationError as error:
+            problems = [self._problem_of(item) for item in error.errors(include_url=False)]
+            raise ArchitectureFileError(self._file.path, problems) from None
+        seen: set[str] = set()
+        for index, rule in enumerate(self.rules.rules):
+            if rule.name in seen:
+                raise self.error(("rules", index, "name"), f"a second rule named '{rule.name}'")
+            seen.add(rule.name)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._file.path
+
+    def error(self, location: Location, what: str, *, remedy: str = "") -> ArchitectureFileError:
+        """An error about one element, e.g. ("rules", 0, "when", "silence", "type")."""
+        return ArchitectureFileError(self.path, [self._file.problem(location, what, remedy=remedy)])
+
+    def _problem_of(self, item: Any) -> Problem:
+        """What pydantic found wrong, in words for who wrote the file."""
+        kind, location = item["type"], tuple(item["loc"])
+        element = dotted(location)
+        if kind == "missing" and location[-1] == "silence":
+            return self._file.problem(location, f"{element[:-8]} has no known condition", expected="silence")
+        if kind == "missing":
+            return self._file.problem(location, f"{element} is missing")
+        if kind == "extra_forbidden":
+            return self._file.problem(location, f"{element} is no known key", key=True)
+        if kind == "expected":
+            text, found = item["ctx"]["text"], shown(item["input"])
+            return self._file.problem(location, f"bad {element}", expected=text, found=found)
+        message = item["msg"].removeprefix("Value error, ")
+        text = message[:1].lower() + message[1:]
+        return self._file.problem(location, f"{element or 'the file'}: {text}", found=shown(item["input"]))
+
+
+def dotted(location: Location) -> str:
+    """`rules[0].when.silence`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return text.removeprefix(".")

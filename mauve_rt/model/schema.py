@@ -1,0 +1,151 @@
+"""The architecture file, schema version 1, and its translation into `ArchitectureModel`.
+
+    mauve: 1
+    executor: {namespace: /robot_1, peers: [robot_2], require_realtime: false}
+    components:
+      exploration: {shell: mauve_examples/ExplorationShell, core: mauve_examples/Exploration,
+                    fsm: mauve_examples/ExplorationFsm, alternatives: [mauve_examples/LocalExploration],
+                    priority: 40, cpus: [1], offset_ms: 0, overrun: skip, properties: {range: 5.0}}
+    resources:
+      target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
+    connections:
+      - [exploration.goal, goal.write]
+
+Nothing here looks at plug-ins, so a file can be read where none is installed.
+"""
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+PropertyValue = bool | int | float | str
+
+GIVEN_RESOURCES = ("shared_data", "ring_buffer")
+MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
+MIN_STACK_BYTES = 16_384
+MAX_CAPACITY = 1_000_000
+
+
+def _plugin_name(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z]\w*/[A-Za-z_]\w*", value, re.ASCII):
+        raise PydanticCustomError("expected", "{text}", {"text": "package/Class"})
+    return value
+
+
+def _identifier(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z]\w*", value, re.ASCII) or "__" in value:
+        text = "a name of letters, digits and single underscores that starts with a letter"
+        raise PydanticCustomError("expected", "{text}", {"text": text})
+    return value
+
+
+def _ros_name(value: str) -> str:
+    if not re.fullmatch(r"(~/|/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", value, re.ASCII) or "__" in value:
+        text = "a ROS name such as scan, /map or ~/status"
+        raise PydanticCustomError("expected", "{text}", {"text": text})
+    return value
+
+
+def _namespace(value: str) -> str:
+    full = "/" + value.strip("/")
+    return full if full == "/" else "/" + _ros_name(full[1:])
+
+
+def _endpoint(value: str) -> str:
+    if not re.fullmatch(r"\w+\.\w+", value, re.ASCII):
+        raise PydanticCustomError("expected", "{text}", {"text": "name.port or name.service"})
+    return value
+
+
+def _scalar(value: Any) -> Any:
+    if isinstance(value, bool | int | float | str):
+        return value
+    raise PydanticCustomError("expected", "{text}", {"text": "true, false, a number or text"})
+
+
+def _resource_kind(value: str) -> str:
+    if value not in GIVEN_RESOURCES and "/" not in value:
+        text = f"{', '.join(GIVEN_RESOURCES)} or the name of a plug-in, package/Class"
+        raise PydanticCustomError("expected", "{text}", {"text": text})
+    return value if value in GIVEN_RESOURCES else _plugin_name(value)
+
+
+def _plugin_names_or_installed(value: Any) -> Any:
+    if value == "installed" or isinstance(value, list):
+        return value
+    raise PydanticCustomError("expected", "{text}", {"text": "a list of cores, or the word installed"})
+
+
+PluginName = Annotated[str, AfterValidator(_plugin_name)]
+Identifier = Annotated[str, AfterValidator(_identifier)]
+RosName = Annotated[str, AfterValidator(_ros_name)]
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
+Cpu = Annotated[int, Field(ge=0, le=65535)]
+Int64 = Annotated[int, Field(ge=0, le=2**63 - 1)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class ExecutorModel(_Section):
+    """The process as a whole."""
+
+    namespace: Annotated[str, AfterValidator(_namespace)] = "/"
+    peers: list[Identifier] = []
+    require_realtime: bool = False
+
+
+class TopicModel(_Section):
+    """The ROS topic that a resource is bound to; the name is relative to the executor's namespace."""
+
+    name: RosName
+    direction: Literal["publish", "subscribe"]
+    qos: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = "reliable"
+
+
+class ResourceModel(_Section):
+    """Data that components share."""
+
+    kind: Annotated[str, AfterValidator(_resource_kind)]
+    type: str = ""
+    capacity: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None  # elements; ring_buffer only
+    overwrite: bool = False  # a full ring_buffer drops its oldest element rather than the new one
+    topic: TopicModel | None = None
+
+
+class ComponentModel(_Section):
+    """A component and the thread it runs on."""
+
+    shell: PluginName
+    core: PluginName
+    fsm: PluginName
+    alternatives: Annotated[
+        list[PluginName] | Literal["installed"], BeforeValidator(_plugin_names_or_installed)
+    ] = []
+    priority: Annotated[int, Field(ge=1, le=MAX_PRIORITY)] = 50
+    cpus: Annotated[list[Cpu], Field(min_length=1)] | None = None  # absent: any
+    offset_ms: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] = 0.0
+    period_ns: Int64 = 0  # 0: as the FSM says
+    overrun: Literal["skip", "catch_up", "fault"] = "skip"
+    max_backlog: Annotated[int, Field(ge=1, le=1_000_000)] = 10
+    stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 131_072
+    reconfigurable: bool = True
+    properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
+
+    @property
+    def offset_ns(self) -> int:
+        """The offset from the epoch in nanoseconds."""
+        return round(self.offset_ms * 1e6)
+
+
+class FileModel(_Section):
+    """A whole architecture file."""
+
+    mauve: Literal[1]
+    executor: ExecutorModel = ExecutorModel()
+    components: Annotated[dict[Identifier, ComponentModel], Field(min_length=1)]
+    resources: dict[Identifier, ResourceModel] = {}
+    connections: list[Annotated[list[Endpoint], Field(min_length=2, max_length=2)]] = []

@@ -1,0 +1,163 @@
+"""What is wrong with the form of an architecture file, in words."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from mauve_rt.errors import Problem
+from mauve_rt.model.schema import ComponentModel, ExecutorModel, FileModel, ResourceModel, TopicModel
+from mauve_rt.model.words import did_you_mean, listed, shown
+from mauve_rt.model.yaml_file import Location, YamlFile
+
+_HINTS: Mapping[str, str] = {
+    "priority": "1 is the lowest, 98 the highest; 99 is kept for the conductor",
+    "mauve": "this program reads version 1 of the schema",
+    "offset_ms": "milliseconds after the epoch",
+    "stack_bytes": "the default of 131072 does for most components",
+    "cpus": "leave the key out to allow every CPU",
+}
+
+
+def schema_problems(file: YamlFile, error: ValidationError) -> list[Problem]:
+    """Every error of the schema as a problem with its place in the file."""
+    if not isinstance(file.data, dict):
+        found = "an empty file" if file.data is None else shown(file.data)
+        keys = listed(FileModel.model_fields, last="and")
+        return [file.problem((), "not an architecture file", expected=f"the keys {keys}", found=found)]
+    by_place: dict[Location, Problem] = {}
+    for details in error.errors(include_url=False):
+        if str(details["loc"][-1]).startswith("literal[") and isinstance(details["input"], list):
+            continue  # the other member of a union, which the list does not mean to be
+        location = _in_file(details["loc"], file.data)
+        by_place.setdefault(location, _problem(file, location, details))
+    return list(by_place.values())
+
+
+def _problem(file: YamlFile, location: Location, details: ErrorDetails) -> Problem:
+    component, element = owner(location)
+    facts = {"component": component, "element": element}
+    kind = details["type"]
+    name = str(location[-1]) if location else "file"
+    within = _words(location[:-1])
+    if kind == "extra_forbidden":
+        remedy = did_you_mean(name, _section(location).model_fields)
+        return file.problem(location, f"unknown key '{name}'{within}", key=True, remedy=remedy, **facts)
+    if kind == "missing":
+        missing = str(details["loc"][-1])
+        return file.problem(location, f"{_subject(location)} has no '{missing}'", remedy="add it", **facts)
+    if location and _is_key(details):
+        what = f"bad name '{name}'{within}"
+        return file.problem(location, what, key=True, expected=_expected(details), **facts)
+    what = f"bad {_subject(location)}" if location and isinstance(location[-1], int) else f"bad {name}{within}"
+    remedy = next((_HINTS[str(part)] for part in reversed(location[-2:]) if str(part) in _HINTS), "")
+    if location[:1] == ("connections",):
+        remedy = "a connection is [component.port, resource.service]"
+    found = shown(details["input"])
+    return file.problem(location, what, expected=_expected(details), found=found, remedy=remedy, **facts)
+
+
+_PLAIN_WORDS: Mapping[str, str] = {
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "string_type": "text",
+    "string_too_short": "text that is not empty",
+    "list_type": "a list",
+    "dict_type": "a mapping",
+    "model_type": "a mapping",
+}
+
+
+def _expected(details: ErrorDetails) -> str:
+    context = details.get("ctx", {})
+    match details["type"]:
+        case "expected":
+            return str(context["text"])
+        case "literal_error":
+            return str(context["expected"]).replace("'", "")
+        case "greater_than_equal":
+            return f"at least {context['ge']:g}"
+        case "less_than_equal":
+            return f"at most {context['le']:g}"
+        case "too_short":
+            return f"at least {context['min_length']} of them"
+        case "too_long":
+            return f"at most {context['max_length']} of them"
+        case kind:
+            return _PLAIN_WORDS.get(kind, str(details["msg"]).removeprefix("Input should be "))
+
+
+def _in_file(location: tuple[int | str, ...], data: Any) -> Location:
+    """The part of pydantic's location that stands in the file; pydantic adds the names of a union's members."""
+    found: list[int | str] = []
+    node = data
+    for part in location:
+        if isinstance(node, dict) and part in node:
+            node = node[part]
+        elif isinstance(node, list) and isinstance(part, int) and part < len(node):
+            node = node[part]
+        else:
+            continue
+        found.append(part)
+    return tuple(found)
+
+
+def _is_key(details: ErrorDetails) -> bool:
+    return details["loc"][-1] == "[key]"
+
+
+def _section(location: Location) -> type[BaseModel]:
+    """The schema of the section that `location` is a key of."""
+    match location[:-1]:
+        case ("executor",):
+            return ExecutorModel
+        case ("components", _):
+            return ComponentModel
+        case ("resources", _):
+            return ResourceModel
+        case ("resources", _, "topic"):
+            return TopicModel
+        case _:
+            return FileModel
+
+
+def owner(location: Location) -> tuple[str, str]:
+    """Name of the component (or resource) that a place belongs to, and of its element there."""
+    if len(location) > 1 and location[0] in ("components", "resources"):
+        return str(location[1]), ".".join(str(part) for part in location[2:])
+    return "", ".".join(str(part) for part in location)
+
+
+def _words(location: Location) -> str:
+    """Where something is, as the end of a phrase; empty for the file itself."""
+    match location:
+        case ():
+            return ""
+        case ("connections", int(index), *_):
+            return f" of connection {index + 1}"
+        case ("components" | "resources" as section, name):
+            return f" of {section[:-1]} '{name}'"
+        case (*before, int(index)):
+            return f" {index + 1}{_words(tuple(before))}"
+        case ("components" | "resources" as section, name, *rest):
+            return f" in {'.'.join(str(part) for part in rest)} of {section[:-1]} '{name}'"
+        case _:
+            return f" in '{'.'.join(str(part) for part in location)}'"
+
+
+def _subject(location: Location) -> str:
+    match location:
+        case ():
+            return "the file"
+        case ("connections", int(index), *_):
+            return f"connection {index + 1}"
+        case ("components" | "resources" as section, name):
+            return f"{section[:-1]} '{name}'"
+        case (*before, key, int(index)):
+            return f"element {index + 1} of {key}{_words(tuple(before))}"
+        case _:
+            return f"'{location[-1]}'{_words(location[:-1])}"

@@ -1,0 +1,37 @@
+"""Small helpers for messages that people read."""
+
+import difflib
+from collections.abc import Iterable
+
+_SHORT = 60
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """The remedy for an unknown word: the nearest known one, else all that are known."""
+    names = sorted(set(known))
+    by_lower = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean {by_lower[close[0]]}?"
+    return f"known: {', '.join(names)}" if names else "there are none"
+
+
+def shown(value: object, limit: int = _SHORT) -> str:
+    """A value as the file has it, shortened: text in quotes, booleans as in YAML."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif value is None:
+        text = "nothing"
+    elif isinstance(value, dict):
+        text = "a mapping"
+    elif isinstance(value, list):
+        text = f"a list of {len(value)}"
+    else:
+        text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def listed(words: Iterable[str], *, last: str = "or") -> str:
+    """`a, b or c`."""
+    items = list(words)
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} {last} {items[-1]}" if items else ""

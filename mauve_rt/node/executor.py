@@ -1,0 +1,102 @@
+"""The executor process: runs the architecture of a file.
+
+    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-r __ns:=/robot_1] [-p bag:=DIR] [-p autostart:=false]
+        [-p require_realtime:=true] [-p trace:=false] [-p peers:=[robot_2]] [-p COMPONENT.PROPERTY:=VALUE]
+        [-p record_topics:="['supervisor/decisions:mauve_msgs/msg/SupervisorDecision:transient_local']"]
+
+Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 for anything else.
+"""
+
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from mauve_rt.node.process import BAD_INPUT, FAILED, complain, leave_now, run_until_signalled
+
+SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
+_SPIN_S = 0.2  # how long a stop may go unnoticed
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run until signalled, then end the process.
+
+    It ends without the interpreter's own tidying up: all that has to be ended in order is ended by then, destroying
+    objects while a component's state still executes is not safe, and libraries' exit handlers were seen to hang.
+    """
+    words = list(sys.argv if arguments is None else arguments)
+    # Without DDS Security anyone who hears us may reconfigure us: this machine only, unless the user says otherwise.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    leave_now(run_until_signalled(lambda stop: _work(words, stop)))
+
+
+def _work(words: list[str], stop: threading.Event) -> int:
+    # Imported here so that a signal while modules load is handled already.
+    from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
+    from mauve_rt.node.executor_settings import Settings  # noqa: PLC0415
+
+    try:
+        settings = Settings.of(words)
+        runtime = settings.runtime()
+        if settings.autostart:
+            runtime.configure()  # before ROS: a bad file starts nothing
+    except MauveError as error:
+        complain(f"executor: {error}")
+        return FAILED if error_code(error) == "realtime_denied" else BAD_INPUT
+    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop)
+
+
+def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event) -> int:
+    import rclpy  # noqa: PLC0415
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+    from rclpy.utilities import try_shutdown  # noqa: PLC0415
+
+    from mauve_rt.node.executor_node import ExecutorNode  # noqa: PLC0415
+
+    try:
+        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+        node = ExecutorNode(runtime, namespace=settings.node_namespace())
+    except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
+        complain(f"executor: {error}")
+        try_shutdown()
+        return BAD_INPUT
+    status = BAD_INPUT
+    try:
+        if not settings.autostart or _autostart(node, stop):
+            _spin(node, stop)
+            status = 0
+    finally:
+        node.close()
+        try_shutdown()
+    return status
+
+
+def _autostart(node: Any, stop: threading.Event) -> bool:
+    from rclpy.lifecycle import TransitionCallbackReturn  # noqa: PLC0415
+
+    for transition in (node.trigger_configure, node.trigger_activate):
+        if not stop.is_set() and transition() != TransitionCallbackReturn.SUCCESS:
+            return False
+    return True
+
+
+def _spin(node: Any, stop: threading.Event) -> None:
+    from rclpy.executors import MultiThreadedExecutor  # noqa: PLC0415
+
+    executor = MultiThreadedExecutor(num_threads=node.THREADS)
+    executor.add_node(node)
+    while not stop.is_set():
+        try:
+            executor.spin_once(timeout_sec=_SPIN_S)
+        except Exception as error:  # noqa: BLE001 - a malformed request must not end the process
+            node.get_logger().error(f"a message or request was dropped: {type(error).__name__}: {error}")
+    node.quiesce()  # ends what a request may be waiting for
+    # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
+    executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
+    executor.shutdown(timeout_sec=0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""The executor's values as messages of mauve_msgs."""
+
+from typing import Any
+
+from mauve_msgs.msg import (
+    ArchitectureState,
+    ComponentInfo,
+    ComponentStatus,
+    PortInfo,
+    RealtimeStatus,
+    ReconfigurationEvent,
+    StepReport,
+)
+from mauve_rt._kernel import ComponentDescription, PortDescription
+from mauve_rt.model.words import shown
+from mauve_rt.node.executor_requests import Outcome, Report, Request
+from mauve_rt.node.executor_runtime import Runtime
+
+_PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
+_MAX_PRIORITY = 255
+
+
+def component_info(component: ComponentDescription, *, alternatives: list[str]) -> Any:
+    """ComponentInfo; `alternatives` are the cores it takes beside the present one."""
+    return ComponentInfo(
+        name=component.name,
+        shell=component.shell,
+        core=component.core,
+        fsm=component.fsm,
+        state=getattr(ComponentInfo, component.state),
+        clock_ns=component.clock_ns,
+        period_ns=component.period_ns,
+        offset_ns=component.offset_ns,
+        policy=component.policy,
+        priority=min(max(component.priority, 0), _MAX_PRIORITY),
+        cpus=list(component.cpus),
+        alternatives=alternatives,
+        reconfigurable=component.reconfigurable,
+        ports=[_port_info(port) for port in component.ports],
+        properties=[f"{item.name}={_yaml(item.value)}" for item in component.properties],
+        fault=component.fault,
+        releases=component.releases,
+        overruns=component.overruns,
+        skipped=component.skipped,
+    )
+
+
+def component_infos(runtime: Runtime) -> list[Any]:
+    """ComponentInfo of every component."""
+    infos = []
+    for component in runtime.components():
+        takes = [runtime.model.components[component.name].core, *runtime.alternatives(component.name)]
+        others = [core for core in dict.fromkeys(takes) if core != component.core]
+        infos.append(component_info(component, alternatives=others))
+    return infos
+
+
+def realtime_status(runtime: Runtime) -> Any:
+    """RealtimeStatus; nothing granted while unconfigured."""
+    status = runtime.realtime_status()
+    if status is None:
+        return RealtimeStatus()
+    return RealtimeStatus(granted=status.granted, missing=list(status.missing))
+
+
+def architecture_state(runtime: Runtime, stamp: Any) -> Any:
+    """ArchitectureState as it is now."""
+    epoch = runtime.epoch  # before the components: a change in between is published again, under its own epoch
+    return ArchitectureState(
+        stamp=stamp,
+        instance_id=runtime.instance_id,
+        epoch=epoch,
+        deployment_epoch_ns=runtime.deployment_epoch_ns(),
+        components=[
+            ComponentStatus(
+                name=component.name,
+                state=getattr(ComponentInfo, component.state),
+                core=component.core,
+                fault=component.fault,
+            )
+            for component in runtime.components()
+        ],
+        realtime=realtime_status(runtime),
+    )
+
+
+def step_reports(outcome: Outcome) -> list[Any]:
+    """StepReport of every step."""
+    return [_step_report(report) for report in outcome.report]
+
+
+def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:
+    """ReconfigurationEvent of a request and what came of it."""
+    return ReconfigurationEvent(
+        stamp=stamp,
+        instance_id=instance_id,
+        epoch=outcome.epoch,
+        requested_by=request.requested_by,
+        request_id=request.request_id,
+        request=str(request),
+        cause=request.cause,
+        success=outcome.success,
+        code=int(outcome.code),
+        message=outcome.message,
+        from_core=outcome.from_core,
+        to_core=outcome.to_core,
+        report=step_reports(outcome),
+    )
+
+
+def _step_report(report: Report) -> Any:
+    return StepReport(
+        step=report.step,
+        component=report.component,
+        prepare_ns=report.prepare_ns,
+        blackout_ns=report.blackout_ns,
+        missed_releases=report.missed_releases,
+        phase_nominal_ns=report.phase_nominal_ns,
+        phase_actual_ns=report.phase_actual_ns,
+    )
+
+
+def _port_info(port: PortDescription) -> Any:
+    return PortInfo(
+        name=port.name,
+        kind=_PORT_KINDS[port.kind],
+        type=port.type,
+        resource=port.resource,
+        service=port.service,
+    )
+
+
+def _yaml(value: bool | float | str) -> str:
+    return f"'{value}'" if isinstance(value, str) else shown(value)

@@ -1,0 +1,176 @@
+"""The executor as a managed ROS 2 node: configure loads, checks and builds, activate deploys, deactivate stops."""
+
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType, SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+
+from mauve_rt.errors import MauveError, ParameterError, one_line
+from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_recording import Recording
+from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_services import Services
+from mauve_rt.node.executor_state import Diagnostics, StatePublisher
+from mauve_rt.node.executor_topics import TopicBridge
+from mauve_rt.trace import TraceError
+
+NODE_NAME = "executor"
+_PARAMETERS: dict[str, tuple[Any, str]] = {
+    "architecture": ("", "architecture file"),
+    "bag": ("", "folder of the bag to record, which must not exist yet; empty: record nothing"),
+    "autostart": (True, "configure and activate at the start"),
+    "require_realtime": (False, "refuse to start without real-time rights"),
+    "trace": (True, "component threads write traces"),
+    "report_phase_timeout_s": (1.0, "how long a reply may wait to measure the next release after a commit"),
+}
+
+
+class ExecutorNode(LifecycleNode):  # type: ignore[misc]
+    """Services, topics and states of one `Runtime`.
+
+    Requests, lifecycle transitions, listing and received messages have a callback group each, so that a stop that waits
+    for a component delays none of the others (given a thread for each: `THREADS`).
+    """
+
+    THREADS = 4
+
+    def __init__(self, runtime: Runtime, *, namespace: str) -> None:
+        """Create the node; the runtime may be configured already.
+
+        Raises:
+            ParameterError: a parameter of the wrong type, or `use_sim_time`.
+        """
+        super().__init__(NODE_NAME, namespace=namespace)  # transitions are in the node's default group
+        control_group, query_group = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        self._data_group = MutuallyExclusiveCallbackGroup()
+        self.reason = ""  # of the last transition that failed
+        self._runtime = runtime
+        self._settings = self._declared()
+        self._recording = Recording()
+        self._topics = TopicBridge(self, self._recording)
+        self._state = StatePublisher(self, runtime, self._recording)
+        self._diagnostics = Diagnostics(self, runtime)
+        control = Control(runtime, phase_timeout_s=self._settings["report_phase_timeout_s"])
+        Services(
+            self, runtime, control=control, state=self._state, control_group=control_group, query_group=query_group
+        )
+        self.create_timer(1.0, self._diagnostics.publish, callback_group=query_group)
+        self.add_on_set_parameters_callback(_refuse_sim_time)
+
+    # ---- transitions ------------------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Load and check the file, build the architecture, open topics and bag."""
+        try:
+            self._runtime.configure()
+            self._topics.open(self._runtime.model, self._data_group)
+            bag = str(self.get_parameter("bag").value)
+            if bag:
+                self._recording.start(self, self._runtime.deployer, Path(bag))
+                self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
+        except (MauveError, TraceError) as error:
+            self._release()
+            return self._failed(error)
+        self._state.refresh(again=True)
+        self._log_realtime()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Deploy: all components start on one grid."""
+        try:
+            self._runtime.activate()
+        except MauveError as error:
+            return self._failed(error)
+        deployer = self._runtime.deployer
+        self._topics.start(deployer)
+        self._state.start(deployer)
+        self._state.refresh()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Write safe outputs, park the components, end the threads."""
+        self.quiesce()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Seal the bag, release the architecture; refused while a component's state still executes."""
+        try:
+            self._release()
+        except MauveError as error:
+            return self._failed(error)
+        self._state.refresh()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """As deactivate and cleanup."""
+        self.quiesce()
+        return self.on_cleanup(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Release everything: back to unconfigured."""
+        return self.on_shutdown(state)
+
+    def quiesce(self) -> None:
+        """Outputs safe, components parked, their last words published, threads joined. May be called again."""
+        if self._runtime.active:
+            self._runtime.deactivate()
+            self._state.refresh()
+        self._state.stop()
+        self._topics.stop()
+
+    def close(self) -> None:
+        """End everything this node holds, in order: components, threads, bag, node.
+
+        A component whose state still executes keeps its memory until the process ends.
+        """
+        self.quiesce()
+        try:
+            self._release()
+        except MauveError as error:
+            self.get_logger().error(str(error))
+        self.destroy_node()
+
+    def _release(self) -> None:
+        self._recording.stop(self)
+        self._topics.close()
+        self._runtime.cleanup()
+
+    def _failed(self, error: Exception) -> TransitionCallbackReturn:
+        self.reason = one_line(str(error))
+        self.get_logger().error(self.reason)
+        return TransitionCallbackReturn.FAILURE
+
+    def _log_realtime(self) -> None:
+        status = self._runtime.realtime_status()
+        for missing in status.missing if status is not None else ():
+            self.get_logger().warning(f"no real time: {missing}")
+
+    # ---- parameters -------------------------------------------------------------------------------------------------
+
+    def _declared(self) -> dict[str, Any]:
+        try:
+            settings = {
+                name: self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
+                for name, (default, description) in _PARAMETERS.items()
+            }
+            strings = ParameterDescriptor(
+                description="further topics to record, each as name:package/msg/Type or name:package/msg/Type:qos",
+                type=ParameterType.PARAMETER_STRING_ARRAY,
+            )
+            topics = self.declare_parameter("record_topics", Parameter.Type.STRING_ARRAY, strings).value
+        except Exception as error:  # rclpy has an exception class of its own for each mistake
+            raise ParameterError(one_line(f"bad parameter: {error}")) from error
+        settings["record_topics"] = list(topics or ())
+        if self.get_parameter("use_sim_time").value:
+            raise ParameterError("use_sim_time: expected false: components run by the monotonic clock; leave it out")
+        return settings
+
+
+def _refuse_sim_time(parameters: list[Any]) -> Any:
+    for parameter in parameters:
+        if parameter.name == "use_sim_time" and parameter.value:
+            return SetParametersResult(successful=False, reason="components run by the monotonic clock")
+    return SetParametersResult(successful=True)

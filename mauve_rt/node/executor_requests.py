@@ -1,0 +1,120 @@
+"""Requests to an executor and their outcomes, as plain values, and the memory of those already answered."""
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from mauve_rt._kernel import NOT_MEASURED
+
+__all__ = ["NOT_MEASURED", "Code", "Outcome", "Report", "Request", "RequestLog", "Step"]
+
+KEPT_REQUESTS = 1024
+
+
+class Code(IntEnum):
+    """The codes of mauve_msgs/srv/Reconfigure."""
+
+    OK = 0
+    UNKNOWN_COMPONENT = 1
+    UNKNOWN_CORE = 2
+    UNDECLARED_CORE = 3
+    NOT_RUNNING = 4
+    ALREADY_RUNNING = 5
+    FAULTED = 6
+    NOT_RECONFIGURABLE = 7
+    WRONG_EPOCH = 8
+    REQUEST_ID_REUSED = 9
+    PREPARE_FAILED = 10
+    ADOPT_REFUSED = 11
+    TIMEOUT = 12
+    NOT_ACTIVE = 13
+    INVALID = 14
+    UNSUPPORTED = 15
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
+
+    kind: str
+    target: str
+    name: str = ""
+    value: str = ""
+
+    def __str__(self) -> str:
+        return " ".join(word for word in (self.kind, self.target, self.name, self.value) if word)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What somebody asked for, whichever service it came by."""
+
+    steps: tuple[Step, ...]
+    request_id: str = ""
+    expected_epoch: int = 0
+    requested_by: str = ""
+    cause: str = ""
+    dry_run: bool = False
+    timeout_s: float = 0.0  # 0: the default
+    clock_ns: int = 0  # of a start: reference instant of the grid, 0: the deployment's
+
+    def __str__(self) -> str:
+        words = "; ".join(str(step) for step in self.steps)
+        return f"{words} (dry run)" if self.dry_run else words
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What one step cost, as mauve_msgs/msg/StepReport. Times in ns."""
+
+    step: str
+    component: str
+    prepare_ns: int = 0
+    blackout_ns: int = NOT_MEASURED
+    missed_releases: int = 0
+    phase_nominal_ns: int = NOT_MEASURED
+    phase_actual_ns: int = NOT_MEASURED
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of a request."""
+
+    code: Code
+    message: str
+    epoch: int = 0  # after the request
+    report: tuple[Report, ...] = ()
+    from_core: str = ""
+    to_core: str = ""
+    replayed: bool = field(default=False, compare=False)  # the first outcome of a repeated request_id
+
+    @property
+    def success(self) -> bool:
+        """Whether it was done."""
+        return self.code is Code.OK
+
+
+class RequestLog:
+    """The last outcomes by request_id. Not thread-safe: the caller serialises requests."""
+
+    def __init__(self, kept: int = KEPT_REQUESTS) -> None:
+        self._kept = kept
+        self._entries: OrderedDict[str, tuple[Request, Outcome]] = OrderedDict()
+
+    def find(self, request: Request) -> Outcome | None:
+        """The first outcome of a repeated request; a refusal where its id belongs to another one; None: not seen."""
+        known = self._entries.get(request.request_id) if request.request_id else None
+        if known is None:
+            return None
+        first, outcome = known
+        if first == request:
+            return outcome
+        message = f"request_id '{request.request_id}' was used before, for: {first}; take a new id for a new request"
+        return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
+
+    def add(self, request: Request, outcome: Outcome) -> None:
+        """Remember an outcome; the oldest one is forgotten when there are too many."""
+        if request.request_id:
+            self._entries[request.request_id] = (request, outcome)
+            while len(self._entries) > self._kept:
+                self._entries.popitem(last=False)

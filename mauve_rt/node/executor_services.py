@@ -1,0 +1,91 @@
+"""~/list_components, ~/stop, ~/start, ~/replace_core, ~/reconfigure: the ROS face of `executor_control`."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.lifecycle import LifecycleNode
+
+from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
+from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_messages import component_infos, realtime_status, step_reports
+from mauve_rt.node.executor_requests import Request, Step
+from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_state import StatePublisher
+
+
+class Services:
+    """The services of a node. Requests for changes wait for each other in `control_group`, listing does not."""
+
+    def __init__(
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        *,
+        control: Control,
+        state: StatePublisher,
+        control_group: CallbackGroup,
+        query_group: CallbackGroup,
+    ) -> None:
+        self._runtime = runtime
+        self._control = control
+        self._state = state
+        node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
+        for service, name, translate in (
+            (Stop, "~/stop", _stop),
+            (Start, "~/start", _start),
+            (ReplaceCore, "~/replace_core", _replace_core),
+            (Reconfigure, "~/reconfigure", _reconfigure),
+        ):
+            node.create_service(service, name, self._handler(translate), callback_group=control_group)
+
+    def _list(self, _request: Any, response: Any) -> Any:
+        response.instance_id = self._runtime.instance_id
+        response.epoch = self._runtime.epoch
+        response.components = component_infos(self._runtime)
+        response.realtime = realtime_status(self._runtime)
+        return response
+
+    def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
+        def handle(ros_request: Any, response: Any) -> Any:
+            request = translate(ros_request)
+            outcome = self._control.handle(request)
+            if not outcome.replayed:
+                self._state.refresh()
+                self._state.event(request, outcome)
+            response.success = outcome.success
+            response.code = int(outcome.code)
+            response.message = outcome.message
+            response.instance_id = self._runtime.instance_id
+            response.epoch = outcome.epoch
+            response.report = step_reports(outcome)
+            return response
+
+        return handle
+
+
+def _stop(ros: Any) -> Request:
+    return Request(steps=(Step("stop", ros.component),), timeout_s=ros.timeout_s, **_common(ros))
+
+
+def _start(ros: Any) -> Request:
+    return Request(steps=(Step("start", ros.component),), clock_ns=ros.clock_ns, **_common(ros))
+
+
+def _replace_core(ros: Any) -> Request:
+    step = Step("replace_core", ros.component, ros.core)
+    return Request(steps=(step,), timeout_s=ros.commit_timeout_s, **_common(ros))
+
+
+def _reconfigure(ros: Any) -> Request:
+    steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
+    return Request(steps=steps, dry_run=ros.dry_run, timeout_s=ros.commit_timeout_s, **_common(ros))
+
+
+def _common(ros: Any) -> dict[str, Any]:
+    return {
+        "request_id": ros.request_id,
+        "expected_epoch": ros.expected_epoch,
+        "requested_by": ros.requested_by,
+        "cause": ros.cause,
+    }

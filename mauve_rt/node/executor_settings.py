@@ -1,0 +1,75 @@
+"""What the command line says to an executor before there is a node."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from mauve_rt.errors import ParameterError
+from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
+from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.ros_arguments import parse_ros_arguments
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The executor's parameters; those of the node with the same names are for people to look at."""
+
+    architecture: str = ""
+    autostart: bool = True
+    require_realtime: bool = False
+    trace: bool = True
+    overrides: Overrides = Overrides()  # noqa: RUF009 - immutable
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> Self:
+        """The settings of a command line.
+
+        Raises:
+            ParameterError: a value of the wrong type, or `use_sim_time`.
+        """
+        arguments = parse_ros_arguments(words, node="executor")
+        given = arguments.parameters
+        if given.get("use_sim_time"):
+            raise ParameterError("use_sim_time: expected false: components run by the monotonic clock; leave it out")
+        peers = given.get("peers")
+        if peers is not None and not (isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)):
+            raise ParameterError(f"parameter peers: expected a list of names such as [robot_2], found {peers}")
+        properties = {}
+        for name, value in given.items():
+            component, dot, property_name = name.partition(".")
+            if dot and component != "qos_overrides" and isinstance(value, bool | int | float | str):
+                properties[component, property_name] = value
+        return cls(
+            architecture=_typed(given, "architecture", str, ""),
+            autostart=_typed(given, "autostart", bool, default=True),
+            require_realtime=_typed(given, "require_realtime", bool, default=False),
+            trace=_typed(given, "trace", bool, default=True),
+            overrides=Overrides(namespace=arguments.namespace, peers=peers, properties=properties),
+        )
+
+    def runtime(self) -> Runtime:
+        """The runtime of the named file, nothing loaded yet."""
+        return Runtime(self._load, require_realtime=self.require_realtime, trace=self.trace)
+
+    def node_namespace(self) -> str:
+        """The namespace of the node before remapping.
+
+        Raises:
+            MauveError: the file cannot be read.
+        """
+        return self._load().namespace if self.architecture else "/"
+
+    def _load(self) -> ArchitectureModel:
+        if not self.architecture:
+            text = "parameter 'architecture' is missing: ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
+            raise ParameterError(text)
+        return load_architecture(Path(self.architecture), overrides=self.overrides)
+
+
+def _typed(given: dict[str, Any], name: str, kind: type, default: Any = None) -> Any:
+    value = given.get(name, default)
+    if not isinstance(value, kind):
+        words = {bool: "true or false", str: "text"}[kind]
+        raise ParameterError(f"parameter {name}: expected {words}, found {value}")
+    return value

@@ -1,0 +1,88 @@
+"""The part of a ROS command line that must be known before there is a node: the executor's namespace is in its file."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosArguments:
+    """What `--ros-args` says to one node."""
+
+    parameters: dict[str, Any] = field(default_factory=dict)  # later ones win, as in rcl
+    namespace: str = ""  # of __ns:=, empty: not remapped
+    name: str = ""  # of __node:= or __name:=, empty: not remapped
+
+
+def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
+    """Parameters (`-p`, `--params-file`) and remappings that apply to the node named `node`.
+
+    What rcl would refuse is left out: rcl says so itself when the node is made.
+    """
+    parameters: dict[str, Any] = {}
+    remapped: dict[str, str] = {}
+    for option, value in _options(arguments):
+        if option in ("-r", "--remap"):
+            source, _, target = value.partition(":=")
+            scope, _, rule = source.rpartition(":")
+            if not scope or scope == node:
+                remapped[rule] = target
+        elif option in ("-p", "--param"):
+            source, separator, text = value.partition(":=")
+            scope, _, name = source.rpartition(":")
+            if separator and (not scope or scope == node):
+                parameters[name] = _parse(text)
+        else:
+            parameters.update(_of_file(value, node))
+    name = remapped.get("__node", remapped.get("__name", ""))
+    return RosArguments(parameters=parameters, namespace=remapped.get("__ns", ""), name=name)
+
+
+def _options(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """(option, value) of the options that matter, within the stretches `--ros-args ... [--]`."""
+    inside = False
+    words = iter(arguments)
+    for word in words:
+        if word == "--ros-args":
+            inside = True
+        elif word == "--":
+            inside = False
+        elif inside and word in ("-p", "--param", "-r", "--remap", "--params-file"):
+            value = next(words, None)
+            if value is not None:
+                yield word, value
+
+
+def _parse(text: str) -> Any:
+    try:
+        value = YAML(typ="safe", pure=True).load(text)
+    except (YAMLError, ValueError, RecursionError):
+        return text
+    return text if value is None else value
+
+
+def _of_file(path: str, node: str) -> dict[str, Any]:
+    try:
+        document = YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, YAMLError, ValueError, RecursionError):
+        return {}
+    found: dict[str, Any] = {}
+    for pattern, section in document.items() if isinstance(document, dict) else ():
+        applies = re.fullmatch(r"/\*\*|(/\*\*|/?[\w/]*/)?/?" + re.escape(node), str(pattern)) is not None
+        values = section.get("ros__parameters") if isinstance(section, dict) else None
+        if applies and isinstance(values, dict):
+            found.update(_flattened(values))
+    return found
+
+
+def _flattened(values: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from _flattened(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

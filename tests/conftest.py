@@ -1,0 +1,40 @@
+"""What several stages of tests share: a small package of plug-ins, compiled once a session."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mauve_rt import _kernel
+
+PLUGINS = Path(__file__).parent / "plugins"
+INSTALLED = Path(_kernel.__file__).resolve().parents[4]  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
+
+
+@pytest.fixture(scope="session")
+def plugin_prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An ament prefix with the package executor_tests, put in front of those searched."""
+    prefix = tmp_path_factory.mktemp("executor_tests")
+    index = prefix / "share" / "ament_index" / "resource_index"
+    (prefix / "lib").mkdir()
+    (prefix / "share" / "executor_tests").mkdir(parents=True)
+    for kind in ("packages", "mauve_rt_plugins"):
+        (index / kind).mkdir(parents=True)
+    (index / "packages" / "executor_tests").touch()
+    shutil.copy(PLUGINS / "executor_tests.txt", index / "mauve_rt_plugins" / "executor_tests")
+    library = prefix / "lib" / "libexecutor_tests.so"
+    subprocess.run(
+        [
+            *("g++", "-std=c++20", "-O1", "-shared", "-fPIC", PLUGINS / "executor_tests.cpp", "-o", library),
+            *(f"-I{INSTALLED}/include", f"-L{INSTALLED}/lib", "-lmauve_rt", f"-Wl,-rpath,{INSTALLED}/lib"),
+        ],
+        check=True,
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), os.environ.get("AMENT_PREFIX_PATH", "")]))
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
+        patch.syspath_prepend(str(PLUGINS))
+        yield prefix

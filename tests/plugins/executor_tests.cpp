@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A small package of plug-ins for the executor's tests: a component that counts, in every temper.
+#include <stdexcept>
+
+#include "mauve_rt/mauve_rt.hpp"
+
+namespace executor_tests {
+
+struct Number {
+  double data{};
+};
+
+struct Point {
+  double x{};
+  double y{};
+  double z{};
+};
+
+/// Not a ROS message.
+struct Private {
+  double value{};
+};
+
+}  // namespace executor_tests
+
+MAUVE_TYPE(executor_tests::Number, "std_msgs/msg/Float64", data)
+MAUVE_TYPE(executor_tests::Point, "geometry_msgs/msg/Point", x, y, z)
+MAUVE_TYPE(executor_tests::Private, "executor_tests/Private", value)
+
+namespace executor_tests {
+
+struct CounterShell : mauve::Shell {
+  mauve::Property<double>& step = property("step", 1.0, {.unit = "1", .minimum = 0.0, .maximum = 10.0});
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10);
+  mauve::Property<bool>& enabled = property("enabled", true);
+  mauve::Property<std::string>& label = property("label", "");
+  mauve::Property<std::string>& list_file = property("list_file", "");
+  mauve::ReadPort<Number>& set = read_port<Number>("set");
+  mauve::WritePort<Number>& count = write_port<Number>("count");
+};
+
+struct Counter : mauve::Core<CounterShell> {
+  double count = 0.0;
+
+  virtual void act() {
+    if (const auto sample = shell().set.read(); sample.is_new()) {
+      if (sample.value.data < -1e6) throw std::runtime_error("set to something unheard of");
+      count = sample.value.data;
+    }
+    count += shell().step.value();
+    shell().count.write({count});
+  }
+  void take(mauve::CoreBase& old) noexcept override {
+    if (auto* other = dynamic_cast<Counter*>(&old)) count = other->count;
+  }
+};
+
+/// Counts downwards.
+struct Backwards : Counter {
+  void act() override {
+    count -= shell().step.value();
+    shell().count.write({count});
+  }
+};
+
+/// Installed, but no architecture file of the tests declares it.
+struct Undeclared : Counter {};
+
+struct Reluctant : Counter {
+  bool adopt(const mauve::CoreBase&) override { return false; }
+};
+
+struct Unready : Counter {
+ protected:
+  bool configure_hook() override { throw std::runtime_error("the core is not ready, and never will be"); }
+};
+
+/// Executes for two seconds at a time.
+struct Slow : Counter {
+  void act() override {
+    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(2);
+    while (mauve::monotonic_now_ns() < until) {
+    }
+  }
+};
+
+struct CounterFsm : mauve::Fsm<CounterShell, Counter> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Counter::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+/// Never waits.
+struct LoopFsm : mauve::Fsm<CounterShell, Counter> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Counter::act);
+    mauve::State& again = execution("CountAgain", "act", &Counter::act);
+    set_initial(run);
+    next(run, again);
+    next(again, run);
+  }
+};
+
+struct OtherShell : mauve::Shell {};
+
+}  // namespace executor_tests
+
+MAUVE_PLUGINS(registry) {
+  using namespace executor_tests;
+  const std::string shell = "executor_tests/CounterShell";
+  registry.type<Number>();
+  registry.type<Point>();
+  registry.type<Private>();
+  registry.shell<CounterShell>(shell);
+  registry.shell<OtherShell>("executor_tests/OtherShell");
+  registry.core<Counter>("executor_tests/Counter", shell);
+  registry.core<Backwards>("executor_tests/Backwards", shell);
+  registry.core<Undeclared>("executor_tests/Undeclared", shell);
+  registry.core<Reluctant>("executor_tests/Reluctant", shell);
+  registry.core<Unready>("executor_tests/Unready", shell);
+  registry.core<Slow>("executor_tests/Slow", shell);
+  registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
+  registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);
+}
