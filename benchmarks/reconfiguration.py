@@ -1,0 +1,96 @@
+"""Replacing a core, stopping, starting, deploying: rows from the C++ programs beside this file."""
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import native
+from ratios import percentile
+from rows import Row, compared, exactly_zero, not_available
+from settings import Settings
+
+Rounds = list[list[dict[str, Any]]]
+_NS_PER_US = 1000
+
+
+def swap_rows(settings: Settings) -> Iterator[Row]:
+    """Replace the core of a running component, again and again."""
+    rounds = _both("bench_swap", settings, count=settings.swaps, cpu=settings.cpu)
+    what = "replace core of a running 1 kHz component with 100 us of work"
+    beside = "hot-standby handover of two threads"
+    components = [component for component, _ in rounds]
+    releases = sum(found["releases"] for found in components)
+    stalled = sum(found["missed_in_stalls"] for found in components)
+    note = f"{stalled} of {releases} releases were missed inside stalls of the machine that a witness marked"
+    yield compared(
+        f"{what}, blackout p50", _pairs(rounds, "blackout_ns", 50), unit="us", beside=beside, ratio_limit=1.5
+    )
+    yield compared(
+        f"{what}, blackout p99", _pairs(rounds, "blackout_ns", 99), unit="us", beside=beside, limit=1000
+    )
+    yield exactly_zero(f"{what}, releases missed", [found["missed"] for found in components], note=note)
+    phases = [found["worst_nominal_phase_ns"] for found in components]
+    yield exactly_zero(f"{what}, nominal phase error", phases, unit="ns")
+
+
+def stop_rows(settings: Settings) -> Iterator[Row]:
+    """Stop a component that is asleep."""
+    rounds = _both("bench_stop", settings, count=settings.stops, cpu=settings.cpu, wait_ms=5000)
+    beside = "futex wake-to-run of a thread"
+    for percent, limit_us in ((50, 50), (99, 200)):
+        pairs = _pairs(rounds, "durations_ns", percent)
+        what = f"stop inside a 5 s wait, p{percent}"
+        yield compared(what, pairs, unit="us", beside=beside, limit=limit_us)
+
+
+def deployment_rows(settings: Settings) -> Iterator[Row]:
+    """Deploy components together."""
+    for cpus in (1, 2):
+        place = "one CPU" if cpus == 1 else "two CPUs"
+        what = f"spread of the first releases of 8 x 1 kHz components on {place}"
+        if cpus > len(os.sched_getaffinity(0)):
+            yield not_available(what, "this machine has one CPU")
+            continue
+        rounds = _both("bench_deployment", settings, count=settings.deployments, cpus=cpus)
+        pairs = _pairs(rounds, "spreads_ns", 50)
+        beside = "threads with a barrier and a shared epoch"
+        yield compared(what, pairs, unit="us", beside=beside, ratio_limit=1.25)
+
+
+def restart_rows(settings: Settings) -> Iterator[Row]:
+    """Stop and start at random instants."""
+    found = [
+        native.run(
+            "bench_restart",
+            seed=number,
+            count=settings.restarts,
+            priority=settings.priority,
+            cpu=settings.cpu,
+        )
+        for number in range(settings.rounds)
+    ]
+    worst = [max(map(abs, one["nominal_phase_ns"])) for one in found]
+    starts = sum(len(one["nominal_phase_ns"]) for one in found)
+    actual = percentile([phase for one in found for phase in one["actual_phase_ns"]], 50)
+    late_us = actual / _NS_PER_US
+    note = f"{starts} starts that came to a release, the actual one {late_us:.3g} us after the nominal (p50)"
+    yield exactly_zero("phase error after random stop/start, nominal, worst", worst, unit="ns", note=note)
+
+
+def _both(program: str, settings: Settings, **options: int) -> Rounds:
+    """Rounds of [component, bare]."""
+
+    def measure(who: str, number: int) -> dict[str, Any]:
+        return native.run(program, who=who, seed=number, priority=settings.priority, **options)
+
+    return native.interleaved(
+        settings.rounds, lambda number: measure("component", number), lambda number: measure("bare", number)
+    )
+
+
+def _pairs(rounds: Rounds, name: str, percent: float) -> list[tuple[float, float]]:
+    """(component, bare) of each round, in us."""
+    return [
+        (percentile(component[name], percent) / _NS_PER_US, percentile(bare[name], percent) / _NS_PER_US)
+        for component, bare in rounds
+    ]

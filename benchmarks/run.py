@@ -1,0 +1,84 @@
+"""Run the benchmarks; prints a Markdown table.
+
+Started by scripts/bench, which builds what is missing. Figures are medians over interleaved rounds, each of
+which runs what is measured and its reference next to each other; a verdict is given where the whole 95 %
+interval is on one side of the target.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import machine
+from native import BenchmarkError
+from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
+from rows import Row, markdown, not_available
+from settings import FULL, QUICK, Settings
+from wakeup import wakeup_rows
+
+BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
+    "wakeup": wakeup_rows,
+    "deployment": deployment_rows,
+    "restart": restart_rows,
+    "stop": stop_rows,
+    "swap": swap_rows,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit status: 0 when everything could be measured, whatever the verdicts; else 1."""
+    given = _parser().parse_args(arguments)
+    settings = FULL if given.full else QUICK
+    if given.rounds is not None:
+        settings = replace(settings, rounds=given.rounds)
+    described, steal = machine.describe(), machine.StealMeter()
+    rows, complete = _measure(given.only or list(BENCHMARKS), settings)
+    print(markdown(rows))
+    print(f"\n{described.line()}")
+    print(f"{settings.mode}, {settings.rounds} rounds; steal time {steal.percent():.2f} %")
+    if given.json is not None:
+        result = {
+            "mode": settings.mode,
+            "machine": described.as_json(),
+            "steal_percent": steal.percent(),
+            "rows": [row.as_json() for row in rows],
+        }
+        given.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    return 0 if complete else 1
+
+
+def _measure(names: Sequence[str], settings: Settings) -> tuple[list[Row], bool]:
+    rows: list[Row] = []
+    complete = True
+    for name in names:
+        began_s = time.monotonic()
+        sys.stderr.write(f"bench: {name} ... ")
+        sys.stderr.flush()
+        try:
+            rows += BENCHMARKS[name](settings)
+        except BenchmarkError as error:
+            complete = False
+            rows.append(not_available(name, " ".join(str(error).split())))
+        sys.stderr.write(f"{time.monotonic() - began_s:.0f} s\n")
+    return rows, complete
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
+    amount = parser.add_mutually_exclusive_group()
+    amount.add_argument("--quick", action="store_true", help="about 2 minutes (the default)")
+    amount.add_argument("--full", action="store_true", help="about 10 minutes")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows, with every round, to FILE")
+    parser.add_argument(
+        "--only", action="append", choices=BENCHMARKS, help="only this one; may be given again"
+    )
+    parser.add_argument("--rounds", type=int, help="another number of rounds; fewer than 10 decide nothing")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

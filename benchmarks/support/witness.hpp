@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A witness per CPU, above all else, that notices when the machine itself stands still.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "mauve_rt/time.hpp"
+
+#include "support/realtime_thread.hpp"
+
+namespace bench {
+
+/// An interval in which a CPU ran nothing of ours, not even the thread of the highest priority.
+struct Stall {
+  mauve::time_ns_t begin_ns;
+  mauve::time_ns_t end_ns;
+};
+
+/// Wakes every 250 us at priority 98; being late by more than 500 us marks a stall.
+class Witness {
+ public:
+  explicit Witness(int cpu) : thread_(kPriority, cpu, [this] { watch(); }) {}
+  ~Witness() { end(); }
+  Witness(const Witness&) = delete;
+  Witness& operator=(const Witness&) = delete;
+
+  /// Ends the watch and returns what was noticed.
+  const std::vector<Stall>& end() {
+    ending_.store(true, std::memory_order_relaxed);
+    if (!ended_.load(std::memory_order_acquire)) ended_.wait(false, std::memory_order_acquire);
+    return stalls_;
+  }
+
+ private:
+  static constexpr int kPriority = 98;
+  static constexpr mauve::time_ns_t kPeriod = mauve::us_to_ns(250);
+  static constexpr mauve::time_ns_t kStall = mauve::us_to_ns(500);
+
+  void watch() {
+    stalls_.reserve(10'000);
+    mauve::time_ns_t next = mauve::monotonic_now_ns();
+    while (!ending_.load(std::memory_order_relaxed)) {
+      next += kPeriod;
+      sleep_until(next);
+      const mauve::time_ns_t now = mauve::monotonic_now_ns();
+      if (now - next > kStall) stalls_.push_back({next - kPeriod, now});
+      if (now > next) next += (now - next) / kPeriod * kPeriod;
+    }
+    ended_.store(true, std::memory_order_release);  // release: publishes stalls_
+    ended_.notify_all();
+  }
+
+  std::vector<Stall> stalls_;        // the witness's own until ended_
+  std::atomic<bool> ending_{false};  // relaxed: noticed at the next wake
+  std::atomic<bool> ended_{false};
+  RealtimeThread thread_;
+};
+
+/// Releases that are missing between consecutive nominal instants.
+struct Missed {
+  std::int64_t ours{0};
+  std::int64_t machines{0};  // inside a marked stall
+};
+
+inline Missed count_missed(const std::vector<mauve::time_ns_t>& nominal_ns, mauve::time_ns_t period_ns,
+                           const std::vector<Stall>& stalls) {
+  Missed missed;
+  for (std::size_t i = 1; i < nominal_ns.size(); ++i) {
+    const mauve::time_ns_t before = nominal_ns[i - 1];
+    const mauve::time_ns_t after = nominal_ns[i];
+    bool stalled = false;
+    for (const Stall& stall : stalls) stalled = stalled || (stall.begin_ns < after && stall.end_ns > before);
+    (stalled ? missed.machines : missed.ours) += (after - before) / period_ns - 1;
+  }
+  return missed;
+}
+
+}  // namespace bench

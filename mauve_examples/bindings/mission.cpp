@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// mauve_examples._mission: the mission's map, starts and reachability for Python. Only translation, no behaviour.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "mauve_examples/map_file.hpp"
+#include "mauve_examples/reachability.hpp"
+#include "mauve_examples/start_poses.hpp"
+
+namespace py = pybind11;
+
+namespace {
+
+using mauve_examples::GridMap;
+using mauve_examples::Pose2D;
+using PoseTuple = std::tuple<double, double, double>;
+
+std::vector<py::ssize_t> shape(const GridMap& map) { return {map.height, map.width}; }
+
+std::vector<PoseTuple> start_poses(const GridMap& map, std::size_t n, std::uint64_t seed) {
+  std::vector<PoseTuple> poses;
+  for (const Pose2D& pose : mauve_examples::start_poses(map, n, seed)) poses.emplace_back(pose.x, pose.y, pose.theta);
+  return poses;
+}
+
+py::array_t<bool> reachable_mask(const GridMap& map, const std::vector<PoseTuple>& starts, double radius_m) {
+  std::vector<Pose2D> poses;
+  for (const auto& [x, y, theta] : starts) poses.push_back({x, y, theta});
+  const std::vector<std::uint8_t> reached = mauve_examples::reachable_cells(map, poses, radius_m);
+  py::array_t<bool> mask(shape(map));
+  std::copy(reached.begin(), reached.end(), mask.mutable_data());
+  return mask;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_mission, module) {
+  module.doc() = "The mission's maps: reading them, placing robots, and what these can reach.";
+  py::register_exception<mauve_examples::MapError>(module, "MapError", PyExc_ValueError);
+
+  py::class_<GridMap>(module, "GridMap")
+      .def_readonly("width", &GridMap::width)
+      .def_readonly("height", &GridMap::height)
+      .def_readonly("resolution_m", &GridMap::resolution_m)
+      .def_readonly("origin_x_m", &GridMap::origin_x_m)
+      .def_readonly("origin_y_m", &GridMap::origin_y_m)
+      .def_property_readonly("cells", [](const py::object& self) {
+        const auto& map = self.cast<const GridMap&>();
+        py::array_t<std::int8_t> view(shape(map), map.cells.data(), self);  // shares the map's memory and keeps it
+        view.attr("setflags")(py::arg("write") = false);
+        return view;
+      });
+
+  module.def("load_map", [](const std::string& path) { return mauve_examples::load_map(path); }, py::arg("path"));
+  module.def("start_poses", &start_poses, py::arg("grid"), py::arg("n"), py::arg("seed"));
+  module.def("reachable_mask", &reachable_mask, py::arg("grid"), py::arg("starts"), py::arg("radius_m"));
+}

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Which tiles of a map have changed since they were handed out last.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "mauve_examples/types.hpp"
+
+namespace mauve_examples {
+
+/// Remembers the revision of every tile it handed out. Not thread-safe; memory is allocated by configure alone.
+class ChangedTiles {
+ public:
+  /// Allocates; everything counts as changed that is not at revision 0. [setup]
+  void configure(std::size_t tile_count) {
+    seen_.assign(tile_count, 0);
+    next_ = 0;
+  }
+
+  /// Fills the list with changed tiles until it is full; `map` offers revision(tile) and copy_tile(tile, MapTile&). [rt]
+  template <typename Map>
+  void collect(const Map& map, TileList& tiles) noexcept {
+    const std::size_t count = seen_.size();
+    for (std::size_t looked = 0; looked < count && !tiles.full(); ++looked) {
+      const std::size_t tile = next_;
+      next_ = (next_ + 1) % count;  // goes on here next time: tiles that change all the time starve none
+      if (map.revision(tile) == seen_[tile]) continue;
+      seen_[tile] = map.revision(tile);
+      tiles.resize(tiles.size() + 1);
+      map.copy_tile(tile, tiles[tiles.size() - 1]);
+    }
+  }
+
+  /// Everything counts as changed again. [rt]
+  void forget() noexcept { std::fill(seen_.begin(), seen_.end(), 0); }
+
+ private:
+  std::vector<std::uint32_t> seen_;
+  std::size_t next_{0};
+};
+
+}  // namespace mauve_examples

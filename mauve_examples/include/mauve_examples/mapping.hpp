@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Mapping: makes the robot's own map from scans and poses, 10 Hz.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mauve_examples/occupancy_map.hpp"
+#include "mauve_examples/types.hpp"
+
+namespace mauve_examples {
+
+struct MappingShell : mauve::Shell {
+  mauve::Property<std::string>& map =
+      property("map", "", {.description = "YAML file: how large the world is"});
+
+  mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
+  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
+  mauve::CallPort<void(MapWriter)>& map_update = call_port<void(MapWriter)>("map_update", kMapWriterType);
+  mauve::WritePort<MapUpdate>& map_updates = write_port<MapUpdate>(
+      "map_updates", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
+};
+
+class MappingCore : public mauve::Core<MappingShell> {
+ public:
+  /// Adds the newest scan to the map and tells what changed. [rt]
+  void integrate();
+
+ protected:
+  bool configure_hook() override;
+
+ private:
+  void collect_changes(const OccupancyGrid& map);
+
+  std::unique_ptr<Scan> scan_;
+  std::unique_ptr<MapUpdate> update_;
+  std::vector<std::uint32_t> told_;  // revision of each tile as it was last told
+  std::size_t next_tile_{0};         // where to look on: with more changes than fit, all get their turn
+};
+
+struct MappingFsm : mauve::Fsm<MappingShell, MappingCore> {
+  void define() override;
+};
+
+}  // namespace mauve_examples

@@ -1,0 +1,100 @@
+"""The exploration mission from one command: runs it, shows how it goes, tells its story, writes the report.
+
+    python -m mauve_examples.mission.demo [--map FILE.yaml] [--robots N] [--duration S] [--link-loss-at S]
+        [--link-back-at S] [--no-supervisor] [--drop-share P] [--seed K] [--out DIR]
+
+Exit status: 0 success, 1 failure, 2 bad input (one line on stderr, nothing started), 130 interrupted.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+SUCCESS, FAILURE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class Interrupts:
+    """Ctrl-C and its kin: the first asks the demo to end what it does, the next one breaks it off."""
+
+    def __init__(self) -> None:
+        self._asked = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+
+    def asked(self) -> bool:
+        """Whether the user wants it to end."""
+        return self._asked
+
+    def _on_signal(self, _number: int, _frame: Any) -> None:
+        if self._asked:
+            raise KeyboardInterrupt
+        self._asked = True
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demo; returns its exit status."""
+    interrupts = Interrupts()
+    # Robots that are nobody else's business: this machine only, unless the user says otherwise.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    # Imported here so that Ctrl-C while modules load is handled already.
+    from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
+
+    try:
+        return _run(list(sys.argv[1:] if arguments is None else arguments), interrupts)
+    except BadInputError as error:
+        return _complain(str(error), BAD_INPUT)
+    except MissionError as error:
+        return _complain(str(error), INTERRUPTED if interrupts.asked() else FAILURE)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _run(arguments: list[str], interrupts: Interrupts) -> int:
+    import rclpy  # noqa: PLC0415
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+    from rclpy.utilities import try_shutdown  # noqa: PLC0415
+
+    from mauve_examples.mission.architecture import load_world  # noqa: PLC0415
+    from mauve_examples.mission.demo_options import parse_options  # noqa: PLC0415
+    from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
+    from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
+
+    options = parse_options(arguments)
+    world = load_world(options.map_file, options.names, seed=options.seed)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with open_progress() as progress:
+            mission = MissionRun(options, world, progress=progress, interrupted=interrupts.asked)
+            mission.run()
+    finally:
+        try_shutdown()
+    if not mission.started:
+        return INTERRUPTED
+    return _report(options, world, mission, interrupts)
+
+
+def _report(options: Any, world: Any, mission: Any, interrupts: Interrupts) -> int:
+    from mauve_examples.mission.demo_ending import ending, summarise  # noqa: PLC0415
+
+    facts = mission.facts()
+    if interrupts.asked():  # who presses Ctrl-C wants to be gone within 3 s: figures, but no drawings
+        summary = summarise(options.out, facts, world.area)
+    else:
+        from mauve_examples.mission.results import write_results  # noqa: PLC0415
+
+        summary = write_results(options.out, facts, area=world.area)
+    print(ending(options.out, mission.story.lines, summary), flush=True)
+    if interrupts.asked():
+        return INTERRUPTED
+    return SUCCESS if summary["success"] else FAILURE
+
+
+def _complain(text: str, status: int) -> int:
+    sys.stderr.write(f"demo: {' '.join(text.split())}\n")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""The last words of a demo: what happened, what it cost, where to read more."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mauve_examples.mission.evidence import read_robot, replay_coverage
+from mauve_examples.mission.facts import MissionArea, MissionFacts
+from mauve_examples.mission.summary import SUMMARY, build_summary, write_summary
+from mauve_rt.trace import TraceError
+
+
+def ending(out: Path, events: list[str], summary: dict[str, Any]) -> str:
+    """The story of a mission as text. `events`: lines as they happened; `summary`: as summary.json."""
+    return "\n".join(_lines(out, events, summary))
+
+
+def summarise(out: Path, facts: MissionFacts, area: MissionArea) -> dict[str, Any]:
+    """Write summary.json from the bags there are, without report and figures; returns the summary."""
+    evidence, unreadable = [], []
+    for robot in facts.robots:
+        try:
+            evidence.append(read_robot(out / "bag" / robot, robot, facts))
+        except TraceError as error:
+            unreadable.append(f"{robot}: {error}")
+    summary = build_summary(facts, evidence, replay_coverage(facts, area, evidence))
+    summary["reasons"] += unreadable
+    summary["success"] = not summary["reasons"]
+    write_summary(out / SUMMARY, summary)
+    return summary
+
+
+def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[str]:
+    yield "\nWhat happened:"
+    yield from (f"  {event}" for event in events or ["nothing"])
+    swaps = [(robot, swap) for robot, one in summary["robots"].items() for swap in one["reconfigurations"]]
+    if swaps:
+        yield "\nReconfigurations, as the trace measured them:"
+        yield from (f"  {robot}  {_swap(swap)}" for robot, swap in swaps)
+    shares = dict(summary["coverage"])
+    together = shares.pop("union")
+    explored = ", ".join(f"{robot} {share:.0%}" for robot, share in shares.items())
+    yield f"\nExplored: {explored}, together {together:.0%}."
+    yield from _realtime(summary["realtime"])
+    if summary["success"]:
+        yield "SUCCESS."
+    else:
+        yield "FAILED:"
+        yield from (f"  {reason}" for reason in summary.get("reasons", ()))
+    report = out / "report.html"
+    yield f"Report: {report if report.exists() else 'none, the mission was interrupted'}"
+    yield f"Figures: {out / 'summary.json'}   traces: {out / 'bag'}"
+
+
+def _swap(swap: dict[str, Any]) -> str:
+    words = [f"{swap['component']}: {_class(swap['from'])} -> {_class(swap['to'])}"]
+    if swap["silence_ms"] is not None:
+        words.append(f"{swap['silence_ms']:.0f} ms after the last sample")
+    if swap["prepare_us"] is not None:
+        words.append(f"prepared in {swap['prepare_us']:.0f} us")
+    if swap["blackout_us"] is not None:
+        words.append(f"blackout {swap['blackout_us']:.0f} us")
+    if swap["missed_releases"] is not None:
+        words.append(f"{swap['missed_releases']} releases missed")
+    return ", ".join(words)
+
+
+def _class(name: str | None) -> str:
+    return name.rsplit("/", 1)[-1] if name else "?"
+
+
+def _realtime(realtime: dict[str, Any]) -> Iterator[str]:
+    if realtime["granted"]:
+        yield "Real time: granted."
+        return
+    yield "Real time was not granted, so the times above are best effort:"
+    yield from (f"  {line}" for line in realtime["missing"] or ["the executors did not say why"])

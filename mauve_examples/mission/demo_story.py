@@ -1,0 +1,143 @@
+"""What has happened in a mission so far: the lines people read, and the picture of now. For one thread."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from mauve_examples.mission.progress import MissionPicture, RobotPicture
+from mauve_msgs.msg import ComponentInfo, StepReport
+
+COMPONENT = "exploration"
+TOLD_DECISIONS = ("condition_true", "failed", "suppressed")
+
+
+@dataclass
+class Swap:
+    """A core that was replaced. Time in seconds of mission time."""
+
+    time_s: float
+    component: str
+    from_core: str
+    to_core: str
+    blackout_ns: int
+    missed_releases: int
+
+
+@dataclass
+class RobotStory:
+    """What is known of one robot."""
+
+    core: str = ""
+    done: bool = False
+    faults: dict[str, str] = field(default_factory=dict)  # by component
+    swaps: list[Swap] = field(default_factory=list)
+    realtime_granted: bool = False
+    realtime_missing: list[str] = field(default_factory=list)
+
+
+class MissionStory:
+    """Fed with messages as they arrive; `clock` gives the mission time, s, negative before the start."""
+
+    def __init__(self, robots: list[str], *, clock: Callable[[], float]) -> None:
+        self.robots = {robot: RobotStory() for robot in robots}
+        self.link_up = True
+        self.link_changes: list[tuple[float, bool]] = []
+        self.lines: list[str] = []
+        self._clock = clock
+
+    def tell(self, text: str) -> None:
+        """Add a line of the story, with the mission time."""
+        self.lines.append(f"{self._clock():6.1f} s  {text}")
+
+    def on_state(self, robot: str, state: Any) -> None:
+        """mauve_msgs/msg/ArchitectureState."""
+        story = self.robots[robot]
+        story.realtime_granted = state.realtime.granted
+        story.realtime_missing = list(state.realtime.missing)
+        for status in state.components:
+            if status.name == COMPONENT:
+                story.core = status.core.rsplit("/", 1)[-1]
+            if status.state == ComponentInfo.FAULTED and status.name not in story.faults:
+                story.faults[status.name] = status.fault
+                self.tell(f"{robot}: {status.name} FAULTED: {status.fault}")
+
+    def on_event(self, robot: str, event: Any) -> None:
+        """mauve_msgs/msg/ReconfigurationEvent."""
+        who = f" (asked by {event.requested_by})" if event.requested_by else ""
+        if not event.success:
+            self.tell(f"{robot}: refused: {event.request}: {event.message}{who}")
+            return
+        if not event.to_core:
+            self.tell(f"{robot}: {event.request}{who}")
+            return
+        for report in event.report:
+            swap = Swap(
+                time_s=self._clock(),
+                component=report.component,
+                from_core=event.from_core.rsplit("/", 1)[-1],
+                to_core=event.to_core.rsplit("/", 1)[-1],
+                blackout_ns=report.blackout_ns,
+                missed_releases=report.missed_releases,
+            )
+            self.robots[robot].swaps.append(swap)
+            self.tell(f"{robot}: {describe(swap)}{who}")
+
+    def on_decision(self, robot: str, decision: Any) -> None:
+        """mauve_msgs/msg/SupervisorDecision; what the executor's events tell better is left out."""
+        if decision.decision in TOLD_DECISIONS:
+            message = f": {decision.message}" if decision.message else ""
+            self.tell(f"{robot}: {decision.rule}: {decision.reason}{message}")
+
+    def on_done(self, robot: str, done: bool) -> None:  # noqa: FBT001 - the message's one field
+        """The robot has nothing left that it can explore, or has again."""
+        if done and not self.robots[robot].done:
+            self.tell(f"{robot}: has explored all it can reach")
+        self.robots[robot].done = done
+
+    def on_link(self, up: bool) -> None:  # noqa: FBT001 - the message's one field
+        """The radio's link changed."""
+        if up == self.link_up:
+            return
+        self.link_up = up
+        self.link_changes.append((self._clock(), up))
+        self.tell("the radio link is back" if up else "the radio link is LOST")
+
+    def link_gaps(self) -> list[tuple[float, float | None]]:
+        """When the link was down, in mission time; None: to the end."""
+        gaps: list[tuple[float, float | None]] = []
+        for time_s, up in self.link_changes:
+            if up:
+                gaps[-1] = (gaps[-1][0], time_s)
+            else:
+                gaps.append((time_s, None))
+        return gaps
+
+    def picture(self, *, duration_s: float, explored: dict[str, float], together: float) -> MissionPicture:
+        """What to show now. `explored`: share per robot, 0 to 1."""
+        robots = [
+            RobotPicture(name=name, explored=explored[name], core=story.core, remark=_remark(story))
+            for name, story in self.robots.items()
+        ]
+        return MissionPicture(
+            time_s=self._clock(),
+            duration_s=duration_s,
+            link_up=self.link_up,
+            robots=robots,
+            together=together,
+            events=self.lines,
+        )
+
+
+def describe(swap: Swap) -> str:
+    """One swap in words: what, and what it cost."""
+    blackout = "blackout not measured"
+    if swap.blackout_ns != StepReport.NOT_MEASURED:
+        blackout = f"blackout {swap.blackout_ns / 1e3:.0f} us"
+    missed = f"{swap.missed_releases} releases missed" if swap.missed_releases else "no release missed"
+    return f"{swap.component}: {swap.from_core} -> {swap.to_core}, {blackout}, {missed}"
+
+
+def _remark(story: RobotStory) -> str:
+    if story.faults:
+        return f"{', '.join(sorted(story.faults))} FAULTED"
+    return "done" if story.done else ""

@@ -1,0 +1,137 @@
+"""A mission in words: the verdict, the figures to remember, what happened when."""
+
+from typing import Any, NamedTuple
+
+from mauve_examples.mission.evidence import CoverageHistory
+from mauve_examples.mission.facts import MissionFacts
+from mauve_examples.mission.figure_style import core_changes, microseconds, short
+from mauve_examples.mission.summary import union_growth
+from mauve_examples.mission.swaps import Swap
+
+
+class Happening(NamedTuple):
+    """Something that happened at a mission time."""
+
+    time_s: float
+    text: str
+
+
+class KeyFigure(NamedTuple):
+    """One number, large."""
+
+    value: str
+    meaning: str
+
+
+def verdict(facts: MissionFacts, swaps: dict[str, list[Swap]], *, success: bool) -> str:
+    """Return one sentence about how it went."""
+    robots = f"{len(facts.robots)} robots" if len(facts.robots) != 1 else "One robot"
+    changed = sum(len(core_changes(found)) for found in swaps.values())
+    if success and facts.expected_swaps:
+        return (
+            f"{robots} lost their radio link, replaced the exploration algorithm in flight, carried on "
+            "alone, and went back to working together when the link returned."
+        )
+    if success:
+        return f"{robots} explored as planned; {changed} cores were replaced on the way."
+    return "The mission did not go as planned."
+
+
+def key_figures(
+    facts: MissionFacts, coverage: CoverageHistory, swaps: dict[str, list[Swap]]
+) -> list[KeyFigure]:
+    """Return the figures that tell most."""
+    every = [swap for found in swaps.values() for swap in found]
+    figures = [
+        KeyFigure(
+            f"{coverage.union[-1]:.1%}" if len(coverage.union) else "0 %", "of the reachable cells explored"
+        )
+    ]
+    if facts.link_down_ns:
+        figures.append(KeyFigure(f"+{union_growth(facts, coverage):.1%}", "explored while the link was down"))
+    figures.append(KeyFigure(str(len(every)), "live reconfigurations"))
+    if every:
+        longest_ns = max(swap.measured.blackout_ns for swap in every)
+        figures.append(KeyFigure(microseconds(longest_ns), "longest blackout of a component"))
+    measured = [swap.measured.missed_releases for swap in every]
+    if measured and None not in measured:
+        figures.append(KeyFigure(str(sum(count or 0 for count in measured)), "releases missed by them"))
+    figures.append(KeyFigure("yes" if facts.realtime["granted"] else "no", "real-time rights granted"))
+    return figures
+
+
+def overrun_figure(summary: dict[str, Any]) -> list[KeyFigure]:
+    """Return how many releases of all components came too late to be on time."""
+    components = [one for robot in summary["robots"].values() for one in robot["components"].values()]
+    overruns = sum(one["overruns"] for one in components)
+    releases = sum(one["releases"] for one in components)
+    return [KeyFigure(f"{overruns:,}", f"overruns in {releases:,} releases")]
+
+
+def cores_in_words(facts: MissionFacts, swaps: dict[str, list[Swap]]) -> list[str]:
+    """Return for each robot which core its exploration ran until when."""
+    lines = []
+    for robot, found in swaps.items():
+        changes = core_changes(found)
+        if not changes:
+            lines.append(f"{robot}: one core throughout.")
+            continue
+        spans = [
+            f"{short(swap.from_core)} until {facts.seconds(swap.measured.parked_ns):.1f} s"
+            for swap in changes
+        ]
+        lines.append(f"{robot}: {', '.join(spans)}, {short(changes[-1].to_core)} to the end.")
+    return lines
+
+
+def happenings(
+    facts: MissionFacts, coverage: CoverageHistory, swaps: dict[str, list[Swap]]
+) -> list[Happening]:
+    """Return what happened, by time."""
+    robots = ", ".join(facts.robots)
+    found = [Happening(0.0, f"The mission begins: {robots}, each in an executor of its own.")]
+    for begin_ns, end_ns in facts.link_down_ns:
+        begin_s, end_s = facts.seconds(begin_ns), facts.seconds(end_ns)
+        found.append(
+            Happening(
+                begin_s, f"The radio link is lost; {coverage.union_at(begin_s):.1%} are explored so far."
+            )
+        )
+        if end_ns < facts.ended_ns:
+            found.append(Happening(end_s, f"The link is back; {coverage.union_at(end_s):.1%} are explored."))
+    found += [
+        Happening(facts.seconds(swap.measured.parked_ns), swap_in_words(swap))
+        for one in swaps.values()
+        for swap in one
+    ]
+    end_s = facts.seconds(facts.ended_ns)
+    shares = ", ".join(
+        f"{robot} knows {values[-1]:.1%}" for robot, values in coverage.robots.items() if len(values)
+    )
+    found.append(Happening(end_s, f"The mission ends; {shares or 'nothing is known'}."))
+    return sorted(found, key=lambda one: one.time_s)
+
+
+def swap_in_words(swap: Swap) -> str:
+    """Return the story of one reconfiguration."""
+    one = swap.measured
+    what = f"is reconfigured ({one.what})"
+    if swap.to_core:
+        what = f"replaces {short(swap.from_core)} by {short(swap.to_core)}"
+    cause = f" ({swap.cause})" if swap.cause else ""
+    return f"{swap.robot} {what} in its component {one.component}{cause}: {', '.join(_costs(swap))}."
+
+
+def _costs(swap: Swap) -> list[str]:
+    one = swap.measured
+    costs = [f"parked for {microseconds(one.blackout_ns)}"]
+    if swap.prepare_us is not None:
+        costs.insert(0, f"prepared in {microseconds(swap.prepare_us * 1e3)} while the old core ran on")
+    if one.missed_releases is not None:
+        costs.append(f"{one.missed_releases or 'no'} release{'s' * (one.missed_releases > 1)} missed")
+    if one.phase_nominal_ns is not None and one.phase_actual_ns is not None:
+        off = microseconds(one.phase_nominal_ns)
+        grid = f"{off} off the grid" if one.phase_nominal_ns else "on the grid"
+        late = microseconds(one.phase_actual_ns - one.phase_nominal_ns)
+        costs.append(f"next release {grid}, woken {late} after it")
+    return costs

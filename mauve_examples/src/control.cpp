@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/control.hpp"
+
+namespace mauve_examples {
+
+bool ControlCore::configure_hook() {
+  controller_.reset();
+  return true;
+}
+
+void ControlCore::control() {
+  ControlOptions options;
+  options.max_speed_mps = shell().max_speed;
+  options.heading.proportional = shell().heading_gain;
+  options.distance.proportional = shell().distance_gain;
+  controller_.set_options(options);
+  const mauve::Sample<Pose2D> pose = shell().pose.read();
+  const mauve::Sample<Point> target = shell().target.read();
+  if (pose.status == mauve::DataStatus::none || target.status == mauve::DataStatus::none) {
+    shell().command.write({});
+    return;
+  }
+  shell().command.write(controller_.step(pose.value, target.value, static_cast<double>(period_ns()) * 1e-9));
+}
+
+void ControlFsm::define() {
+  mauve::State& control = execution("Control", "control", &ControlCore::control);
+  mauve::State& pause = wait("Pause", mauve::ms_to_ns(20));
+  set_initial(control);
+  next(control, pause);
+  next(pause, control);
+}
+
+}  // namespace mauve_examples

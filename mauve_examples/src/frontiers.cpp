@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/frontiers.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "mauve_examples/nearest_cell.hpp"
+
+namespace mauve_examples {
+
+namespace {
+
+constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int32_t kStraight = 5;
+constexpr std::int32_t kDiagonal = 7;
+// A robot pushed against a wall stands where it does not plan to go: the search starts from the nearest good cell.
+constexpr double kSnap_m = 0.8;
+
+constexpr std::uint8_t kOpen = 1;
+constexpr std::uint8_t kTaken = 2;
+
+}  // namespace
+
+void FrontierFinder::configure(const GridGeometry& geometry, const FrontierOptions& options) {
+  geometry_ = geometry;
+  options_ = options;
+  clearance_.configure(geometry, options.radius_m);
+  near_squared_ = clearance_.squared_cells(options.radius_m);
+  const std::size_t count = geometry.cell_count();
+  cost_.assign(count, kUnreached);
+  next_.assign(count, kNone);
+  previous_.assign(count, kNone);
+  members_.assign(count, 0);
+  stack_.assign(count, 0);
+  is_member_.assign(count, 0);
+  list_.clear();
+}
+
+const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, const Point& robot) noexcept {
+  cells_ = cells;
+  list_.clear();
+  for (std::size_t i = 0; i < member_count_; ++i) is_member_[members_[i]] = 0;
+  member_count_ = 0;
+  clearance_.compute(cells);
+  std::fill(cost_.begin(), cost_.end(), kUnreached);
+  const auto start = nearest_cell(geometry_, geometry_.cell_at(robot.x, robot.y), cells_of(geometry_, kSnap_m),
+                                  [this](Cell cell) { return passable(geometry_.index(cell)); });
+  if (!start) return list_;
+  flood(*start);
+  cluster();
+  return list_;
+}
+
+bool FrontierFinder::passable(std::size_t index) const noexcept {
+  return cells_[index] == kFree && clearance_.at_least(index, near_squared_);
+}
+
+bool FrontierFinder::beside_unknown(Cell cell) const noexcept {
+  // Unknown cells that touch walls are of no interest: no robot will ever stand there, whatever they hold.
+  const auto unknown = [this](Cell beside) {
+    if (!geometry_.contains(beside)) return false;
+    const std::size_t index = geometry_.index(beside);
+    return cells_[index] == kUnknown && clearance_.at_least(index, near_squared_);
+  };
+  return unknown({cell.column + 1, cell.row}) || unknown({cell.column - 1, cell.row}) ||
+         unknown({cell.column, cell.row + 1}) || unknown({cell.column, cell.row - 1});
+}
+
+void FrontierFinder::flood(Cell start) noexcept {
+  std::fill(std::begin(bucket_), std::end(bucket_), kNone);
+  const auto first = static_cast<std::uint32_t>(geometry_.index(start));
+  cost_[first] = 0;
+  next_[first] = previous_[first] = kNone;
+  bucket_[0] = first;
+  std::size_t empty_in_a_row = 0;
+  for (std::size_t turn = 0; empty_in_a_row < kBuckets; turn = (turn + 1) % kBuckets) {
+    ++empty_in_a_row;
+    while (bucket_[turn] != kNone) {
+      empty_in_a_row = 0;
+      const std::uint32_t index = bucket_[turn];
+      unlink(index);
+      const Cell cell = geometry_.cell(index);
+      if (beside_unknown(cell)) {
+        members_[member_count_++] = index;
+        is_member_[index] = kOpen;
+      }
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const Cell next{cell.column + dx, cell.row + dy};
+          if (!geometry_.contains(next)) continue;
+          const bool diagonal = dx != 0 && dy != 0;
+          if (diagonal && !(passable(geometry_.index({next.column, cell.row})) &&
+                            passable(geometry_.index({cell.column, next.row})))) {
+            continue;
+          }
+          relax(index, next, diagonal ? kDiagonal : kStraight);
+        }
+      }
+    }
+  }
+}
+
+void FrontierFinder::relax(std::uint32_t from, Cell next, std::int32_t step) noexcept {
+  const auto index = static_cast<std::uint32_t>(geometry_.index(next));
+  const std::int32_t cost = cost_[from] + step;
+  if (cost >= cost_[index] || !passable(index)) return;
+  if (cost_[index] != kUnreached) unlink(index);
+  cost_[index] = cost;
+  std::uint32_t& head = bucket_[static_cast<std::size_t>(cost) % kBuckets];
+  next_[index] = head;
+  previous_[index] = kNone;
+  if (head != kNone) previous_[head] = index;
+  head = index;
+}
+
+void FrontierFinder::unlink(std::uint32_t index) noexcept {
+  if (previous_[index] != kNone) {
+    next_[previous_[index]] = next_[index];
+  } else {
+    bucket_[static_cast<std::size_t>(cost_[index]) % kBuckets] = next_[index];
+  }
+  if (next_[index] != kNone) previous_[next_[index]] = previous_[index];
+}
+
+void FrontierFinder::cluster() noexcept {
+  for (std::size_t i = 0; i < member_count_; ++i) {
+    if (is_member_[members_[i]] != kOpen) continue;
+    const Frontier frontier = grow(members_[i]);
+    if (frontier.size_m >= options_.min_size_m) keep(frontier);
+  }
+}
+
+Frontier FrontierFinder::grow(std::uint32_t seed) noexcept {
+  const Cell origin = geometry_.cell(seed);
+  const int extent = cells_of(geometry_, options_.extent_m);
+  std::size_t size = 1;
+  stack_[0] = seed;
+  is_member_[seed] = kTaken;
+  double sum_column = 0.0;
+  double sum_row = 0.0;
+  // Breadth first: stack_[0, size) ends up as the whole stretch.
+  for (std::size_t done = 0; done < size; ++done) {
+    const Cell cell = geometry_.cell(stack_[done]);
+    sum_column += cell.column;
+    sum_row += cell.row;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const Cell next{cell.column + dx, cell.row + dy};
+        if (!geometry_.contains(next)) continue;
+        const auto index = static_cast<std::uint32_t>(geometry_.index(next));
+        const int across = next.column - origin.column;
+        const int along = next.row - origin.row;
+        if (is_member_[index] != kOpen || across * across + along * along > extent * extent) continue;
+        is_member_[index] = kTaken;
+        stack_[size++] = index;
+      }
+    }
+  }
+  // The member nearest to the middle stands for all.
+  const double mean_column = sum_column / static_cast<double>(size);
+  const double mean_row = sum_row / static_cast<double>(size);
+  std::uint32_t middle = seed;
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < size; ++i) {
+    const Cell cell = geometry_.cell(stack_[i]);
+    const double across = cell.column - mean_column;
+    const double along = cell.row - mean_row;
+    if (across * across + along * along >= best) continue;
+    best = across * across + along * along;
+    middle = stack_[i];
+  }
+  const double per_cost_m = geometry_.resolution_m / kStraight;
+  return {geometry_.centre(geometry_.cell(middle)), static_cast<double>(size) * geometry_.resolution_m,
+          static_cast<double>(cost_[middle]) * per_cost_m};
+}
+
+void FrontierFinder::keep(const Frontier& frontier) noexcept {
+  const auto worth = [this](const Frontier& f) { return f.cost_m - options_.size_gain * f.size_m; };
+  if (list_.full() && worth(frontier) >= worth(list_[list_.size() - 1])) return;
+  if (!list_.full()) list_.resize(list_.size() + 1);
+  std::size_t place = list_.size() - 1;
+  for (; place > 0 && worth(list_[place - 1]) > worth(frontier); --place) list_[place] = list_[place - 1];
+  list_[place] = frontier;
+}
+
+double FrontierFinder::cost_m(const Point& place) const noexcept {
+  const Cell cell = geometry_.cell_at(place.x, place.y);
+  if (!geometry_.contains(cell)) return std::numeric_limits<double>::infinity();
+  const std::int32_t cost = cost_[geometry_.index(cell)];
+  if (cost == kUnreached) return std::numeric_limits<double>::infinity();
+  return cost * geometry_.resolution_m / kStraight;
+}
+
+bool FrontierFinder::any_near(const Point& place, double reach_m) const noexcept {
+  const Cell centre = geometry_.cell_at(place.x, place.y);
+  return nearest_cell(geometry_, centre, cells_of(geometry_, reach_m), [this](Cell cell) {
+           return is_member_[geometry_.index(cell)] != 0;
+         }).has_value();
+}
+
+}  // namespace mauve_examples

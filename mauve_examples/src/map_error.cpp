@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/map_error.hpp"
+
+#include <algorithm>
+
+namespace mauve_examples {
+
+namespace {
+
+std::string one_line(const MapError::Detail& detail) {
+  std::string line = detail.what + ": " + detail.where + ": expected " + detail.expected + ", found " +
+                     detail.found + "; " + detail.remedy;
+  // File names and YAML values may hold control characters; the promise is one line.
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  return line;
+}
+
+}  // namespace
+
+MapError::MapError(const Detail& detail) : std::runtime_error(one_line(detail)) {}
+
+}  // namespace mauve_examples

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/map_file.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <string>
+
+#include "grey_image.hpp"
+
+namespace mauve_examples {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What the YAML file says.
+struct MapDescription {
+  fs::path image;
+  double resolution_m{0.0};
+  double origin_x_m{0.0};
+  double origin_y_m{0.0};
+  bool negate{false};
+  double occupied_threshold{0.65};
+  double free_threshold{0.25};
+};
+
+/// Reads the values of one map file; every complaint names the file, the line and the key.
+class MapYaml {
+ public:
+  explicit MapYaml(const fs::path& path) : path_(path) {
+    try {
+      root_ = YAML::LoadFile(path.string());
+    } catch (const YAML::Exception& error) {
+      throw MapError({"map file is no valid YAML", where(error.mark), "YAML as the ROS map server reads it", error.msg,
+                      "give the map's .yaml file, not its image"});
+    }
+    if (!root_.IsMap()) {
+      throw MapError({"map file holds no map description", where(root_.Mark()), "keys image, resolution, origin",
+                      "no keys at all", "give the .yaml file that map_saver wrote beside the image"});
+    }
+  }
+
+  MapDescription read() const {
+    MapDescription map;
+    const std::string mode = optional("mode") ? text(root_["mode"], "mode") : "trinary";
+    if (mode != "trinary") {
+      refuse("mode is not supported", root_["mode"], "mode: trinary", mode, "convert the map to trinary");
+    }
+    map.image = path_.parent_path() / text(required("image"), "image");
+    const YAML::Node resolution = required("resolution");
+    map.resolution_m = number(resolution, "resolution");
+    if (map.resolution_m < 0.001 || map.resolution_m > 10.0) {
+      refuse("resolution is out of range", resolution, "0.001 to 10 metres per cell", resolution.Scalar(),
+             "set the size of a cell, e.g. 0.05");
+    }
+    read_origin(map);
+    if (optional("negate")) map.negate = flag(root_["negate"]);
+    read_thresholds(map);
+    return map;
+  }
+
+ private:
+  void read_origin(MapDescription& map) const {
+    const YAML::Node origin = required("origin");
+    if (!origin.IsSequence() || origin.size() < 2 || origin.size() > 3) {
+      refuse("origin is no pose", origin, "[x, y, yaw] in m, m, rad", "something else", "write e.g. [-10.0, -10.0, 0]");
+    }
+    map.origin_x_m = number(origin[0], "origin x");
+    map.origin_y_m = number(origin[1], "origin y");
+    const double yaw_rad = origin.size() == 3 ? number(origin[2], "origin yaw") : 0.0;
+    if (yaw_rad != 0.0) {
+      refuse("a turned map is not supported", origin, "origin yaw 0", origin[2].Scalar(),
+             "turn the image and set the yaw to 0");
+    }
+  }
+
+  void read_thresholds(MapDescription& map) const {
+    if (optional("occupied_thresh")) map.occupied_threshold = number(root_["occupied_thresh"], "occupied_thresh");
+    if (optional("free_thresh")) map.free_threshold = number(root_["free_thresh"], "free_thresh");
+    if (!(0.0 <= map.free_threshold && map.free_threshold < map.occupied_threshold && map.occupied_threshold <= 1.0)) {
+      const YAML::Node at = optional("free_thresh") ? root_["free_thresh"] : root_["occupied_thresh"];
+      refuse("thresholds are out of order", at, "0 <= free_thresh < occupied_thresh <= 1",
+             "free_thresh " + std::to_string(map.free_threshold) + ", occupied_thresh " +
+                 std::to_string(map.occupied_threshold),
+             "usual values are 0.25 and 0.65");
+    }
+  }
+
+  bool optional(const char* key) const { return root_[key].IsDefined(); }
+
+  YAML::Node required(const char* key) const {
+    if (!root_[key].IsDefined()) {
+      refuse("map file is incomplete", root_, std::string("key ") + key, "none", "add it");
+    }
+    return root_[key];
+  }
+
+  std::string text(const YAML::Node& node, const char* key) const {
+    if (!node.IsScalar() || node.Scalar().empty()) {
+      refuse(std::string(key) + " is no text", node, "one word or path", "something else", "correct the value");
+    }
+    return node.Scalar();
+  }
+
+  double number(const YAML::Node& node, const char* key) const {
+    double value = 0.0;
+    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
+      refuse(std::string(key) + " is no number", node, "a finite number",
+             node.IsScalar() ? "'" + node.Scalar() + "'" : "something else", "correct the value");
+    }
+    return value;
+  }
+
+  bool flag(const YAML::Node& node) const {
+    const std::string word = node.IsScalar() ? node.Scalar() : "something else";
+    if (word == "0" || word == "false") return false;
+    if (word == "1" || word == "true") return true;
+    refuse("negate is no switch", node, "0 or 1", word, "correct the value");
+  }
+
+  std::string where(const YAML::Mark& mark) const {
+    return mark.is_null() ? path_.string() : path_.string() + ":" + std::to_string(mark.line + 1);
+  }
+
+  [[noreturn]] void refuse(const std::string& what, const YAML::Node& at, const std::string& expected,
+                           const std::string& found, const std::string& remedy) const {
+    throw MapError({what, where(at.IsDefined() ? at.Mark() : YAML::Mark::null_mark()), expected, found, remedy});
+  }
+
+  fs::path path_;
+  YAML::Node root_;
+};
+
+void require_file(const fs::path& path, const char* what) {
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    throw MapError({std::string(what) + " does not exist", path.string(), "a file", "none", "check the path"});
+  }
+  if (!fs::is_regular_file(path, error) || !std::ifstream(path)) {
+    throw MapError({std::string(what) + " cannot be opened", path.string(), "a readable file",
+                    "a folder or a file without read permission", "check the path and its permissions"});
+  }
+}
+
+GreyImage read_image(const fs::path& path) {
+  require_file(path, "map image");
+  std::array<char, 8> magic{};
+  std::ifstream(path, std::ios::binary).read(magic.data(), magic.size());
+  if (magic[0] == 'P' && (magic[1] == '2' || magic[1] == '5')) return read_pgm(path);
+  if (std::equal(magic.begin(), magic.begin() + 4, "\x89PNG")) return read_png(path);
+  throw MapError({"map image has another format", path.string(), "PGM (P2 or P5) or PNG", "neither's first bytes",
+                  "convert the image to PGM or PNG"});
+}
+
+}  // namespace
+
+void check_image_size(const fs::path& path, unsigned long long width, unsigned long long height) {
+  if (width == 0 || height == 0 || width > kMaxMapCells || height > kMaxMapCells || width * height > kMaxMapCells) {
+    throw MapError({"map image has an unusable size", path.string(), "1 to " + std::to_string(kMaxMapCells) + " cells",
+                    std::to_string(width) + " x " + std::to_string(height), "crop the map or lower its resolution"});
+  }
+}
+
+GridMap load_map(const fs::path& yaml_path) {
+  require_file(yaml_path, "map file");
+  const MapDescription description = MapYaml(yaml_path).read();
+  const GreyImage image = read_image(description.image);
+
+  GridMap map;
+  map.width = image.width;
+  map.height = image.height;
+  map.resolution_m = description.resolution_m;
+  map.origin_x_m = description.origin_x_m;
+  map.origin_y_m = description.origin_y_m;
+  map.cells.resize(map.cell_count(), kUnknown);
+  for (std::size_t i = 0; i < image.shades.size(); ++i) {
+    const double occupancy = description.negate ? image.shades[i] : 1.0 - image.shades[i];
+    const Cell from_top = map.cell(i);
+    const std::size_t flipped = map.index({from_top.column, map.height - 1 - from_top.row});
+    if (occupancy > description.occupied_threshold) {
+      map.cells[flipped] = kOccupied;
+    } else if (occupancy < description.free_threshold) {
+      map.cells[flipped] = kFree;
+    }
+  }
+  if (std::find(map.cells.begin(), map.cells.end(), kFree) == map.cells.end()) {
+    throw MapError({"map has no free space", description.image.string(),
+                    "pixels brighter than free_thresh allows", "none",
+                    "check free_thresh and negate in " + yaml_path.string()});
+  }
+  return map;
+}
+
+}  // namespace mauve_examples

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/mapping.hpp"
+
+#include "mauve_examples/map_file.hpp"
+#include "mauve_examples/scan_integration.hpp"
+
+namespace mauve_examples {
+
+bool MappingCore::configure_hook() {
+  const GridMap world = load_map(shell().map.value());
+  shell().map_update([&world](OccupancyGrid& map) { map.configure(world); });
+  scan_ = std::make_unique<Scan>();
+  update_ = std::make_unique<MapUpdate>();
+  update_->resolution_m = world.resolution_m;
+  update_->origin_x_m = world.origin_x_m;
+  update_->origin_y_m = world.origin_y_m;
+  update_->columns = static_cast<std::uint16_t>(world.tile_columns());
+  update_->rows = static_cast<std::uint16_t>(world.tile_rows());
+  told_.assign(world.tile_count(), 0);
+  next_tile_ = 0;
+  return true;
+}
+
+void MappingCore::integrate() {
+  const mauve::Sample<Pose2D> pose = shell().pose.read();
+  mauve::time_ns_t scan_time_ns = 0;
+  const mauve::DataStatus status = shell().scan.read(*scan_, &scan_time_ns);
+  // Equal writer's times: the scan was taken at this pose, and not at the one before or after.
+  const bool belong_together = status == mauve::DataStatus::new_data && pose.time_ns == scan_time_ns;
+  shell().map_update([&](OccupancyGrid& map) {
+    if (belong_together) integrate_scan(*scan_, pose.value, map);
+    collect_changes(map);
+  });
+  if (update_->tiles.empty()) return;
+  update_->stamp_ns = clock_ns();
+  if (shell().map_updates.write(*update_)) {
+    for (const MapTile& tile : update_->tiles) {
+      told_[static_cast<std::size_t>(tile.row) * update_->columns + tile.column] = tile.revision;
+    }
+  }
+}
+
+void MappingCore::collect_changes(const OccupancyGrid& map) {
+  update_->tiles.clear();
+  for (std::size_t looked = 0; looked < told_.size() && !update_->tiles.full(); ++looked) {
+    const std::size_t tile = next_tile_;
+    next_tile_ = (next_tile_ + 1) % told_.size();
+    if (map.revision(tile) == told_[tile]) continue;
+    update_->tiles.resize(update_->tiles.size() + 1);
+    map.copy_tile(tile, update_->tiles[update_->tiles.size() - 1]);
+  }
+}
+
+void MappingFsm::define() {
+  mauve::State& integrate = execution("Integrate", "integrate", &MappingCore::integrate);
+  mauve::State& pause = wait("Pause", mauve::ms_to_ns(100));
+  set_initial(integrate);
+  next(integrate, pause);
+  next(pause, integrate);
+}
+
+}  // namespace mauve_examples

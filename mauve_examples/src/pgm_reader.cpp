@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// PGM, plain (P2) and raw (P5). Format: netpbm's pgm(5).
+#include <cctype>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+
+#include "grey_image.hpp"
+#include "mauve_examples/map_file.hpp"
+
+namespace mauve_examples {
+
+namespace {
+
+/// Reads the whitespace-separated words of a PGM file; a '#' starts a comment that ends with the line.
+class PgmWords {
+ public:
+  PgmWords(const std::filesystem::path& path, const std::string& bytes) : path_(path), bytes_(bytes) {}
+
+  /// The next number; a word that is none, or a missing one, is an error.
+  unsigned long long number(const std::string& what, unsigned long long limit) {
+    const std::optional<char> first = skip_to_word();
+    if (!first) truncated(what);
+    unsigned long long value = 0;
+    const std::size_t start = position_;
+    while (position_ < bytes_.size() && std::isdigit(static_cast<unsigned char>(bytes_[position_])) != 0) {
+      value = value * 10 + static_cast<unsigned long long>(bytes_[position_++] - '0');
+      if (value > limit) refuse(what, "at most " + std::to_string(limit), "more");
+    }
+    if (position_ == start) refuse(what, "a number", std::string("'") + *first + "'");
+    return value;
+  }
+
+  /// Skips the one whitespace character that ends a raw file's header.
+  void end_header() {
+    if (position_ >= bytes_.size()) truncated("pixels");
+    if (std::isspace(static_cast<unsigned char>(bytes_[position_])) == 0) {
+      refuse("end of the header", "one whitespace character", std::string("'") + bytes_[position_] + "'");
+    }
+    ++position_;
+  }
+
+  std::size_t position() const { return position_; }
+
+  [[noreturn]] void truncated(const std::string& what) const {
+    throw MapError({"map image is truncated", path_.string(), what, "end of file after " + std::to_string(bytes_.size()) + " bytes",
+                    "copy or write the image again"});
+  }
+
+ private:
+  std::optional<char> skip_to_word() {
+    while (position_ < bytes_.size()) {
+      const char c = bytes_[position_];
+      if (c == '#') {
+        position_ = std::min(bytes_.find('\n', position_), bytes_.size());
+      } else if (std::isspace(static_cast<unsigned char>(c)) != 0) {
+        ++position_;
+      } else {
+        return c;
+      }
+    }
+    return std::nullopt;
+  }
+
+  [[noreturn]] void refuse(const std::string& what, const std::string& expected, const std::string& found) const {
+    throw MapError({"map image is no valid PGM", path_.string(), what + " to be " + expected, found,
+                    "save the image as an 8 bit PGM or as a PNG"});
+  }
+
+  const std::filesystem::path& path_;
+  const std::string& bytes_;
+  std::size_t position_{2};  // after the magic number
+};
+
+}  // namespace
+
+GreyImage read_pgm(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const bool raw = bytes.starts_with("P5");
+  PgmWords words(path, bytes);
+  const auto width = words.number("width", 1'000'000);
+  const auto height = words.number("height", 1'000'000);
+  check_image_size(path, width, height);
+  const auto white = words.number("maximum value", 65'535);
+  if (white == 0 || white > 255) {
+    throw MapError({"map image has another depth", path.string(), "a maximum value of 1 to 255", std::to_string(white),
+                    "save the image with 8 bits a pixel"});
+  }
+
+  GreyImage image{static_cast<int>(width), static_cast<int>(height), {}};
+  const std::size_t pixels = width * height;
+  image.shades.reserve(pixels);
+  if (raw) {
+    words.end_header();
+    if (bytes.size() - words.position() < pixels) words.truncated(std::to_string(pixels) + " bytes of pixels");
+  }
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const auto value = raw ? static_cast<unsigned char>(bytes[words.position() + i])
+                           : words.number("pixel " + std::to_string(i), white);
+    if (value > white) {
+      throw MapError({"map image is no valid PGM", path.string(), "pixels of at most " + std::to_string(white),
+                      std::to_string(value), "save the image again"});
+    }
+    image.shades.push_back(static_cast<double>(value) / static_cast<double>(white));
+  }
+  return image;
+}
+
+}  // namespace mauve_examples

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_examples/robot.hpp"
+
+#include "mauve_examples/disc_collision.hpp"
+#include "mauve_examples/ray_caster.hpp"
+
+namespace mauve_examples {
+
+bool RobotCore::configure_hook() {
+  world_ = load_map(shell().map.value());
+  body_ = {.pose = {shell().start_x, shell().start_y, shell().start_yaw},
+           .speed_mps = 0.0,
+           .turn_rate_radps = 0.0};
+  if (disc_collides(world_, body_.pose.x, body_.pose.y, shell().radius)) {
+    throw mauve::Error(
+        mauve::ErrorCode::configure_failed, "the robot does not fit where it starts",
+        {.element = "properties start_x, start_y",
+         .expected = "a place free for a disc of " + std::to_string(shell().radius.value()) + " m",
+         .found = "(" + std::to_string(body_.pose.x) + ", " + std::to_string(body_.pose.y) + ") in " +
+                  shell().map.value(),
+         .remedy = "start it elsewhere"});
+  }
+  scan_ = std::make_unique<Scan>();
+  (void)beam_table();  // computed at its first use, which is not to be in real time
+  collisions_ = 0;
+  collision_mark_ = mauve::TraceNames::intern("collision");
+  return true;
+}
+
+Twist RobotCore::command_in_force() const {
+  const mauve::Sample<Twist> sample = shell().command.read();
+  const auto timeout_ns = static_cast<mauve::time_ns_t>(shell().command_timeout * 1e9);
+  return sample.status != mauve::DataStatus::none && sample.age_ns(clock_ns()) <= timeout_ns ? sample.value
+                                                                                             : Twist{};
+}
+
+void RobotCore::move() {
+  limits_.speed_mps = shell().max_speed;
+  Unicycle next = body_;
+  next.step(command_in_force(), limits_, static_cast<double>(period_ns()) * 1e-9);
+  if (disc_collides(world_, next.pose.x, next.pose.y, shell().radius)) {
+    next.pose.x = body_.pose.x;  // turning on the spot is always possible for a disc
+    next.pose.y = body_.pose.y;
+    next.speed_mps = 0.0;
+    mauve::trace_mark(collision_mark_, ++collisions_);
+  }
+  body_ = next;
+  shell().pose.write(body_.pose);
+}
+
+void RobotCore::sense() {
+  range_scan(world_, body_.pose, static_cast<float>(shell().max_range.value()), *scan_);
+  shell().scan.write(*scan_);
+}
+
+void RobotFsm::define() {
+  mauve::State& move = execution("Move", "move", &RobotCore::move);
+  mauve::State& sense = execution("Sense", "sense", &RobotCore::sense);
+  mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
+  set_initial(move);
+  next(move, sense);
+  next(sense, pause);
+  next(pause, move);
+}
+
+}  // namespace mauve_examples

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Who takes which frontier, and what is said about it: peers, batches of tiles, bids, rounds.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "mauve_examples/explorer.hpp"
+#include "test_maps.hpp"
+
+namespace mauve_examples {
+namespace {
+
+PeerMessage from(const char* sender, std::uint32_t sequence, std::uint32_t round = 0) {
+  PeerMessage message;
+  message.sender = RobotName(sender);
+  message.sequence = sequence;
+  message.round = round;
+  return message;
+}
+
+PeerMessage acking(PeerMessage message, const char* peer, std::uint32_t sequence, std::uint32_t round, std::uint32_t batch = 0) {
+  message.acks.push_back({RobotName(peer), sequence, round, batch});
+  return message;
+}
+
+TEST(PeerTable, OnlyAnAnswerToTheVeryRoundCounts) {
+  PeerTable peers;
+  peers.configure("a", {"b", "c"});
+  EXPECT_FALSE(peers.all_answered(1));
+  peers.receive(acking(from("b", 1), "a", 3, 2), 5);
+  peers.receive(acking(from("c", 1), "a", 3, 1), 5);
+  EXPECT_TRUE(peers.all_answered(1));
+  EXPECT_FALSE(peers.all_answered(2));
+  peers.receive(acking(from("c", 2), "a", 4, 2), 5);
+  EXPECT_TRUE(peers.all_answered(2));
+}
+
+TEST(PeerTable, AnswersToSomebodyElseDoNotCount) {
+  PeerTable peers;
+  peers.configure("a", {"b"});
+  peers.receive(acking(from("b", 1), "c", 3, 9), 5);
+  EXPECT_FALSE(peers.all_answered(1));
+}
+
+TEST(PeerTable, TellsRestartedPeersAndAnswersToAnEarlierLife) {
+  PeerTable peers;
+  peers.configure("a", {"b"});
+  using Received = PeerTable::Received;
+  EXPECT_EQ(peers.receive(from("b", 7, 4), 5), Received::news);
+  EXPECT_EQ(peers.receive(from("b", 7, 4), 5), Received::repeated);
+  EXPECT_EQ(peers.receive(from("x", 1), 5), Received::stranger);
+  EXPECT_EQ(peers.receive(from("b", 1, 1), 5), Received::restarted);
+  EXPECT_EQ(peers.find("b")->highest_round, 1U);
+  peers.receive(acking(from("b", 2), "a", 900, 50), 5);  // this robot has only sent 5 messages
+  EXPECT_FALSE(peers.all_answered(1));
+}
+
+TEST(PeerTable, AloneEverybodyHasAnswered) {
+  PeerTable peers;
+  peers.configure("a", {});
+  EXPECT_TRUE(peers.all_answered(1));
+}
+
+TEST(TileSender, ABatchStaysUnderWayUnchangedUntilAllHaveIt) {
+  OccupancyGrid own;
+  own.configure({160, 160, 1.0, 0.0, 0.0});
+  MergedMap map;
+  map.configure(own.geometry());
+  for (int i = 0; i < 100; ++i) own.observe_free({i % 10 * 16, i / 10 * 16});
+  map.refresh(own);
+  TileSender sender;
+  sender.configure(map.tile_count());
+  sender.start(map);
+  EXPECT_EQ(sender.batch(), 1U);
+  ASSERT_EQ(sender.tiles().size(), kMaxTilesPerMessage);
+  const MapTile first = sender.tiles()[0];
+  own.observe_free({first.column * 16 + 1, first.row * 16});
+  map.refresh(own);
+  sender.start(map);
+  EXPECT_EQ(sender.tiles()[0].revision, first.revision);
+  sender.confirm();
+  sender.start(map);
+  EXPECT_EQ(sender.batch(), 2U);
+  EXPECT_EQ(sender.tiles().size(), 37U);  // the other 36 and the one that changed meanwhile
+  sender.confirm();
+  sender.start(map);
+  EXPECT_EQ(sender.batch(), 0U);
+  sender.forget();
+  sender.start(map);
+  EXPECT_EQ(sender.batch(), 3U);
+}
+
+FrontierList frontiers(std::initializer_list<Frontier> list) {
+  FrontierList result;
+  for (const Frontier& frontier : list) result.push_back(frontier);
+  return result;
+}
+
+PeerMessage bidding(PeerMessage message, std::initializer_list<Bid> bids) {
+  for (const Bid& bid : bids) message.bids.push_back(bid);
+  return message;
+}
+
+TEST(Auction, TheLowerBidWinsAContestedFrontier) {
+  const FrontierList own = frontiers({{{0.0, 0.0, 0.0}, 1.0, 4.0}, {{50.0, 0.0, 0.0}, 1.0, 30.0}});
+  PeerTable peers;
+  peers.configure("b", {"a"});
+  peers.receive(bidding(from("a", 1, 1), {{0.5, 0.0, 3.0}, {50.5, 0.0, 31.0}}), 0);
+  EXPECT_EQ(bid_together(own, peers, {}), 1U);
+  peers.receive(bidding(from("a", 2, 1), {{0.5, 0.0, 5.0}, {50.5, 0.0, 31.0}}), 0);
+  EXPECT_EQ(bid_together(own, peers, {}), 0U);
+}
+
+TEST(Auction, EqualBidsGoByName) {
+  const FrontierList own = frontiers({{{0.0, 0.0, 0.0}, 1.0, 4.0}, {{50.0, 0.0, 0.0}, 1.0, 30.0}});
+  PeerTable peers;
+  peers.configure("b", {"a"});
+  peers.receive(bidding(from("a", 1, 1), {{0.0, 0.0, 4.0}}), 0);
+  EXPECT_EQ(bid_together(own, peers, {}), 1U);
+  peers.configure("b", {"c"});
+  peers.receive(bidding(from("c", 1, 1), {{0.0, 0.0, 4.0}}), 0);
+  EXPECT_EQ(bid_together(own, peers, {}), 0U);
+}
+
+TEST(Auction, ClaimsAreRespectedUnlessOneIsMuchNearer) {
+  PeerTable peers;
+  peers.configure("a", {"b"});
+  PeerMessage message = from("b", 1);
+  message.has_claim = true;
+  message.claim = {0.5, 0.0, 10.0};
+  peers.receive(message, 0);
+  EXPECT_EQ(bid_together(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}}), peers, {}), std::nullopt);
+  EXPECT_EQ(bid_together(frontiers({{{0.0, 0.0, 0.0}, 1.0, 4.0}}), peers, {}), 0U);
+  EXPECT_TRUE(is_undercut({0.0, 0.0, 21.0}, peers, {}));
+  EXPECT_FALSE(is_undercut({0.0, 0.0, 19.0}, peers, {}));
+  EXPECT_FALSE(is_undercut({9.0, 0.0, 21.0}, peers, {}));
+}
+
+TEST(Auction, AloneTheCheapestAwayFromLastClaimsIsTaken) {
+  PeerTable peers;
+  peers.configure("a", {"b"});
+  PeerMessage message = from("b", 1);
+  message.has_claim = true;
+  message.claim = {0.0, 0.0, 1.0};
+  peers.receive(message, 0);
+  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 9.0}}), peers, {}), 1U);
+  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 19.0}}), peers, {}), 0U);
+  EXPECT_EQ(choose_alone({}, peers, {}), std::nullopt);
+}
+
+/// Two robots at the ends of a corridor that both see half of.
+class Rounds : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    truth_.width = 200;
+    truth_.height = 20;
+    truth_.resolution_m = 0.1;
+    map_.configure(truth_);
+    for (int column = 50; column < 150; ++column) {
+      for (int row = 0; row < 20; ++row) map_.observe_free({column, row});
+    }
+    explorer_.configure(truth_, "a", {"b"}, {});
+    explorer_.refresh(map_);
+  }
+  PeerMessage& compose() {
+    explorer_.compose(*message_);
+    return *message_;
+  }
+
+  GridGeometry truth_;
+  OccupancyGrid map_;
+  Explorer explorer_;
+  std::unique_ptr<PeerMessage> message_ = std::make_unique<PeerMessage>();
+  Pose2D pose_{7.0, 1.0, 0.0};
+};
+
+TEST_F(Rounds, NoGoalIsTakenBeforeThePeerHasAnswered) {
+  for (std::int64_t tick = 0; tick < 100; ++tick) {
+    explorer_.look(pose_, tick);
+    EXPECT_FALSE(explorer_.decide_together(tick));
+    EXPECT_EQ(compose().round, 1U);
+    EXPECT_FALSE(message_->bids.empty());
+    explorer_.receive(acking(from("b", static_cast<std::uint32_t>(tick) + 1), "a", 1, 0));  // it heard an earlier message
+  }
+  explorer_.receive(acking(from("b", 200), "a", 50, 1));
+  explorer_.look(pose_, 100);
+  EXPECT_TRUE(explorer_.decide_together(100));
+  EXPECT_NEAR(explorer_.destination().x, 5.05, 0.1);  // the nearer end
+  EXPECT_EQ(compose().round, 0U);
+  EXPECT_TRUE(message_->has_claim);
+  EXPECT_NEAR(message_->claim.cost_m, 2.0, 0.5);
+}
+
+TEST_F(Rounds, TwoOpenRoundsAnswerEachOther) {
+  Explorer other;
+  other.configure(truth_, "b", {"a"}, {});
+  other.refresh(map_);
+  auto theirs = std::make_unique<PeerMessage>();
+  bool mine_taken = false;
+  bool theirs_taken = false;
+  for (std::int64_t tick = 0; tick < 3; ++tick) {
+    explorer_.look(pose_, tick);
+    mine_taken |= explorer_.decide_together(tick);
+    other.look({13.0, 1.0, 0.0}, tick);
+    theirs_taken |= other.decide_together(tick);
+    compose();
+    other.compose(*theirs);
+    explorer_.receive(*theirs);
+    other.receive(*message_);
+  }
+  EXPECT_TRUE(mine_taken);
+  EXPECT_TRUE(theirs_taken);
+  EXPECT_NEAR(explorer_.destination().x, 5.05, 0.1);
+  EXPECT_NEAR(other.destination().x, 14.95, 0.1);
+}
+
+TEST_F(Rounds, ARobotWithNothingLeftStillAnswers) {
+  const GridMap known = load_map(testing::own_map("arena"));
+  Explorer idle;
+  idle.configure(known, "b", {"a"}, {});
+  idle.receive(from("a", 1, 17));
+  idle.look({-4.0, -4.0, 0.0}, 0);
+  EXPECT_TRUE(idle.done());
+  EXPECT_FALSE(idle.decide_together(0));
+  idle.compose(*message_);
+  EXPECT_EQ(message_->round, 0U);
+  ASSERT_EQ(message_->acks.size(), 1U);
+  EXPECT_EQ(message_->acks[0].round, 17U);
+}
+
+TEST_F(Rounds, TilesArriveAndAreAcknowledged) {
+  Explorer other;
+  other.configure(truth_, "b", {"a"}, {});
+  explorer_.look(pose_, 0);
+  compose();
+  ASSERT_EQ(message_->map_batch, 1U);
+  other.receive(*message_);
+  EXPECT_EQ(other.map().cells()[truth_.index({100, 10})], kFree);
+  auto answer = std::make_unique<PeerMessage>();
+  other.compose(*answer);
+  EXPECT_EQ(answer->acks[0].map_batch, 1U);
+  EXPECT_EQ(answer->map_batch, 0U);  // it has seen nothing itself
+  explorer_.receive(*answer);
+  EXPECT_EQ(compose().map_batch, 0U);
+}
+
+TEST_F(Rounds, TilesOfAnotherGridAreAcknowledgedButNotMerged) {
+  GridGeometry shifted = truth_;
+  shifted.origin_x_m = 1.0;
+  Explorer other;
+  other.configure(shifted, "b", {"a"}, {});
+  explorer_.look(pose_, 0);
+  other.receive(compose());
+  EXPECT_EQ(other.map().cells()[truth_.index({100, 10})], kUnknown);
+  EXPECT_EQ(other.peers().peers()[0].merged_batch, 1U);
+}
+
+TEST_F(Rounds, AGoalWithoutProgressIsGivenUpForAWhile) {
+  explorer_.configure(truth_, "a", {}, {});
+  explorer_.refresh(map_);
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  explorer_.look(pose_, 0);
+  ASSERT_TRUE(explorer_.decide_together(0));
+  const Point first = explorer_.destination();
+  for (std::int64_t t = 1; t < 10; ++t) {
+    explorer_.look(pose_, t * kSecond_ns);
+    EXPECT_FALSE(explorer_.decide_together(t * kSecond_ns)) << t;
+  }
+  explorer_.look(pose_, 10 * kSecond_ns);
+  EXPECT_FALSE(explorer_.goal().active());
+  EXPECT_TRUE(explorer_.decide_together(10 * kSecond_ns));
+  EXPECT_GT(distance_m(explorer_.destination(), first), 5.0);
+}
+
+TEST_F(Rounds, AnExploredGoalIsDropped) {
+  explorer_.configure(truth_, "a", {}, {});
+  explorer_.refresh(map_);
+  explorer_.look(pose_, 0);
+  ASSERT_TRUE(explorer_.decide_alone(0));
+  for (int column = 0; column < 50; ++column) {
+    for (int row = 0; row < 20; ++row) map_.observe_free({column, row});
+  }
+  explorer_.refresh(map_);
+  explorer_.look(pose_, 1);
+  EXPECT_FALSE(explorer_.goal().active());
+}
+
+}  // namespace
+}  // namespace mauve_examples

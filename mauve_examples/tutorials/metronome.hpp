@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A first component, a metronome: shell, core and fsm. A tick every millisecond, a beat every hundred ticks.
+#pragma once
+
+#include <mauve_rt/mauve_rt.hpp>
+
+namespace mauve_tutorials {
+
+struct Beat {
+  double number{};
+};
+
+}  // namespace mauve_tutorials
+
+// The type's identity and its fields, in the order of the ROS message.
+MAUVE_TYPE(mauve_tutorials::Beat, "std_msgs/msg/Float64", number)
+
+namespace mauve_tutorials {
+
+/// The shell: what others see of the component.
+struct MetronomeShell : mauve::Shell {
+  mauve::Property<std::int64_t>& period_us = property(
+      "period_us", 1000, {.unit = "us", .description = "from tick to tick", .minimum = 100, .maximum = 1e6});
+  mauve::Property<std::int64_t>& ticks_per_beat =
+      property("ticks_per_beat", 100, {.unit = "1", .description = "from beat to beat", .minimum = 1});
+  mauve::WritePort<Beat>& beat = write_port<Beat>("beat");
+};
+
+/// The core: data and algorithms, one method for each action and guard of the fsm.
+class Metronome : public mauve::Core<MetronomeShell> {
+ public:
+  void tick() { ++ticks_; }
+  virtual bool is_beat_due() const { return ticks_ >= shell().ticks_per_beat; }
+  void beat() {
+    ticks_ = 0;
+    shell().beat.write({.number = static_cast<double>(++beats_)});
+  }
+
+  /// Replacing another metronome while it runs, this one goes on counting where that one was.
+  void take(mauve::CoreBase& old) noexcept override {
+    if (const auto* metronome = dynamic_cast<const Metronome*>(&old)) {
+      ticks_ = metronome->ticks_;
+      beats_ = metronome->beats_;
+    }
+  }
+
+ protected:
+  std::int64_t ticks() const noexcept { return ticks_; }
+  std::int64_t beats() const noexcept { return beats_; }
+
+ private:
+  std::int64_t ticks_{0};  // since the last beat
+  std::int64_t beats_{0};
+};
+
+/// The fsm: when the core's methods run. Only `wait` lets time pass.
+struct MetronomeFsm : mauve::Fsm<MetronomeShell, Metronome> {
+  void define() override {
+    mauve::State& tick = execution("Tick", "tick", &Metronome::tick);
+    mauve::State& beat = execution("Beat", "beat", &Metronome::beat);
+    mauve::State& rest = wait("Rest", mauve::us_to_ns(shell().period_us));
+    set_initial(tick);
+    transition(tick, "is_beat_due", &Metronome::is_beat_due, beat);
+    next(tick, rest);
+    next(beat, rest);
+    next(rest, tick);
+  }
+};
+
+}  // namespace mauve_tutorials

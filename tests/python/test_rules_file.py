@@ -1,0 +1,97 @@
+from pathlib import Path
+
+import pytest
+
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model.rules import RulesFile
+
+GOOD = """\
+mauve: 1
+executor: executor
+rules:
+  - name: link_lost
+    when: {silence: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 1}}
+    do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
+    undo:
+      for_s: 3.0
+      do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]
+"""
+
+
+def load(folder: Path, text: str) -> RulesFile:
+    path = folder / "rules.yaml"
+    path.write_text(text, encoding="utf-8")
+    return RulesFile(path)
+
+
+def test_a_rule_with_its_defaults(tmp_path: Path):
+    rules = load(tmp_path, GOOD).rules
+    rule = rules.rules[0]
+    assert rules.executor == "executor"
+    assert rule.when.silence.longer_than_s == 1.0
+    assert (rule.for_s, rule.cooldown_s) == (0.0, 0.0)
+    assert rule.undo is not None
+    assert rule.undo.for_s == 3.0
+    assert rule.targets() == {"exploration"}
+
+
+def test_a_scalar_value_becomes_yaml_text(tmp_path: Path):
+    step = "{kind: set_property, target: mapping, name: range, value: 2.5}"
+    text = GOOD.replace(
+        "{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}", step
+    )
+    assert load(tmp_path, text).rules.rules[0].do[0].value == "2.5"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "word"),
+    [
+        ("mauve: 1", "mauve: 2", "1:8", "mauve"),
+        ("longer_than_s: 1", "longer_than_s: 0", "5:88", "greater than 0"),
+        ("longer_than_s: 1", "longer_than_s: .nan", "5:88", "finite"),
+        ("longer_than_s: 1", "longer_than_s: fast", "5:88", "'fast'"),
+        ("silence:", "noise:", "5:5", "silence"),
+        ("type: mauve_msgs/msg/PeerMessage", "type: PeerMessage", "5:45", "type"),
+        ("topic: radio/in", "topic: radio//in", "5:29", "a ROS name"),
+        ("do: [{kind: replace_core", "do: [{kind: explode", "6:17", "'explode'"),
+        (", name: mauve_examples/LocalExploration", "", "6:10", "needs a name"),
+        ("for_s: 3.0", "for_s: -1", "8:14", "greater than or equal to 0"),
+        ("    undo:", "    cooldown: 1\n    undo:", "7:5", "cooldown"),
+        ("- name: link_lost", "- name: link lost", "4:11", "link lost"),
+        ("mauve: 1", "mauve: 1\nmauve: 1", "2:1", "twice"),
+        ("undo:", "undo: [", "", "not YAML"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line_that_points_at_the_place(
+    tmp_path: Path, old: str, new: str, place: str, word: str
+):
+    assert old in GOOD
+    with pytest.raises(ArchitectureFileError) as caught:
+        load(tmp_path, GOOD.replace(old, new, 1))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(f"{tmp_path / 'rules.yaml'}:{place}")
+    assert word in line
+
+
+@pytest.mark.parametrize("text", ["", "[]", "just words", "rules: []\nmauve: 1"])
+def test_what_is_no_rules_file_is_refused(tmp_path: Path, text: str):
+    with pytest.raises(ArchitectureFileError) as caught:
+        load(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_rules_of_one_name_are_refused(tmp_path: Path):
+    second = GOOD[GOOD.index("  - name") :]
+    with pytest.raises(ArchitectureFileError, match=r"rules.yaml:10:11: a second rule named 'link_lost'"):
+        load(tmp_path, GOOD + second)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path):
+    with pytest.raises(ArchitectureFileError, match="No such file"):
+        RulesFile(tmp_path / "none.yaml")
+
+
+def test_an_error_of_the_user_of_the_file_points_at_the_element(tmp_path: Path):
+    error = load(tmp_path, GOOD).error(("rules", 0, "when", "silence", "type"), "not installed")
+    assert str(error).endswith("rules.yaml:5:45: not installed")

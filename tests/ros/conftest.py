@@ -1,0 +1,173 @@
+"""Real executor processes, and a node of the test's own to talk with them."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+PATIENCE_S = 20.0
+ARCHITECTURE = """\
+mauve: 1
+executor: {namespace: /robot_1}
+components:
+  counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+            alternatives: [executor_tests/Backwards, executor_tests/Reluctant, executor_tests/Unready,
+                           executor_tests/PyCounter, executor_tests/Slow], priority: 40, properties: {period_ms: 20}}
+  guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+          reconfigurable: false}
+  sleepy: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+           alternatives: [executor_tests/Backwards], properties: {period_ms: 5000}}
+resources:
+  count: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: count, direction: publish}}
+  set: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: set, direction: subscribe}}
+connections:
+  - [counter.count, count.write]
+  - [counter.set, set.read]
+"""
+
+
+class ExecutorProcess:
+    """`ros2 run mauve_rt executor --ros-args ...`, as a process of its own."""
+
+    def __init__(self, folder: Path, environment: dict[str, str], arguments: list[str]) -> None:
+        self._log = folder / f"executor_{time.monotonic_ns()}.log"
+        with self._log.open("w", encoding="utf-8") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
+                env={**os.environ, **environment},
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def output(self) -> str:
+        """Everything it printed."""
+        return self._log.read_text(encoding="utf-8")
+
+    def wait_begun(self) -> None:
+        """Until it handles signals: the interpreter itself takes a while to load."""
+        deadline = time.monotonic() + PATIENCE_S
+        mask = 1 << (signal.SIGINT - 1)
+        while not self._blocked_signals() & mask:
+            assert time.monotonic() < deadline, self.output
+            time.sleep(0.005)
+
+    def _blocked_signals(self) -> int:
+        status = Path(f"/proc/{self.process.pid}/status").read_text(encoding="ascii")
+        return int(status.partition("SigBlk:")[2].split()[0], 16)
+
+    def wait(self, timeout_s: float = PATIENCE_S) -> int:
+        """Its exit status."""
+        return self.process.wait(timeout_s)
+
+    def end(self, number: signal.Signals) -> tuple[int, float]:
+        """Send a signal; exit status and the seconds it took to go."""
+        began = time.monotonic()
+        self.process.send_signal(number)
+        return self.wait(), time.monotonic() - began
+
+
+class Graph:
+    """A node of the test's own, spun by the test."""
+
+    def __init__(self, context: Context) -> None:
+        self.node = Node("test", context=context, start_parameter_services=False)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self._clients: dict[str, Any] = {}
+
+    def spin_until(self, condition: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S) -> None:
+        """Spin until the condition holds; fails after `timeout_s`."""
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < deadline, f"gave up waiting for: {what}"
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def ask_later(self, service_type: Any, service: str, **fields: Any) -> Any:
+        """A future for the reply of a service, once it is there."""
+        client = self._clients.get(service)
+        if client is None:
+            client = self._clients[service] = self.node.create_client(service_type, service)
+        self.spin_until(client.service_is_ready, f"service {service}")
+        return client.call_async(service_type.Request(**fields))
+
+    def ask(self, service_type: Any, service: str, **fields: Any) -> Any:
+        """The reply of a service."""
+        future = self.ask_later(service_type, service, **fields)
+        self.spin_until(future.done, f"a reply of {service}")
+        return future.result()
+
+    def hear(self, message_type: Any, topic: str, qos: QoSProfile | int = 100) -> list[Any]:
+        """A list that fills with a topic's messages; returns when a publisher was found."""
+        heard: list[Any] = []
+        subscription = self.node.create_subscription(message_type, topic, heard.append, qos)
+        self.spin_until(lambda: self.node.count_publishers(topic) > 0, f"a publisher of {topic}")
+        assert subscription is not None
+        return heard
+
+    def voice(self, message_type: Any, topic: str) -> Any:
+        """A publisher that already has a subscriber."""
+        publisher = self.node.create_publisher(message_type, topic, 10)
+        self.spin_until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
+        return publisher
+
+
+@pytest.fixture(scope="module")
+def domain() -> int:
+    """A ROS domain of this module's own."""
+    return random.randint(1, 100)
+
+
+@pytest.fixture
+def graph(domain: int) -> Iterator[Graph]:
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    graph = Graph(context)
+    yield graph
+    graph.node.destroy_node()
+    context.try_shutdown()
+
+
+@pytest.fixture
+def architecture(tmp_path: Path, plugin_prefix: Path) -> Path:
+    path = tmp_path / "robot.yaml"
+    path.write_text(ARCHITECTURE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def start_executor(tmp_path: Path, domain: int, plugin_prefix: Path) -> Iterator[Callable[..., ExecutorProcess]]:
+    """start_executor("-p", "architecture:=FILE", ...): ended with the test, by force if need be."""
+    started: list[ExecutorProcess] = []
+
+    def start(*arguments: str, **environment: str) -> ExecutorProcess:
+        started.append(ExecutorProcess(tmp_path, {"ROS_DOMAIN_ID": str(domain), **environment}, list(arguments)))
+        return started[-1]
+
+    yield start
+    for executor in started:
+        if executor.process.poll() is None:
+            executor.process.terminate()
+            try:
+                executor.process.wait(5)
+            except subprocess.TimeoutExpired:
+                executor.process.kill()
+                executor.process.wait()
+
+
+@pytest.fixture
+def executor(start_executor: Callable[..., ExecutorProcess], architecture: Path) -> ExecutorProcess:
+    """An executor that runs `ARCHITECTURE` as /robot_1/executor."""
+    return start_executor("-p", f"architecture:={architecture}")

@@ -1,0 +1,144 @@
+"""The supervisor and the executor as processes: a real core is replaced in flight, and back."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+
+from mauve_msgs.msg import ArchitectureState, SupervisorDecision
+from mauve_rt.model.ament_index import share_folder
+
+RULES = """\
+mauve: 1
+rules:
+  - name: quiet
+    when: {silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 0.5}}
+    do: [{kind: replace_core, target: metronome, name: mauve_examples/Accelerando}]
+    undo: {for_s: 0.5, do: [{kind: replace_core, target: metronome, name: mauve_examples/Metronome}]}
+"""
+PATIENCE_S = 30.0
+
+
+class Band:
+    """A metronome under an executor, its supervisor, and a peer that plays while `playing`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.domain = random.randint(1, 100)  # noqa: S311
+        self.playing = True
+        self.decisions: list[Any] = []
+        self.states: list[Any] = []
+        (folder / "rules.yaml").write_text(RULES, encoding="utf-8")
+        self.start_executor()
+        self.supervisor_process = self._start("supervisor", f"rules:={folder / 'rules.yaml'}")
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=self.domain)
+        self.node = Node("peer", context=self.context)
+        self.spinner = SingleThreadedExecutor(context=self.context)
+        self.spinner.add_node(self.node)
+        voice = self.node.create_publisher(Float64, "/band/peer", 10)
+        self.node.create_timer(0.1, lambda: self.playing and voice.publish(Float64()))
+        latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        listen = self.node.create_subscription
+        listen(SupervisorDecision, "/band/supervisor/decisions", self.decisions.append, latched)
+        listen(ArchitectureState, "/band/executor/state", self.states.append, latched)
+
+    def start_executor(self) -> None:
+        share = share_folder("mauve_examples")
+        assert share is not None
+        architecture = share / "architecture" / "metronome.yaml"
+        self.executor_process = self._start("executor", f"architecture:={architecture}")
+
+    def _start(self, node: str, parameter: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                f"mauve_rt.node.{node}",
+                "--ros-args",
+                "-r",
+                "__ns:=/band",
+                "-p",
+                parameter,
+            ],
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
+        )
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline_s, f"it did not happen; decisions: {self.said()}"
+            self.spinner.spin_once(timeout_sec=0.1)
+
+    def said(self) -> list[str]:
+        return [decision.decision for decision in self.decisions]
+
+    def core(self) -> str:
+        return str(self.states[-1].components[0].core)
+
+    def close(self) -> None:
+        for process in (self.executor_process, self.supervisor_process):
+            process.kill()
+            process.communicate()
+        self.spinner.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+@pytest.fixture
+def band(tmp_path: Path) -> Iterator[Band]:
+    band = Band(tmp_path)
+    yield band
+    band.close()
+
+
+def test_a_core_is_replaced_in_flight_and_back(band: Band):
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.until(lambda: "done" in band.said())
+    band.until(lambda: band.core() == "mauve_examples/Accelerando")
+    band.playing = True
+    band.until(lambda: band.said()[-2:] == ["undo", "done"])
+    band.until(lambda: band.core() == "mauve_examples/Metronome")
+    swapped = [decision for decision in band.decisions if decision.decision == "done"]
+    assert swapped[-1].epoch == band.states[-1].epoch
+
+
+def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: Band, tmp_path: Path):
+    band.until(lambda: "armed" in band.said())
+    band.executor_process.kill()
+    band.executor_process.communicate()
+    share = share_folder("mauve_examples")
+    assert share is not None
+    band.executor_process = band._start(
+        "executor", f"architecture:={share / 'architecture' / 'metronome.yaml'}"
+    )
+    band.until(lambda: band.said().count("armed") == 2)
+    band.playing = False
+    band.until(lambda: band.said()[-1:] == ["done"])
+    assert len({state.instance_id for state in band.states}) == 2
+
+
+def test_both_end_cleanly_on_ctrl_c(band: Band):
+    band.until(lambda: "armed" in band.said())
+    for process in (band.supervisor_process, band.executor_process):
+        process.send_signal(signal.SIGINT)
+    for process in (band.supervisor_process, band.executor_process):
+        _, errors = process.communicate(timeout=10)
+        assert process.returncode == 0
+        assert "Traceback" not in errors

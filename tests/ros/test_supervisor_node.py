@@ -1,0 +1,238 @@
+"""The supervisor node against a stand-in for the executor: real topics, services and times."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus, PeerMessage, SupervisorDecision
+from mauve_msgs.srv import Reconfigure
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model.rules import RulesFile
+from mauve_rt.node.supervisor import Supervisor
+
+LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
+RULES = f"""\
+mauve: 1
+rules:
+  - name: link_lost
+    when: {{silence: {{topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 0.5}}}}
+    do: [{{kind: replace_core, target: exploration, name: {LOCAL}}}]
+    undo: {{for_s: 0.5, do: [{{kind: replace_core, target: exploration, name: {USUAL}}}]}}
+"""
+LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
+PATIENCE_S = 20.0
+
+
+class StandIn:
+    """Answers as an executor would, and speaks as a peer while `talking`."""
+
+    def __init__(self, context: Context) -> None:
+        self.requests: list[Any] = []
+        self.refuse_with = 0
+        self.talking = True
+        self.core = USUAL
+        self.epoch = 0
+        self.node = Node("executor", namespace="/robot_1", context=context)
+        latched = QoSProfile(depth=1, durability=LATCHED)
+        self._state = self.node.create_publisher(ArchitectureState, "~/state", latched)
+        self._voice = self.node.create_publisher(PeerMessage, "radio/in", 10)
+        self.node.create_service(Reconfigure, "~/reconfigure", self._reconfigure)
+        self.node.create_timer(0.1, self._speak)
+
+    def tell(self) -> None:
+        self.epoch += 1
+        status = ComponentStatus(name="exploration", state=ComponentInfo.RUNNING, core=self.core)
+        self._state.publish(ArchitectureState(instance_id="one", epoch=self.epoch, components=[status]))
+
+    def _speak(self) -> None:
+        if self.talking:
+            self._voice.publish(PeerMessage(sender="robot_2"))
+
+    def _reconfigure(self, request: Any, response: Any) -> Any:
+        self.requests.append(request)
+        if self.refuse_with:
+            response.code, self.refuse_with = self.refuse_with, 0
+            response.message = "refused for the test"
+        else:
+            self.core = request.steps[0].name
+            self.tell()
+            response.success = True
+        response.epoch = self.epoch
+        return response
+
+
+class Graph:
+    """A context of its own, everything in it spun by the test."""
+
+    def __init__(self) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=random.randint(1, 100))  # noqa: S311
+        self.executor = SingleThreadedExecutor(context=self.context)
+
+    def add(self, node: Node) -> Node:
+        self.executor.add_node(node)
+        return node
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline_s, "it did not happen"
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def spin(self, seconds: float) -> None:
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def close(self) -> None:
+        for node in self.executor.get_nodes():
+            node.destroy_node()
+        self.executor.shutdown()
+        rclpy.shutdown(context=self.context)
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    graph = Graph()
+    yield graph
+    graph.close()
+
+
+@pytest.fixture
+def rules(tmp_path: Path) -> Path:
+    path = tmp_path / "rules.yaml"
+    path.write_text(RULES, encoding="utf-8")
+    return path
+
+
+def supervised(graph: Graph, rules: Path) -> tuple[StandIn, list[Any]]:
+    """The stand-in, and the decisions as a subscriber that joined late gets them."""
+    stand_in = StandIn(graph.context)
+    graph.add(stand_in.node)
+    node = graph.add(Node("supervisor", namespace="/robot_1", context=graph.context))
+    supervisor = Supervisor(node, RulesFile(rules))
+    node.supervisor_kept_alive = supervisor  # type: ignore[attr-defined]
+    graph.until(lambda: node.count_subscribers("/robot_1/radio/in") > 0)
+    graph.until(lambda: stand_in.node.count_clients("/robot_1/executor/reconfigure") > 0)
+    graph.spin(0.5)
+    stand_in.tell()
+    decisions: list[Any] = []
+    listener = graph.add(Node("listener", context=graph.context))
+    qos = QoSProfile(depth=100, durability=LATCHED)
+    listener.create_subscription(SupervisorDecision, "/robot_1/supervisor/decisions", decisions.append, qos)
+    graph.until(lambda: len(decisions) > 0)
+    return stand_in, decisions
+
+
+def said(decisions: list[Any]) -> list[str]:
+    return [decision.decision for decision in decisions]
+
+
+def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: Graph, rules: Path):
+    stand_in, decisions = supervised(graph, rules)
+    graph.spin(1.0)
+    assert said(decisions) == ["armed"]
+    stand_in.talking = False
+    graph.until(lambda: "done" in said(decisions))
+    stand_in.talking = True
+    graph.until(lambda: said(decisions).count("done") == 2)
+    assert said(decisions) == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
+    assert [decision.rule for decision in decisions] == ["link_lost"] * 7
+    first, second = stand_in.requests
+    assert [(step.kind, step.target, step.name) for step in first.steps] == [
+        ("replace_core", "exploration", LOCAL)
+    ]
+    assert second.steps[0].name == USUAL
+    assert first.requested_by == "/robot_1/supervisor"
+    assert first.cause.startswith("link_lost: nothing on /robot_1/radio/in for 0.")
+    assert [first.expected_epoch, second.expected_epoch] == [1, 2]
+    assert uuid.UUID(first.request_id) != uuid.UUID(second.request_id)
+    do = decisions[2]
+    assert do.silence_s > 0.5
+    assert do.epoch == 1
+    assert do.stamp.sec > 0
+
+
+def test_a_refusal_is_told_and_tried_again(graph: Graph, rules: Path):
+    stand_in, decisions = supervised(graph, rules)
+    stand_in.refuse_with = Reconfigure.Response.PREPARE_FAILED
+    stand_in.talking = False
+    graph.until(lambda: "done" in said(decisions))
+    assert said(decisions) == ["armed", "condition_true", "do", "failed", "do", "done"]
+    assert decisions[3].message == "refused for the test"
+
+
+def test_who_swapped_by_hand_before_is_not_swapped_again(graph: Graph, rules: Path):
+    stand_in, decisions = supervised(graph, rules)
+    stand_in.core = LOCAL
+    stand_in.tell()
+    stand_in.talking = False
+    graph.until(lambda: len(decisions) >= 3)
+    assert said(decisions) == ["armed", "condition_true", "suppressed"]
+    assert stand_in.requests == []
+
+
+def test_an_executor_that_is_gone_is_a_failure_that_is_told(graph: Graph, rules: Path):
+    stand_in, decisions = supervised(graph, rules)
+    graph.executor.remove_node(stand_in.node)
+    stand_in.node.destroy_node()
+    graph.until(lambda: "failed" in said(decisions))
+    assert "not sent" in decisions[-1].reason
+    assert decisions[-1].message == "service /robot_1/executor/reconfigure is not there"
+
+
+def test_a_message_type_that_is_not_installed_is_refused(graph: Graph, rules: Path):
+    rules.write_text(RULES.replace("PeerMessage", "NoMessage"), encoding="utf-8")
+    node = graph.add(Node("supervisor", context=graph.context))
+    with pytest.raises(ArchitectureFileError, match=r":4:45: message type mauve_msgs/msg/NoMessage is"):
+        Supervisor(node, RulesFile(rules))
+
+
+def run(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "mauve_rt.node.supervisor", "--ros-args", *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 100))},  # noqa: S311
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "parameter 'rules' is missing"),
+        (["-p", "rules:=/nowhere.yaml"], "/nowhere.yaml:1:1: "),
+        (["-p", "rules:=7"], "parameter 'rules'"),
+        (["--no-such-option"], "supervisor: "),
+    ],
+)
+def test_bad_input_ends_the_process_with_one_line(arguments: list[str], words: str):
+    process = run(*arguments)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert errors.count("\n") == 1
+    assert words in errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_process_cleanly(rules: Path, number: signal.Signals):
+    process = run("-r", "__ns:=/robot_1", "-p", f"rules:={rules}")
+    time.sleep(3.0)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=10)
+    assert process.returncode == 0
+    assert "Traceback" not in errors

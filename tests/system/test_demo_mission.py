@@ -1,0 +1,156 @@
+"""The demo, shortened: what it says, what it writes, and that both agree with the bags."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bag_reading import messages, topics
+from demo_harness import Demo, Starter
+
+LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
+ROBOTS = ("robot_1", "robot_2")
+SHORT = ("--duration", "25", "--link-loss-at", "6", "--link-back-at", "14")
+
+
+@pytest.fixture(scope="module")
+def mission(start_once: Starter) -> Demo:
+    demo = start_once(*SHORT)
+    demo.finish(timeout_s=120)
+    return demo
+
+
+@pytest.fixture(scope="module")
+def summary(mission: Demo) -> dict[str, Any]:
+    return json.loads((mission.out / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_it_succeeds_and_says_so(mission: Demo, summary: dict[str, Any]):
+    assert summary["reasons"] == []
+    assert mission.status == 0
+    assert mission.errors == ""
+    text = "\n".join(mission.lines)
+    assert "SUCCESS." in text
+    assert re.search(r"6\.\d s  the radio link is LOST", text)
+    assert re.search(r"14\.\d s  the radio link is back", text)
+    for robot in ROBOTS:
+        assert f"{robot}: exploration: Exploration -> LocalExploration, blackout " in text
+        assert f"{robot}: exploration: LocalExploration -> Exploration, blackout " in text
+    assert mission.processes() == {}
+
+
+def test_it_writes_what_it_promises(mission: Demo):
+    assert {path.name for path in mission.out.iterdir()} >= {"summary.json", "report.html", "bag", "log"}
+    assert list(mission.out.glob("*.png"))
+    page = (mission.out / "report.html").read_text(encoding="utf-8")
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert "https://" not in page.replace("https://www.w3.org", "")
+    for kind in ("architecture", "supervisor"):
+        assert {path.stem for path in (mission.out / kind).glob("*.yaml")} == set(ROBOTS)
+
+
+def test_the_summary_tells_of_both_swaps_of_every_robot(summary: dict[str, Any]):
+    for robot in ROBOTS:
+        swaps = summary["robots"][robot]["reconfigurations"]
+        assert [(swap["component"], swap["from"], swap["to"]) for swap in swaps] == [
+            ("exploration", USUAL, LOCAL),
+            ("exploration", LOCAL, USUAL),
+        ]
+        there, back = swaps
+        assert there["cause"].startswith(f"link_lost: nothing on /{robot}/radio/in for ")
+        assert there["silence_ms"] > 1000.0
+        assert back["silence_ms"] < 1000.0
+        for swap in swaps:
+            assert swap["prepare_us"] > 0.0
+            assert swap["blackout_us"] > 0.0
+            assert swap["missed_releases"] == 0
+            assert swap["phase_nominal_ns"] == 0
+
+
+def test_coverage_is_a_share_and_grew_without_the_link(mission: Demo, summary: dict[str, Any]):
+    coverage = summary["coverage"]
+    assert set(coverage) == {*ROBOTS, "union"}
+    assert all(0.0 < share <= 1.0 for share in coverage.values())
+    assert coverage["union"] >= max(coverage[robot] for robot in ROBOTS)
+    down = [line for line in mission.lines if "link DOWN" in line]
+    together = [int(re.search(r"together +(\d+)%", line)[1]) for line in down]  # type: ignore[index]
+    assert together[-1] > together[0]
+
+
+def test_the_components_are_those_of_the_paper(summary: dict[str, Any]):
+    for robot in ROBOTS:
+        components = summary["robots"][robot]["components"]
+        assert set(components) == {"robot", "control", "guidance", "mapping", "exploration"}
+        for component in components.values():
+            assert component["releases"] > 0
+            assert component["wakeup_p50_ns"] <= component["wakeup_p99_ns"]
+            assert component["policy"] in ("SCHED_FIFO", "SCHED_OTHER")
+            assert component["cpus"]
+        assert components["robot"]["releases"] > components["control"]["releases"] * 1.5
+
+
+def test_the_bags_open_and_agree_with_the_summary(mission: Demo, summary: dict[str, Any]):
+    for robot in ROBOTS:
+        bag = mission.out / "bag" / robot
+        counts = topics(bag)
+        names = ("pose", "goal", "map_updates", "executor/events", "supervisor/decisions")
+        assert {f"/{robot}/{name}" for name in names} <= counts.keys()
+        events = [event for event in messages(bag, f"/{robot}/executor/events") if event.to_core]
+        swaps = summary["robots"][robot]["reconfigurations"]
+        assert [(event.from_core, event.to_core) for event in events] == [(s["from"], s["to"]) for s in swaps]
+        assert [event.cause for event in events] == [swap["cause"] for swap in swaps]
+        for event, swap in zip(events, swaps, strict=True):
+            assert event.report[0].blackout_ns / 1e3 == pytest.approx(swap["blackout_us"], abs=1.0)
+            assert event.requested_by == f"/{robot}/supervisor"
+        decisions = [decision.decision for decision in messages(bag, f"/{robot}/supervisor/decisions")]
+        assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
+
+
+def test_real_time_rights_are_told(mission: Demo, summary: dict[str, Any]):
+    realtime = summary["realtime"]
+    assert realtime["granted"] == (realtime["missing"] == [])
+    text = "\n".join(mission.lines)
+    assert all(line in text for line in realtime["missing"])
+
+
+def test_the_logs_have_no_traceback(mission: Demo):
+    logs = {path.stem: path.read_text(encoding="utf-8") for path in (mission.out / "log").glob("*.log")}
+    assert len(logs) == 5
+    assert not [name for name, text in logs.items() if "Traceback" in text]
+
+
+def test_without_supervisors_the_robots_stall(start: Starter):
+    demo = start(*SHORT, "--no-supervisor")
+    assert demo.finish(timeout_s=120) == 1
+    summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["success"] is False
+    assert all(robot["reconfigurations"] == [] for robot in summary["robots"].values())
+    assert "FAILED:" in demo.lines
+    # They end what they were about when the link was lost, then they stand.
+    down = [re.search(r"together +(\d+)%", line) for line in demo.lines if "link DOWN" in line]
+    late = [int(match[1]) for match in down[-2:] if match]
+    assert late[0] == late[-1]
+    assert demo.processes() == {}
+
+
+def test_one_robot_needs_no_radio(start: Starter):
+    demo = start("--robots", "1", "--duration", "6", "--map", "room")
+    assert demo.finish(timeout_s=120) == 0
+    summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
+    assert set(summary["coverage"]) == {"robot_1", "union"}
+    assert summary["robots"]["robot_1"]["reconfigurations"] == []
+
+
+def shared_map(name: str) -> Path:
+    """A map of the folder beside the clone, where there is one."""
+    path = Path(__file__).resolve().parents[2].parent / "shared" / "maps" / name
+    if not path.exists():
+        pytest.skip(f"no {name} in shared/maps beside the clone")
+    return path
+
+
+@pytest.mark.parametrize("name", ["depot.yaml", "tb3_sandbox.yaml"])
+def test_maps_of_others_work_as_they_are(start: Starter, name: str):
+    demo = start("--map", str(shared_map(name)), *SHORT)
+    assert demo.finish(timeout_s=120) == 0, demo.lines[-8:]
