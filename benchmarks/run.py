@@ -31,7 +31,12 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Return the exit status: 0 when everything could be measured, whatever the verdicts; else 1."""
-    given = _parser().parse_args(arguments)
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    if given.rounds is not None and given.rounds < 1:
+        parser.error(f"--rounds: expected at least 1, found {given.rounds}")
+    if given.json is not None and not given.json.parent.is_dir():
+        parser.error(f"--json: there is no folder {given.json.parent}")
     settings = FULL if given.full else QUICK
     if given.rounds is not None:
         settings = replace(settings, rounds=given.rounds)

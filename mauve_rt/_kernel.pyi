@@ -1,18 +1,19 @@
 """The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC."""
 
 from collections.abc import Callable
-from typing import Protocol, final
+from typing import Protocol, TypeAlias, final
 
-PropertyValue = bool | int | float | str
+PropertyValue: TypeAlias = bool | int | float | str
 
 class MauveError(Exception):
     """An error of the kernel. str() is one line: what, where, expected, found, remedy.
 
-    code is the name of an ErrorCode: 'invalid_argument', 'unknown_component', 'unknown_core', 'undeclared_core',
-    'unknown_shell', 'unknown_fsm', 'unknown_resource', 'unknown_service', 'unknown_port', 'unknown_property', 'unknown_type',
-    'type_mismatch', 'out_of_range', 'duplicate_name', 'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed',
-    'not_configured', 'not_running', 'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed',
-    'timeout', 'realtime_denied', 'plugin', 'io', 'internal'.
+    code is the name of an ErrorCode: 'invalid_argument', 'unknown_component', 'unknown_core',
+    'undeclared_core', 'unknown_shell', 'unknown_fsm', 'unknown_resource', 'unknown_service', 'unknown_port',
+    'unknown_property', 'unknown_type', 'type_mismatch', 'out_of_range', 'duplicate_name',
+    'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed', 'not_configured', 'not_running',
+    'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed', 'timeout',
+    'realtime_denied', 'plugin', 'io', 'internal'.
     """
 
     code: str
@@ -104,7 +105,10 @@ class StepReport:
 NOT_MEASURED: int
 
 class PythonCore(Protocol):
-    """What a core written in Python offers: a method per action and guard of the FSM, and optionally these."""
+    """What a core written in Python offers: a method per action and guard of the FSM.
+
+    And, if it likes, these and adopt(old), which may refuse by returning False or raising.
+    """
 
     def configure(self) -> bool | None: ...
     def cleanup(self) -> None: ...
@@ -113,9 +117,15 @@ class PythonCore(Protocol):
 class PluginRegistry:
     def __init__(self) -> None: ...
     def load_library(self, path: str) -> None:
-        """Opens a plug-in library (RTLD_NOW | RTLD_LOCAL, never closed); a second call for one path does nothing."""
+        """Opens a plug-in library (RTLD_NOW | RTLD_LOCAL, never closed).
+
+        A second call for one path does nothing.
+        """
     def add_python_core(self, name: str, shell: str, factory: Callable[[object], object]) -> None:
-        """factory(shell_view) -> core object. Its actions run on the component's thread under the interpreter's lock."""
+        """factory(shell_view) -> core object.
+
+        Its actions run on the component's thread under the interpreter's lock.
+        """
     def names(self, kind: str) -> list[str]:
         """kind: 'shell', 'core', 'fsm', 'resource', 'type'."""
     def describe_shell(self, name: str) -> ShellDescription: ...
@@ -144,12 +154,17 @@ class Architecture:
         alternatives: list[str] = [],
         reconfigurable: bool = True,
     ) -> None: ...
-    def add_resource(self, name: str, *, kind: str, type: str = "", capacity: int = 0, overwrite: bool = False) -> None: ...
+    def add_resource(
+        self, name: str, *, kind: str, type: str = "", capacity: int = 0, overwrite: bool = False
+    ) -> None: ...
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
     def set_property(self, component: str, name: str, value: PropertyValue) -> None:
         """Before configure. Once configured use Deployer.set_property."""
     def publish(self, resource: str) -> None:
-        """Marks a resource as bound to an outgoing topic: Deployer.wait_published yields what is written to it."""
+        """Marks a resource as bound to an outgoing topic.
+
+        Deployer.wait_published yields what is written to it.
+        """
     def configure(self) -> None: ...
     def cleanup(self) -> None: ...
     def components(self) -> list[ComponentDescription]: ...
@@ -172,20 +187,36 @@ class TraceDrain:
 class Deployer:
     """Threads of an architecture. Every call releases the interpreter's lock."""
 
-    def __init__(self, architecture: Architecture, *, require_realtime: bool = False, trace: bool = True) -> None: ...
+    def __init__(
+        self, architecture: Architecture, *, require_realtime: bool = False, trace: bool = True
+    ) -> None: ...
     def prepare_process(self) -> None:
-        """Locks memory, holds /dev/cpu_dma_latency at 0, notes what was denied. Called by deploy() if not before."""
+        """Locks memory, holds /dev/cpu_dma_latency at 0, notes what was denied.
+
+        Called by deploy() if not before.
+        """
     def deploy(self) -> None:
         """Creates the threads, meets them at the barrier, publishes the epoch, starts every component."""
     def shutdown(self) -> None:
-        """Stops in reverse order (outputs written), joins the threads. The architecture can be deployed again."""
+        """Stops in reverse order (outputs written), joins the threads.
+
+        The architecture can be deployed again.
+        """
     def stop(self, component: str, timeout_ns: int = 1_000_000_000) -> None: ...
     def start(self, component: str, clock_ns: int | None = None) -> None: ...
     def get_time(self, component: str) -> int: ...
     def replace_core(
-        self, component: str, core: str, *, commit_timeout_ns: int = 1_000_000_000, phase_timeout_ns: int = 1_000_000_000
+        self,
+        component: str,
+        core: str,
+        *,
+        commit_timeout_ns: int = 1_000_000_000,
+        phase_timeout_ns: int = 1_000_000_000,
     ) -> StepReport:
-        """Prepare, commit, retire. Waits up to phase_timeout_ns for the next release to measure phase_actual_ns."""
+        """Prepare, commit, retire.
+
+        Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.
+        """
     def set_property(
         self, component: str, name: str, value: PropertyValue, *, commit_timeout_ns: int = 1_000_000_000
     ) -> StepReport: ...
@@ -196,11 +227,17 @@ class Deployer:
     def trace_components(self) -> list[str]: ...
     def trace_names(self) -> list[str]: ...
     def wait_published(self, timeout_ns: int) -> list[tuple[str, bytes, int]]:
-        """(resource, serialized message with its CDR header, writer's time) of what was written since the last call."""
+        """What was written to published resources since the last call.
+
+        (resource, serialized message with its CDR header, writer's time), one thread at a time.
+        """
     def write_resource(self, resource: str, data: bytes) -> bool:
         """Writes a serialized message to a shared_data or ring_buffer resource; False when a ring is full."""
     def read_resource(self, resource: str) -> tuple[bytes, int, int]:
-        """(serialized message, sequence number - 0: never written, writer's time) of a shared_data resource."""
+        """Looks at a shared_data resource.
+
+        (serialized message, sequence number - 0: never written, writer's time)
+        """
     def wait_change(self, timeout_ns: int) -> bool:
         """Waits until any component changes its state or core (a fault included); False at the timeout."""
     def wake(self) -> None:

@@ -14,9 +14,9 @@
         def has_goal(self) -> bool:                 # a guard of the FSM
             return self.shell.goal.read().status != "none"
 
-A core has one method for every action and guard of its component's FSM; the kernel checks that when it prepares the core.
-Its methods run on the component's thread, under the interpreter's lock: soft real time. List it in the package's
-`mauve_rt_plugins` (see `mauve_rt.model.plugins`).
+A core has one method for every action and guard of its component's FSM; the kernel checks that when it
+prepares the core. Its methods run on the component's thread, under the interpreter's lock: soft real time.
+List it in the package's `mauve_rt_plugins` (see `mauve_rt.model.plugins`).
 """
 
 from dataclasses import dataclass
@@ -92,7 +92,9 @@ class _Port:
         """
         found = message_class(self.type)
         if found is None:
-            raise TypeError(f"port '{self.name}': type '{self.type}' is no installed ROS message; use a core in C++")
+            raise TypeError(
+                f"port '{self.name}': type '{self.type}' is no installed ROS message; use a core in C++"
+            )
         return found
 
 
@@ -167,8 +169,8 @@ class Shell:
 class Core:
     """Base of cores written in Python.
 
-    A core may also have `adopt(old)`: called on the component's thread when it takes over from `old` (the other core
-    object, None when that is written in C++); returning False leaves everything as it was.
+    A core may also have `adopt(old)`: called on the component's thread when it takes over from `old` (the
+    other core object, None when that is written in C++); returning False leaves everything as it was.
     """
 
     def __init__(self, shell: Shell) -> None:

@@ -1,4 +1,4 @@
-"""Typed errors. Every one is a `MauveError`: a code, where it is, what was expected and found, and what to do about it."""
+"""Typed errors. Every one is a `MauveError`: code, place, what was expected and found, what to do."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,8 +59,8 @@ class Problem:
 class ArchitectureFileError(MauveError):
     """An architecture file that cannot be used.
 
-    `str()` is one line about the first problem, `FILE:LINE:COLUMN: what (component.element): expected ..., found ...;
-    remedy`; `problems` has all that were found, in the order of the file.
+    `str()` is one line about the first problem, `FILE:LINE:COLUMN: what (component.element): expected ...,
+    found ...; remedy`; `problems` has all that were found, in the order of the file.
     """
 
     file: Path

@@ -11,7 +11,9 @@ import pytest
 from mauve_rt import _kernel
 
 PLUGINS = Path(__file__).parent / "plugins"
-INSTALLED = Path(_kernel.__file__).resolve().parents[4]  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
+INSTALLED = (
+    Path(_kernel.__file__).resolve().parents[4]
+)  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +36,9 @@ def plugin_prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         check=True,
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), os.environ.get("AMENT_PREFIX_PATH", "")]))
+        patch.setenv(
+            "AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), os.environ.get("AMENT_PREFIX_PATH", "")])
+        )
         patch.setenv("PYTHONPATH", os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
         patch.syspath_prepend(str(PLUGINS))
         yield prefix

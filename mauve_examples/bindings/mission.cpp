@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// mauve_examples._mission: the mission's map, starts and reachability for Python. Only translation, no behaviour.
+// mauve_examples._mission: the mission's map, starts and reachability for Python. Only translation, no
+// behaviour.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -26,12 +27,14 @@ std::vector<py::ssize_t> shape(const GridMap& map) { return {map.height, map.wid
 
 std::vector<PoseTuple> start_poses(const GridMap& map, std::size_t n, std::uint64_t seed) {
   std::vector<PoseTuple> poses;
-  for (const Pose2D& pose : mauve_examples::start_poses(map, n, seed)) poses.emplace_back(pose.x, pose.y, pose.theta);
+  for (const Pose2D& pose : mauve_examples::start_poses(map, n, seed))
+    poses.emplace_back(pose.x, pose.y, pose.theta);
   return poses;
 }
 
 py::array_t<bool> reachable_mask(const GridMap& map, const std::vector<PoseTuple>& starts, double radius_m) {
   std::vector<Pose2D> poses;
+  poses.reserve(starts.size());
   for (const auto& [x, y, theta] : starts) poses.push_back({x, y, theta});
   const std::vector<std::uint8_t> reached = mauve_examples::reachable_cells(map, poses, radius_m);
   py::array_t<bool> mask(shape(map));
@@ -53,12 +56,14 @@ PYBIND11_MODULE(_mission, module) {
       .def_readonly("origin_y_m", &GridMap::origin_y_m)
       .def_property_readonly("cells", [](const py::object& self) {
         const auto& map = self.cast<const GridMap&>();
-        py::array_t<std::int8_t> view(shape(map), map.cells.data(), self);  // shares the map's memory and keeps it
+        py::array_t<std::int8_t> view(shape(map), map.cells.data(),
+                                      self);  // shares the map's memory and keeps it
         view.attr("setflags")(py::arg("write") = false);
         return view;
       });
 
-  module.def("load_map", [](const std::string& path) { return mauve_examples::load_map(path); }, py::arg("path"));
+  module.def(
+      "load_map", [](const std::string& path) { return mauve_examples::load_map(path); }, py::arg("path"));
   module.def("start_poses", &start_poses, py::arg("grid"), py::arg("n"), py::arg("seed"));
   module.def("reachable_mask", &reachable_mask, py::arg("grid"), py::arg("starts"), py::arg("radius_m"));
 }

@@ -69,7 +69,7 @@ def load_world(map_file: Path, robots: Sequence[str], *, seed: int) -> World:
     try:
         grid = _mission.load_map(str(map_file))
         poses = _mission.start_poses(grid, len(robots), seed)
-        starts = dict(zip(robots, (tuple(pose) for pose in poses), strict=True))
+        starts = dict(zip(robots, poses, strict=True))
         facts = MissionFacts(map_path=map_file, radius_m=radius_m, starts=starts, started_ns=0, ended_ns=0)
         return World(map_file=map_file, radius_m=radius_m, starts=starts, area=load_area(facts))
     except UnicodeDecodeError:  # a message that quotes a binary file

@@ -25,6 +25,7 @@ PATIENCE_S = 10.0
 HURRIED_PATIENCE_S = 2.5
 RECORDED = ("supervisor/decisions:mauve_msgs/msg/SupervisorDecision", "/radio/link:std_msgs/msg/Bool")
 LOOK_IN = "To look into a robot from another terminal: mauve list /robot_1/executor"
+NO_REALTIME = "Real-time rights are missing: what the robots do may come late. More about it at the end."
 USUAL_CORE, LOCAL_CORE = "Exploration", "LocalExploration"
 
 
@@ -42,7 +43,7 @@ class MissionRun:
         self._started_ns = 0  # CLOCK_MONOTONIC; 0: not started
         self._ended_ns = 0
         self._next_show_s = 0.0
-        self._shown_lines = 0
+        self._shown_events = 0
         self._components: dict[str, dict[str, ComponentFacts]] = {}
         self._processes: Processes | None = None
         self.trouble: list[str] = []
@@ -83,6 +84,8 @@ class MissionRun:
             self._wait_until_ready(monitor, self._processes, nodes)
             if not self._interrupted():
                 self._progress.say("All have met. " + LOOK_IN)
+                if not all(robot.realtime_granted for robot in self.story.robots.values()):
+                    self._progress.say(NO_REALTIME)
                 self._started_ns = time.monotonic_ns()
                 monitor.activate()
                 self._play(monitor, self._processes)
@@ -222,10 +225,10 @@ class MissionRun:
         return all(robot.done for robot in robots) and (swapped or not self._options.supervisor)
 
     def _show(self, *, now: bool = False) -> None:
-        if not now and self.time_s() < self._next_show_s and len(self.story.lines) == self._shown_lines:
+        if not now and self.time_s() < self._next_show_s and len(self.story.events) == self._shown_events:
             return
         self._next_show_s = self.time_s() + SHOW_PERIOD_S
-        self._shown_lines = len(self.story.lines)
+        self._shown_events = len(self.story.events)
         self._progress.show(
             self.story.picture(
                 duration_s=self._options.duration_s,

@@ -8,14 +8,14 @@ from mauve_examples.mission.progress import MissionPicture, RobotPicture
 from mauve_msgs.msg import ComponentInfo, StepReport
 
 COMPONENT = "exploration"
+DONE_LASTS_S = 1.5  # before its first scan, or while a peer's map arrives, a robot may think so for a moment
 TOLD_DECISIONS = ("condition_true", "failed", "suppressed")
 
 
 @dataclass
 class Swap:
-    """A core that was replaced. Time in seconds of mission time."""
+    """A core that was replaced."""
 
-    time_s: float
     component: str
     from_core: str
     to_core: str
@@ -28,7 +28,9 @@ class RobotStory:
     """What is known of one robot."""
 
     core: str = ""
-    done: bool = False
+    core_since_s: float = 0.0  # mission time
+    done: bool = False  # has said so for DONE_LASTS_S
+    done_since_s: float | None = None  # mission time; None: says that it is not
     faults: dict[str, str] = field(default_factory=dict)  # by component
     swaps: list[Swap] = field(default_factory=list)
     realtime_granted: bool = False
@@ -42,12 +44,17 @@ class MissionStory:
         self.robots = {robot: RobotStory() for robot in robots}
         self.link_up = True
         self.link_changes: list[tuple[float, bool]] = []
-        self.lines: list[str] = []
+        self.events: list[tuple[float, str]] = []  # as they became known; mission time in s
         self._clock = clock
 
-    def tell(self, text: str) -> None:
-        """Add a line of the story, with the mission time."""
-        self.lines.append(f"{self._clock():6.1f} s  {text}")
+    def tell(self, text: str, *, at_s: float | None = None) -> None:
+        """Add to the story what happened at a mission time, now by default."""
+        self.events.append((self._clock() if at_s is None else at_s, text))
+
+    def lines(self, *, by_time: bool = False) -> list[str]:
+        """The story so far, with mission times, in the order in which it became known or by time."""
+        events = sorted(self.events) if by_time else self.events
+        return [f"{time_s:6.1f} s  {text}" for time_s, text in events]
 
     def on_state(self, robot: str, state: Any) -> None:
         """mauve_msgs/msg/ArchitectureState."""
@@ -56,7 +63,9 @@ class MissionStory:
         story.realtime_missing = list(state.realtime.missing)
         for status in state.components:
             if status.name == COMPONENT:
-                story.core = status.core.rsplit("/", 1)[-1]
+                core = status.core.rsplit("/", 1)[-1]
+                if core != story.core:
+                    story.core, story.core_since_s = core, self._clock()
             if status.state == ComponentInfo.FAULTED and status.name not in story.faults:
                 story.faults[status.name] = status.fault
                 self.tell(f"{robot}: {status.name} FAULTED: {status.fault}")
@@ -70,17 +79,19 @@ class MissionStory:
         if not event.to_core:
             self.tell(f"{robot}: {event.request}{who}")
             return
+        story = self.robots[robot]
         for report in event.report:
             swap = Swap(
-                time_s=self._clock(),
                 component=report.component,
                 from_core=event.from_core.rsplit("/", 1)[-1],
                 to_core=event.to_core.rsplit("/", 1)[-1],
                 blackout_ns=report.blackout_ns,
                 missed_releases=report.missed_releases,
             )
-            self.robots[robot].swaps.append(swap)
-            self.tell(f"{robot}: {describe(swap)}{who}")
+            story.swaps.append(swap)
+            # The event waits for the next release, to tell its phase; ~/state told of the swap at once.
+            known = swap.component == COMPONENT and swap.to_core == story.core
+            self.tell(f"{robot}: {describe(swap)}{who}", at_s=story.core_since_s if known else None)
 
     def on_decision(self, robot: str, decision: Any) -> None:
         """mauve_msgs/msg/SupervisorDecision; what the executor's events tell better is left out."""
@@ -89,10 +100,17 @@ class MissionStory:
             self.tell(f"{robot}: {decision.rule}: {decision.reason}{message}")
 
     def on_done(self, robot: str, done: bool) -> None:  # noqa: FBT001 - the message's one field
-        """The robot has nothing left that it can explore, or has again."""
-        if done and not self.robots[robot].done:
-            self.tell(f"{robot}: has explored all it can reach")
-        self.robots[robot].done = done
+        """The robot has nothing left that it can explore, or has again; believed when it stays so."""
+        story = self.robots[robot]
+        if not done:
+            story.done, story.done_since_s = False, None
+            return
+        now_s = self._clock()
+        if story.done_since_s is None:
+            story.done_since_s = now_s
+        if not story.done and now_s - story.done_since_s >= DONE_LASTS_S:
+            story.done = True
+            self.tell(f"{robot}: has explored all it can reach", at_s=story.done_since_s)
 
     def on_link(self, up: bool) -> None:  # noqa: FBT001 - the message's one field
         """The radio's link changed."""
@@ -124,7 +142,7 @@ class MissionStory:
             link_up=self.link_up,
             robots=robots,
             together=together,
-            events=self.lines,
+            events=self.lines(),
         )
 
 

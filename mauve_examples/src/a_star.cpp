@@ -51,14 +51,15 @@ void AStar::configure(const GridGeometry& geometry, const PlanOptions& options) 
 std::uint8_t AStar::weight(std::size_t index) const noexcept {
   const std::int8_t state = cells_[index];
   if (state != kFree && (state != kUnknown || options_.unknown_weight <= 0.0)) return 0;
-  const std::size_t squared = std::min<std::size_t>(clearance_.squared(index), weight_of_clearance_.size() - 1);
+  const std::size_t squared =
+      std::min<std::size_t>(clearance_.squared(index), weight_of_clearance_.size() - 1);
   const std::uint8_t weight = weight_of_clearance_[squared];
   if (state == kFree) return weight;
   return static_cast<std::uint8_t>(std::min(weight * (1.0 + options_.unknown_weight), 255.0));
 }
 
-PlanStatus AStar::plan(std::span<const std::int8_t> cells, const Point& start, const Point& goal, double path_step_m,
-                       Path& path) noexcept {
+PlanStatus AStar::plan(std::span<const std::int8_t> cells, const Point& start, const Point& goal,
+                       double path_step_m, Path& path) noexcept {
   path.clear();
   expanded_ = 0;
   cells_ = cells;
@@ -114,7 +115,8 @@ void AStar::expand(Cell cell, Cell start) noexcept {
   }
 }
 
-void AStar::simplify(const Point& start, Cell first, Cell goal, double path_step_m, Path& path) const noexcept {
+void AStar::simplify(const Point& start, Cell first, Cell goal, double path_step_m,
+                     Path& path) const noexcept {
   // From where it does not fit, the robot first steps straight out; elsewhere the path begins under its feet.
   const bool fits = passable(geometry_.cell_at(start.x, start.y));
   Point anchor = fits ? start : geometry_.centre(first);
@@ -128,12 +130,14 @@ void AStar::simplify(const Point& start, Cell first, Cell goal, double path_step
     length_m += distance_m(geometry_.centre(reached), geometry_.centre(cell));
     const int here = weight(geometry_.index(cell));
     const Point centre = geometry_.centre(cell);
-    // A straight line must be hardly worse than the path it replaces: about as far from walls, as little unknown.
+    // A straight line must be hardly worse than the path it replaces: about as far from walls, as little
+    // unknown.
     const int allowed = std::max(worst, here);
-    const bool straight = distance_m(anchor, centre) <= path_step_m && line_is_clear(geometry_, anchor, centre, [&](Cell on) {
-                            const int weight_on = geometry_.contains(on) ? weight(geometry_.index(on)) : 0;
-                            return weight_on != 0 && weight_on <= allowed + kUnit / 2;
-                          });
+    const bool straight =
+        distance_m(anchor, centre) <= path_step_m && line_is_clear(geometry_, anchor, centre, [&](Cell on) {
+          const int weight_on = geometry_.contains(on) ? weight(geometry_.index(on)) : 0;
+          return weight_on != 0 && weight_on <= allowed + kUnit / 2;
+        });
     if (straight) {
       worst = allowed;
     } else {

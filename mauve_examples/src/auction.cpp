@@ -66,7 +66,8 @@ Winner lowest(std::span<Bidder> bidders, const Taken& taken, const AuctionOption
     if (bidder.served) continue;
     for (std::size_t i = 0; i < bidder.offers.size(); ++i) {
       const double price = price_m(bidder.offers[i], taken, options);
-      const bool tie = price == winner.price_m && winner.bidder != nullptr && bidder.name < winner.bidder->name;
+      const bool tie =
+          price == winner.price_m && winner.bidder != nullptr && bidder.name < winner.bidder->name;
       if (price < winner.price_m || tie) winner = {&bidder, i, price};
     }
   }
@@ -83,7 +84,8 @@ std::optional<std::size_t> bid_together(const FrontierList& own, const PeerTable
   bidders[0].name = peers.own_name().view();
   for (const Frontier& frontier : own) bidders[0].offers.push_back({frontier.at, frontier.cost_m});
   for (const Peer& peer : peers.peers()) {
-    if (peer.has_claim) taken.push_back({{peer.claim.x, peer.claim.y, 0.0}, options.undercut_share * peer.claim.cost_m});
+    if (peer.has_claim)
+      taken.push_back({{peer.claim.x, peer.claim.y, 0.0}, options.undercut_share * peer.claim.cost_m});
     if (peer.has_claim || !peer.bidding) continue;
     Bidder& bidder = bidders[count++];
     bidder.name = peer.name.view();

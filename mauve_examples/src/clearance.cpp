@@ -14,9 +14,11 @@ constexpr int kMaxLimitCells = 180;  // distances fit one byte, sums of two squa
 
 void ClearanceField::configure(const GridGeometry& geometry, double limit_m) {
   geometry_ = geometry;
-  limit_cells_ = std::clamp(static_cast<int>(std::ceil(limit_m / geometry.resolution_m)) + 1, 1, kMaxLimitCells);
+  limit_cells_ =
+      std::clamp(static_cast<int>(std::ceil(limit_m / geometry.resolution_m)) + 1, 1, kMaxLimitCells);
   column_distance_.assign(geometry.cell_count(), 0);
-  row_squares_.assign(static_cast<std::size_t>(geometry.width + 2 * limit_cells_), 0);
+  row_squares_.assign(static_cast<std::size_t>(geometry.width) + 2 * static_cast<std::size_t>(limit_cells_),
+                      0);
   squared_.assign(geometry.cell_count(), 0);
 }
 

@@ -5,8 +5,8 @@
 
 namespace mauve_examples {
 
-void Explorer::configure(const GridGeometry& geometry, std::string_view name, const std::vector<std::string>& peers,
-                         const ExplorerOptions& options) {
+void Explorer::configure(const GridGeometry& geometry, std::string_view name,
+                         const std::vector<std::string>& peers, const ExplorerOptions& options) {
   map_.configure(geometry);
   finder_.configure(geometry, options.frontiers);
   peers_.configure(name, peers);
@@ -57,7 +57,7 @@ void Explorer::look(const Pose2D& robot, std::int64_t now_ns) noexcept {
   for (const Frontier& frontier : finder_.list()) {
     if (!goal_.given_up(frontier.at, now_ns)) candidates_.push_back(frontier);
   }
-  done_ = candidates_.empty() && !goal_.active();
+  done_ = finder_.has_view() && candidates_.empty() && !goal_.active();
 }
 
 bool Explorer::decide_together(std::int64_t now_ns) noexcept {
@@ -112,7 +112,8 @@ void Explorer::compose(PeerMessage& message) noexcept {
   message.round = round();
   message.bids.clear();
   if (round_open_) {
-    for (const Frontier& frontier : candidates_) message.bids.push_back({frontier.at.x, frontier.at.y, frontier.cost_m});
+    for (const Frontier& frontier : candidates_)
+      message.bids.push_back({frontier.at.x, frontier.at.y, frontier.cost_m});
   }
   message.has_claim = goal_.active();
   message.claim = goal_.active() ? claim() : Bid{};

@@ -14,7 +14,8 @@ constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::int32_t kStraight = 5;
 constexpr std::int32_t kDiagonal = 7;
-// A robot pushed against a wall stands where it does not plan to go: the search starts from the nearest good cell.
+// A robot pushed against a wall stands where it does not plan to go: the search starts from the nearest good
+// cell.
 constexpr double kSnap_m = 0.8;
 
 constexpr std::uint8_t kOpen = 1;
@@ -44,8 +45,10 @@ const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, con
   member_count_ = 0;
   clearance_.compute(cells);
   std::fill(cost_.begin(), cost_.end(), kUnreached);
-  const auto start = nearest_cell(geometry_, geometry_.cell_at(robot.x, robot.y), cells_of(geometry_, kSnap_m),
-                                  [this](Cell cell) { return passable(geometry_.index(cell)); });
+  const auto start =
+      nearest_cell(geometry_, geometry_.cell_at(robot.x, robot.y), cells_of(geometry_, kSnap_m),
+                   [this](Cell cell) { return passable(geometry_.index(cell)); });
+  has_view_ = start.has_value();
   if (!start) return list_;
   flood(*start);
   cluster();
@@ -194,9 +197,9 @@ double FrontierFinder::cost_m(const Point& place) const noexcept {
 
 bool FrontierFinder::any_near(const Point& place, double reach_m) const noexcept {
   const Cell centre = geometry_.cell_at(place.x, place.y);
-  return nearest_cell(geometry_, centre, cells_of(geometry_, reach_m), [this](Cell cell) {
-           return is_member_[geometry_.index(cell)] != 0;
-         }).has_value();
+  return nearest_cell(geometry_, centre, cells_of(geometry_, reach_m),
+                      [this](Cell cell) { return is_member_[geometry_.index(cell)] != 0; })
+      .has_value();
 }
 
 }  // namespace mauve_examples

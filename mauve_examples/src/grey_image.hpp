@@ -17,8 +17,8 @@ struct GreyImage {
 /// Reads a PGM file, plain (P2) or raw (P5), of at most 8 bits a pixel. Throws MapError. [non-rt]
 GreyImage read_pgm(const std::filesystem::path& path);
 
-/// Reads a PNG file; a pixel's shade is the mean of its channels, alpha included, as in nav2_map_server's trinary
-/// mode. Throws MapError. [non-rt]
+/// Reads a PNG file; a pixel's shade is the mean of its channels, alpha included, as in nav2_map_server's
+/// trinary mode. Throws MapError. [non-rt]
 GreyImage read_png(const std::filesystem::path& path);
 
 /// Refuses images that hold nothing or more than kMaxMapCells. Throws MapError. [non-rt]

@@ -11,8 +11,7 @@ std::string one_line(const MapError::Detail& detail) {
   std::string line = detail.what + ": " + detail.where + ": expected " + detail.expected + ", found " +
                      detail.found + "; " + detail.remedy;
   // File names and YAML values may hold control characters; the promise is one line.
-  std::replace_if(
-      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  std::replace_if(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
   return line;
 }
 

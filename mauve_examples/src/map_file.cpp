@@ -35,12 +35,13 @@ class MapYaml {
     try {
       root_ = YAML::LoadFile(path.string());
     } catch (const YAML::Exception& error) {
-      throw MapError({"map file is no valid YAML", where(error.mark), "YAML as the ROS map server reads it", error.msg,
-                      "give the map's .yaml file, not its image"});
+      throw MapError({"map file is no valid YAML", where(error.mark), "YAML as the ROS map server reads it",
+                      error.msg, "give the map's .yaml file, not its image"});
     }
     if (!root_.IsMap()) {
-      throw MapError({"map file holds no map description", where(root_.Mark()), "keys image, resolution, origin",
-                      "no keys at all", "give the .yaml file that map_saver wrote beside the image"});
+      throw MapError({"map file holds no map description", where(root_.Mark()),
+                      "keys image, resolution, origin", "no keys at all",
+                      "give the .yaml file that map_saver wrote beside the image"});
     }
   }
 
@@ -67,7 +68,8 @@ class MapYaml {
   void read_origin(MapDescription& map) const {
     const YAML::Node origin = required("origin");
     if (!origin.IsSequence() || origin.size() < 2 || origin.size() > 3) {
-      refuse("origin is no pose", origin, "[x, y, yaw] in m, m, rad", "something else", "write e.g. [-10.0, -10.0, 0]");
+      refuse("origin is no pose", origin, "[x, y, yaw] in m, m, rad", "something else",
+             "write e.g. [-10.0, -10.0, 0]");
     }
     map.origin_x_m = number(origin[0], "origin x");
     map.origin_y_m = number(origin[1], "origin y");
@@ -79,9 +81,11 @@ class MapYaml {
   }
 
   void read_thresholds(MapDescription& map) const {
-    if (optional("occupied_thresh")) map.occupied_threshold = number(root_["occupied_thresh"], "occupied_thresh");
+    if (optional("occupied_thresh"))
+      map.occupied_threshold = number(root_["occupied_thresh"], "occupied_thresh");
     if (optional("free_thresh")) map.free_threshold = number(root_["free_thresh"], "free_thresh");
-    if (!(0.0 <= map.free_threshold && map.free_threshold < map.occupied_threshold && map.occupied_threshold <= 1.0)) {
+    if (!(0.0 <= map.free_threshold && map.free_threshold < map.occupied_threshold &&
+          map.occupied_threshold <= 1.0)) {
       const YAML::Node at = optional("free_thresh") ? root_["free_thresh"] : root_["occupied_thresh"];
       refuse("thresholds are out of order", at, "0 <= free_thresh < occupied_thresh <= 1",
              "free_thresh " + std::to_string(map.free_threshold) + ", occupied_thresh " +
@@ -101,7 +105,8 @@ class MapYaml {
 
   std::string text(const YAML::Node& node, const char* key) const {
     if (!node.IsScalar() || node.Scalar().empty()) {
-      refuse(std::string(key) + " is no text", node, "one word or path", "something else", "correct the value");
+      refuse(std::string(key) + " is no text", node, "one word or path", "something else",
+             "correct the value");
     }
     return node.Scalar();
   }
@@ -128,7 +133,8 @@ class MapYaml {
 
   [[noreturn]] void refuse(const std::string& what, const YAML::Node& at, const std::string& expected,
                            const std::string& found, const std::string& remedy) const {
-    throw MapError({what, where(at.IsDefined() ? at.Mark() : YAML::Mark::null_mark()), expected, found, remedy});
+    throw MapError(
+        {what, where(at.IsDefined() ? at.Mark() : YAML::Mark::null_mark()), expected, found, remedy});
   }
 
   fs::path path_;
@@ -138,7 +144,8 @@ class MapYaml {
 void require_file(const fs::path& path, const char* what) {
   std::error_code error;
   if (!fs::exists(path, error)) {
-    throw MapError({std::string(what) + " does not exist", path.string(), "a file", "none", "check the path"});
+    throw MapError(
+        {std::string(what) + " does not exist", path.string(), "a file", "none", "check the path"});
   }
   if (!fs::is_regular_file(path, error) || !std::ifstream(path)) {
     throw MapError({std::string(what) + " cannot be opened", path.string(), "a readable file",
@@ -152,16 +159,18 @@ GreyImage read_image(const fs::path& path) {
   std::ifstream(path, std::ios::binary).read(magic.data(), magic.size());
   if (magic[0] == 'P' && (magic[1] == '2' || magic[1] == '5')) return read_pgm(path);
   if (std::equal(magic.begin(), magic.begin() + 4, "\x89PNG")) return read_png(path);
-  throw MapError({"map image has another format", path.string(), "PGM (P2 or P5) or PNG", "neither's first bytes",
-                  "convert the image to PGM or PNG"});
+  throw MapError({"map image has another format", path.string(), "PGM (P2 or P5) or PNG",
+                  "neither's first bytes", "convert the image to PGM or PNG"});
 }
 
 }  // namespace
 
 void check_image_size(const fs::path& path, unsigned long long width, unsigned long long height) {
-  if (width == 0 || height == 0 || width > kMaxMapCells || height > kMaxMapCells || width * height > kMaxMapCells) {
-    throw MapError({"map image has an unusable size", path.string(), "1 to " + std::to_string(kMaxMapCells) + " cells",
-                    std::to_string(width) + " x " + std::to_string(height), "crop the map or lower its resolution"});
+  if (width == 0 || height == 0 || width > kMaxMapCells || height > kMaxMapCells ||
+      width * height > kMaxMapCells) {
+    throw MapError(
+        {"map image has an unusable size", path.string(), "1 to " + std::to_string(kMaxMapCells) + " cells",
+         std::to_string(width) + " x " + std::to_string(height), "crop the map or lower its resolution"});
   }
 }
 

@@ -8,7 +8,10 @@ namespace mauve_examples {
 
 bool MappingCore::configure_hook() {
   const GridMap world = load_map(shell().map.value());
-  shell().map_update([&world](OccupancyGrid& map) { map.configure(world); });
+  shell().map_update([&world](OccupancyGrid& map) {
+    // What was drawn before remains, unless it was of another world.
+    if (map.geometry() != world) map.configure(world);
+  });
   scan_ = std::make_unique<Scan>();
   update_ = std::make_unique<MapUpdate>();
   update_->resolution_m = world.resolution_m;
@@ -21,14 +24,25 @@ bool MappingCore::configure_hook() {
   return true;
 }
 
+bool MappingCore::read_scan_and_its_pose() {
+  // Equal writer's times: the scan was taken at this pose, and not at the one before or after. On another CPU
+  // than the robot's both are read at the very instant they are written, so a pair that does not match is
+  // common: the next does.
+  constexpr int kAttempts = 10;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    mauve::time_ns_t scan_time_ns = 0;
+    if (shell().scan.read(*scan_, &scan_time_ns) == mauve::DataStatus::none) return false;
+    const mauve::Sample<Pose2D> pose = shell().pose.read();
+    pose_ = pose.value;
+    if (pose.time_ns == scan_time_ns) return true;
+  }
+  return false;
+}
+
 void MappingCore::integrate() {
-  const mauve::Sample<Pose2D> pose = shell().pose.read();
-  mauve::time_ns_t scan_time_ns = 0;
-  const mauve::DataStatus status = shell().scan.read(*scan_, &scan_time_ns);
-  // Equal writer's times: the scan was taken at this pose, and not at the one before or after.
-  const bool belong_together = status == mauve::DataStatus::new_data && pose.time_ns == scan_time_ns;
+  const bool has_scan = read_scan_and_its_pose();
   shell().map_update([&](OccupancyGrid& map) {
-    if (belong_together) integrate_scan(*scan_, pose.value, map);
+    if (has_scan) integrate_scan(*scan_, pose_, map);
     collect_changes(map);
   });
   if (update_->tiles.empty()) return;

@@ -31,7 +31,8 @@ void Navigator::follow(std::span<const std::int8_t> cells, const Pose2D& robot, 
   path_.advance();
 }
 
-bool Navigator::blocked(std::span<const std::int8_t> cells, const Pose2D& robot, double look_ahead_m) const noexcept {
+bool Navigator::blocked(std::span<const std::int8_t> cells, const Pose2D& robot,
+                        double look_ahead_m) const noexcept {
   if (path_.finished()) return false;
   const Point& target = path_.target();
   // A robot that already is too near to something can only go on: no plan would start better.
@@ -73,7 +74,8 @@ bool Navigator::leaves_room(std::span<const std::int8_t> cells, Cell cell) const
   return across * across + along * along >= reach * reach;
 }
 
-bool Navigator::line_leaves_room(std::span<const std::int8_t> cells, const Point& from, const Point& to) const noexcept {
+bool Navigator::line_leaves_room(std::span<const std::int8_t> cells, const Point& from,
+                                 const Point& to) const noexcept {
   return line_is_clear(geometry_, from, to, [&](Cell cell) { return leaves_room(cells, cell); });
 }
 

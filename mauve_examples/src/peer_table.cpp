@@ -37,16 +37,19 @@ PeerTable::Received PeerTable::receive(const PeerMessage& message, std::uint32_t
 }
 
 Peer* PeerTable::find(std::string_view name) noexcept {
-  const auto found = std::find_if(peers_.begin(), peers_.end(), [&](const Peer& peer) { return peer.name == name; });
+  const auto found =
+      std::find_if(peers_.begin(), peers_.end(), [&](const Peer& peer) { return peer.name == name; });
   return found == peers_.end() ? nullptr : &*found;
 }
 
 bool PeerTable::all_answered(std::uint32_t round) const noexcept {
-  return std::all_of(peers_.begin(), peers_.end(), [&](const Peer& peer) { return peer.answered_round >= round; });
+  return std::all_of(peers_.begin(), peers_.end(),
+                     [&](const Peer& peer) { return peer.answered_round >= round; });
 }
 
 bool PeerTable::all_merged(std::uint32_t batch) const noexcept {
-  return std::all_of(peers_.begin(), peers_.end(), [&](const Peer& peer) { return peer.acked_batch >= batch; });
+  return std::all_of(peers_.begin(), peers_.end(),
+                     [&](const Peer& peer) { return peer.acked_batch >= batch; });
 }
 
 void PeerTable::write_acks(PeerMessage& message) const noexcept {

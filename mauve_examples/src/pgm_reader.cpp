@@ -44,7 +44,8 @@ class PgmWords {
   std::size_t position() const { return position_; }
 
   [[noreturn]] void truncated(const std::string& what) const {
-    throw MapError({"map image is truncated", path_.string(), what, "end of file after " + std::to_string(bytes_.size()) + " bytes",
+    throw MapError({"map image is truncated", path_.string(), what,
+                    "end of file after " + std::to_string(bytes_.size()) + " bytes",
                     "copy or write the image again"});
   }
 
@@ -63,7 +64,8 @@ class PgmWords {
     return std::nullopt;
   }
 
-  [[noreturn]] void refuse(const std::string& what, const std::string& expected, const std::string& found) const {
+  [[noreturn]] void refuse(const std::string& what, const std::string& expected,
+                           const std::string& found) const {
     throw MapError({"map image is no valid PGM", path_.string(), what + " to be " + expected, found,
                     "save the image as an 8 bit PGM or as a PNG"});
   }
@@ -85,8 +87,8 @@ GreyImage read_pgm(const std::filesystem::path& path) {
   check_image_size(path, width, height);
   const auto white = words.number("maximum value", 65'535);
   if (white == 0 || white > 255) {
-    throw MapError({"map image has another depth", path.string(), "a maximum value of 1 to 255", std::to_string(white),
-                    "save the image with 8 bits a pixel"});
+    throw MapError({"map image has another depth", path.string(), "a maximum value of 1 to 255",
+                    std::to_string(white), "save the image with 8 bits a pixel"});
   }
 
   GreyImage image{static_cast<int>(width), static_cast<int>(height), {}};
@@ -94,14 +96,16 @@ GreyImage read_pgm(const std::filesystem::path& path) {
   image.shades.reserve(pixels);
   if (raw) {
     words.end_header();
-    if (bytes.size() - words.position() < pixels) words.truncated(std::to_string(pixels) + " bytes of pixels");
+    if (bytes.size() - words.position() < pixels)
+      words.truncated(std::to_string(pixels) + " bytes of pixels");
   }
   for (std::size_t i = 0; i < pixels; ++i) {
     const auto value = raw ? static_cast<unsigned char>(bytes[words.position() + i])
                            : words.number("pixel " + std::to_string(i), white);
     if (value > white) {
-      throw MapError({"map image is no valid PGM", path.string(), "pixels of at most " + std::to_string(white),
-                      std::to_string(value), "save the image again"});
+      throw MapError({"map image is no valid PGM", path.string(),
+                      "pixels of at most " + std::to_string(white), std::to_string(value),
+                      "save the image again"});
     }
     image.shades.push_back(static_cast<double>(value) / static_cast<double>(white));
   }

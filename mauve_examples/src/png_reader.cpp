@@ -12,17 +12,15 @@ namespace {
 /// Frees what libpng holds, also when an error leaves the reader.
 struct PngHandle {
   png_image image{};
-  PngHandle() {
-    image.version = PNG_IMAGE_VERSION;
-  }
+  PngHandle() { image.version = PNG_IMAGE_VERSION; }
   ~PngHandle() { png_image_free(&image); }
   PngHandle(const PngHandle&) = delete;
   PngHandle& operator=(const PngHandle&) = delete;
 };
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const PngHandle& png) {
-  throw MapError({"map image cannot be read", path.string(), "a complete PNG image",
-                  png.image.message, "copy or save the image again"});
+  throw MapError({"map image cannot be read", path.string(), "a complete PNG image", png.image.message,
+                  "copy or save the image again"});
 }
 
 }  // namespace
@@ -32,7 +30,8 @@ GreyImage read_png(const std::filesystem::path& path) {
   if (png_image_begin_read_from_file(&png.image, path.c_str()) == 0) refuse(path, png);
   check_image_size(path, png.image.width, png.image.height);
   const bool has_alpha = (png.image.format & PNG_FORMAT_FLAG_ALPHA) != 0U;
-  // Without the flag, 16 bit images would be taken as linear light and come out brighter than they were painted.
+  // Without the flag, 16 bit images would be taken as linear light and come out brighter than they were
+  // painted.
   png.image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
   png.image.format = PNG_FORMAT_RGBA;
 

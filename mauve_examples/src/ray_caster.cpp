@@ -9,7 +9,8 @@ namespace mauve_examples {
 
 BeamTable::BeamTable() noexcept {
   for (std::size_t i = 0; i < kBeamCount; ++i) {
-    const double angle_rad = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(kBeamCount);
+    const double angle_rad =
+        2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(kBeamCount);
     beams_[i] = {std::cos(angle_rad), std::sin(angle_rad)};
   }
 }
@@ -19,7 +20,8 @@ const BeamTable& beam_table() noexcept {
   return table;
 }
 
-double cast_ray(const GridMap& map, const Point& from, const Direction& direction, double max_range_m) noexcept {
+double cast_ray(const GridMap& map, const Point& from, const Direction& direction,
+                double max_range_m) noexcept {
   double range_m = std::numeric_limits<double>::infinity();
   traverse(map, from, direction, max_range_m, [&](Cell cell, double entry_m) {
     if (map.is_free(cell)) return true;

@@ -17,7 +17,7 @@ std::vector<std::uint8_t> standable_cells(const GridMap& map, double radius_m) {
 }
 
 std::vector<std::size_t> spread(const GridGeometry& grid, const std::vector<std::uint8_t>& standable,
-                                std::vector<std::size_t> seeds, std::vector<std::uint8_t>& reached) {
+                                const std::vector<std::size_t>& seeds, std::vector<std::uint8_t>& reached) {
   std::vector<std::size_t> order;
   for (const std::size_t seed : seeds) {
     if (standable[seed] == 0 || reached[seed] != 0) continue;
@@ -40,7 +40,8 @@ std::vector<std::size_t> spread(const GridGeometry& grid, const std::vector<std:
   return order;
 }
 
-std::vector<std::uint8_t> reachable_cells(const GridMap& map, std::span<const Pose2D> starts, double radius_m) {
+std::vector<std::uint8_t> reachable_cells(const GridMap& map, std::span<const Pose2D> starts,
+                                          double radius_m) {
   constexpr double kSnap_m = 0.5;
   const std::vector<std::uint8_t> standable = standable_cells(map, radius_m);
   std::vector<std::size_t> seeds;

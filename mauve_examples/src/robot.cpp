@@ -45,12 +45,20 @@ void RobotCore::move() {
     mauve::trace_mark(collision_mark_, ++collisions_);
   }
   body_ = next;
-  shell().pose.write(body_.pose);
 }
 
 void RobotCore::sense() {
   range_scan(world_, body_.pose, static_cast<float>(shell().max_range.value()), *scan_);
+  // One right after the other: who reads both on another CPU seldom gets one of them without the other.
+  shell().pose.write(body_.pose);
   shell().scan.write(*scan_);
+}
+
+void RobotCore::take(mauve::CoreBase& old) noexcept {
+  if (const auto* robot = dynamic_cast<const RobotCore*>(&old)) {
+    body_ = robot->body_;
+    collisions_ = robot->collisions_;
+  }
 }
 
 void RobotFsm::define() {

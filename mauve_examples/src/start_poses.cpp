@@ -61,10 +61,12 @@ std::vector<Pose2D> start_poses(const GridMap& map, std::size_t count, std::uint
   }
 
   if (!region.empty()) {
-    // The region again, now in the order of the way from the first robot: the others stand near, on its side of walls.
+    // The region again, now in the order of the way from the first robot: the others stand near, on its side
+    // of walls.
     std::sort(region.begin(), region.end());
     std::vector<std::uint8_t> reached(map.cell_count(), 0);
-    const std::vector<std::size_t> by_distance = spread(map, standable, {region[random.below(region.size())]}, reached);
+    const std::vector<std::size_t> by_distance =
+        spread(map, standable, {region[random.below(region.size())]}, reached);
     for (const std::size_t index : by_distance) {
       const Point at = map.centre(map.cell(index));
       const bool apart = std::all_of(poses.begin(), poses.end(), [&](const Pose2D& other) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The mission without threads, kernel or ROS: the components' algorithms stepped in one loop, as fast as they go.
+// The mission without threads, kernel or ROS: the components' algorithms stepped in one loop, as fast as they
+// go.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +27,8 @@ struct SimulationOptions {
   std::uint64_t seed{1};
   double link_lost_s{1e9};
   double link_back_s{1e9};
-  bool local_while_lost{false};  // swap to deciding alone a second after the loss, and back 3 s after the return
+  bool local_while_lost{
+      false};  // swap to deciding alone a second after the loss, and back 3 s after the return
   double drop_share{0.0};
   double duration_s{300.0};
 };
@@ -58,7 +60,8 @@ struct SimulatedRobot {
 
 class MissionSimulation {
  public:
-  MissionSimulation(const GridMap& map, const SimulationOptions& options, const ExplorerOptions& explorer = {})
+  MissionSimulation(const GridMap& map, const SimulationOptions& options,
+                    const ExplorerOptions& explorer = {})
       : map_(map), options_(options) {
     const std::vector<Pose2D> starts = start_poses(map, options.robots, options.seed);
     reachable_ = reachable_cells(map, starts, kRobotRadius_m);
@@ -96,7 +99,8 @@ class MissionSimulation {
   bool run() { return run_until(options_.duration_s); }
 
   bool all_done() const {
-    return now_s() > 1.0 && std::all_of(robots_.begin(), robots_.end(), [](const auto& robot) { return robot->explorer.done(); });
+    return now_s() > 1.0 && std::all_of(robots_.begin(), robots_.end(),
+                                        [](const auto& robot) { return robot->explorer.done(); });
   }
   double now_s() const { return static_cast<double>(now_ns_) * 1e-9; }
   const std::vector<std::unique_ptr<SimulatedRobot>>& robots() const { return robots_; }
@@ -108,7 +112,8 @@ class MissionSimulation {
   }
   double union_coverage() const {
     return share([&](std::size_t cell) {
-      return std::any_of(robots_.begin(), robots_.end(), [&](const auto& robot) { return robot->map.cells()[cell] == kFree; });
+      return std::any_of(robots_.begin(), robots_.end(),
+                         [&](const auto& robot) { return robot->map.cells()[cell] == kFree; });
     });
   }
   /// Share of the cells known to any robot whose state is the true one.
@@ -139,9 +144,12 @@ class MissionSimulation {
 
   bool link_up() const { return now_s() < options_.link_lost_s || now_s() >= options_.link_back_s; }
   bool local() const {
-    return options_.local_while_lost && now_s() >= options_.link_lost_s + 1.0 && now_s() < options_.link_back_s + 3.0;
+    return options_.local_while_lost && now_s() >= options_.link_lost_s + 1.0 &&
+           now_s() < options_.link_back_s + 3.0;
   }
-  bool every(std::int64_t period_ns, std::int64_t offset_ns = 0) const { return (now_ns_ - offset_ns) % period_ns == 0; }
+  bool every(std::int64_t period_ns, std::int64_t offset_ns = 0) const {
+    return (now_ns_ - offset_ns) % period_ns == 0;
+  }
 
   void step_robot(SimulatedRobot& robot, std::size_t number) {
     // The robots' grids are out of phase, as those of processes started one after the other.
@@ -174,7 +182,8 @@ class MissionSimulation {
   }
 
   void guide(SimulatedRobot& robot) {
-    const bool blocked = !robot.navigator.path().finished() && robot.navigator.blocked(robot.map.cells(), robot.body.pose, 4.0);
+    const bool blocked = !robot.navigator.path().finished() &&
+                         robot.navigator.blocked(robot.map.cells(), robot.body.pose, 4.0);
     const bool stalled = robot.navigator.stalled(robot.body.pose, now_ns_, 2'000'000'000);
     const bool moved = robot.has_goal && distance_m(robot.goal, robot.planned_goal) > 0.0;
     if (robot.has_goal && (moved || blocked || stalled || robot.needs_path)) {
@@ -207,7 +216,8 @@ class MissionSimulation {
     }
     robot.explorer.refresh(robot.map);
     robot.explorer.look(robot.body.pose, now_ns_);
-    const bool chosen = local() ? robot.explorer.decide_alone(now_ns_) : robot.explorer.decide_together(now_ns_);
+    const bool chosen =
+        local() ? robot.explorer.decide_alone(now_ns_) : robot.explorer.decide_together(now_ns_);
     if (chosen) {
       robot.goal = robot.explorer.destination();
       robot.has_goal = true;

@@ -18,7 +18,8 @@ PeerMessage from(const char* sender, std::uint32_t sequence, std::uint32_t round
   return message;
 }
 
-PeerMessage acking(PeerMessage message, const char* peer, std::uint32_t sequence, std::uint32_t round, std::uint32_t batch = 0) {
+PeerMessage acking(PeerMessage message, const char* peer, std::uint32_t sequence, std::uint32_t round,
+                   std::uint32_t batch = 0) {
   message.acks.push_back({RobotName(peer), sequence, round, batch});
   return message;
 }
@@ -143,8 +144,10 @@ TEST(Auction, AloneTheCheapestAwayFromLastClaimsIsTaken) {
   message.has_claim = true;
   message.claim = {0.0, 0.0, 1.0};
   peers.receive(message, 0);
-  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 9.0}}), peers, {}), 1U);
-  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 19.0}}), peers, {}), 0U);
+  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 9.0}}), peers, {}),
+            1U);
+  EXPECT_EQ(choose_alone(frontiers({{{0.0, 0.0, 0.0}, 1.0, 6.0}, {{20.0, 0.0, 0.0}, 1.0, 19.0}}), peers, {}),
+            0U);
   EXPECT_EQ(choose_alone({}, peers, {}), std::nullopt);
 }
 
@@ -180,7 +183,8 @@ TEST_F(Rounds, NoGoalIsTakenBeforeThePeerHasAnswered) {
     EXPECT_FALSE(explorer_.decide_together(tick));
     EXPECT_EQ(compose().round, 1U);
     EXPECT_FALSE(message_->bids.empty());
-    explorer_.receive(acking(from("b", static_cast<std::uint32_t>(tick) + 1), "a", 1, 0));  // it heard an earlier message
+    explorer_.receive(
+        acking(from("b", static_cast<std::uint32_t>(tick) + 1), "a", 1, 0));  // it heard an earlier message
   }
   explorer_.receive(acking(from("b", 200), "a", 50, 1));
   explorer_.look(pose_, 100);
@@ -215,11 +219,16 @@ TEST_F(Rounds, TwoOpenRoundsAnswerEachOther) {
 }
 
 TEST_F(Rounds, ARobotWithNothingLeftStillAnswers) {
-  const GridMap known = load_map(testing::own_map("arena"));
+  OccupancyGrid known;
+  known.configure({20, 20, 0.1, 0.0, 0.0});
+  for (int i = 0; i < 400; ++i) known.observe_free({i % 20, i / 20});
   Explorer idle;
-  idle.configure(known, "b", {"a"}, {});
+  idle.configure(known.geometry(), "b", {"a"}, {});
   idle.receive(from("a", 1, 17));
-  idle.look({-4.0, -4.0, 0.0}, 0);
+  idle.look({1.0, 1.0, 0.0}, 0);
+  EXPECT_FALSE(idle.done()) << "it has not even looked yet";
+  idle.refresh(known);
+  idle.look({1.0, 1.0, 0.0}, 0);
   EXPECT_TRUE(idle.done());
   EXPECT_FALSE(idle.decide_together(0));
   idle.compose(*message_);

@@ -41,7 +41,8 @@ TEST(Exploration, WithoutTheLinkTheRobotsStallWithItTheyGoOn) {
 TEST(Exploration, DecidingAloneCoverageGrowsWhileTheLinkIsDown) {
   const GridMap map = load_map(testing::own_map("office"));
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    MissionSimulation mission(map, {.seed = seed, .link_lost_s = 20.0, .link_back_s = 45.0, .local_while_lost = true});
+    MissionSimulation mission(
+        map, {.seed = seed, .link_lost_s = 20.0, .link_back_s = 45.0, .local_while_lost = true});
     mission.run_until(22.0);
     const double at_loss = mission.union_coverage();
     mission.run_until(45.0);

@@ -17,7 +17,8 @@ FrontierOptions fine() { return {0.3, 3.0, 0.5, 0.0}; }
 
 TEST(Frontiers, AreReachableFreeCellsBesideTheUnknown) {
   // The right room ends in the unknown; the lower one too, but no way leads there.
-  const GridMap map = testing::drawn({"##########", "#....##..#", "#........ ", "#....##..#", "##########", "#.......  ", "##########"});
+  const GridMap map = testing::drawn(
+      {"##########", "#....##..#", "#........ ", "#....##..#", "##########", "#.......  ", "##########"});
   FrontierFinder finder;
   finder.configure(map, fine());
   const FrontierList& list = finder.find(map.cells, {1.5, 3.5, 0.0});
@@ -100,7 +101,8 @@ TEST(Reachability, SpreadsFromTheStartsOverWhereTheRobotFits) {
   const GridMap map = testing::drawn({"#########", "#...#...#", "#...#...#", "#...#...#", "#########"}, 0.3);
   const std::vector<Pose2D> starts{{0.75, 0.75, 0.0}};
   const auto mask = reachable_cells(map, starts, 0.2);
-  EXPECT_EQ(std::count(mask.begin(), mask.end(), 1), 1);  // the centres of the outer cells are 15 cm from the wall
+  EXPECT_EQ(std::count(mask.begin(), mask.end(), 1),
+            1);  // the centres of the outer cells are 15 cm from the wall
   EXPECT_EQ(mask[map.index({2, 2})], 1);
   const auto thin = reachable_cells(map, starts, 0.1);
   EXPECT_EQ(std::count(thin.begin(), thin.end(), 1), 9);

@@ -13,7 +13,8 @@ namespace {
 
 using testing::TemporaryFolder;
 
-const std::string kYaml = "image: map.pgm\nresolution: 0.5\norigin: [-1.0, -2.0, 0.0]\nnegate: 0\n";
+/// A map file that is in order; more keys can be added.
+std::string good_yaml() { return "image: map.pgm\nresolution: 0.5\norigin: [-1.0, -2.0, 0.0]\nnegate: 0\n"; }
 
 /// Loads a map made of the two texts.
 GridMap load(const std::string& yaml, const std::string& image, const std::string& image_name = "map.pgm") {
@@ -36,7 +37,8 @@ std::string refusal(const std::string& yaml, const std::string& image = "P5 2 1 
 }
 
 TEST(MapFile, ReadsTrinaryCellsWithTheLowestRowFirst) {
-  const GridMap map = load(kYaml, std::string("P5\n3 2\n255\n") + "\xFE\xCD" + std::string(1, '\0') + "\xFE\xFE\xFE");
+  const GridMap map =
+      load(good_yaml(), std::string("P5\n3 2\n255\n") + "\xFE\xCD" + std::string(1, '\0') + "\xFE\xFE\xFE");
   EXPECT_EQ(map.width, 3);
   EXPECT_EQ(map.height, 2);
   EXPECT_DOUBLE_EQ(map.resolution_m, 0.5);
@@ -47,27 +49,29 @@ TEST(MapFile, ReadsTrinaryCellsWithTheLowestRowFirst) {
 }
 
 TEST(MapFile, GreyIsUnknownUnderTheThresholdsOfMapSaver) {
-  const GridMap map = load(kYaml + "free_thresh: 0.196\noccupied_thresh: 0.65\n", "P5 2 1 255\n\xCD\xFE");
+  const GridMap map =
+      load(good_yaml() + "free_thresh: 0.196\noccupied_thresh: 0.65\n", "P5 2 1 255\n\xCD\xFE");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kUnknown, kFree}));
 }
 
 TEST(MapFile, TakesCommentsAnywhereInTheHeader) {
-  const GridMap map = load(kYaml, "P5\n# made by hand\n2 # two wide\n1\n#255 is white\n255\n\xFE\xFE");
+  const GridMap map = load(good_yaml(), "P5\n# made by hand\n2 # two wide\n1\n#255 is white\n255\n\xFE\xFE");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kFree, kFree}));
 }
 
 TEST(MapFile, PixelsMayLookLikeComments) {
-  const GridMap map = load(kYaml, "P5 3 1 255\n#\n\xFE");
+  const GridMap map = load(good_yaml(), "P5 3 1 255\n#\n\xFE");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kOccupied, kOccupied, kFree}));
 }
 
 TEST(MapFile, ReadsPlainPgmWithAnotherWhite) {
-  const GridMap map = load(kYaml, "P2\n3 1\n# half is unknown\n10\n10 5 # here too\n0");
+  const GridMap map = load(good_yaml(), "P2\n3 1\n# half is unknown\n10\n10 5 # here too\n0");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kFree, kUnknown, kOccupied}));
 }
 
 TEST(MapFile, NegateSwapsFreeAndOccupied) {
-  const GridMap map = load("image: map.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 1\n", "P2 2 1 255 255 0");
+  const GridMap map =
+      load("image: map.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 1\n", "P2 2 1 255 255 0");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kOccupied, kFree}));
 }
 
@@ -84,8 +88,11 @@ TEST_P(PngColours, AreAveraged) {
   image.format = format;
   const std::vector<png_byte> palette{255, 255, 255, 0, 0, 0};
   image.colormap_entries = 2;
-  ASSERT_NE(png_image_write_to_file(&image, (folder.path() / "map.png").c_str(), 0, pixels.data(), 0, palette.data()), 0);
-  const GridMap map = load_map(folder.write("map.yaml", "image: map.png\nresolution: 1\norigin: [0, 0, 0]\n"));
+  ASSERT_NE(png_image_write_to_file(&image, (folder.path() / "map.png").c_str(), 0, pixels.data(), 0,
+                                    palette.data()),
+            0);
+  const GridMap map =
+      load_map(folder.write("map.yaml", "image: map.png\nresolution: 1\norigin: [0, 0, 0]\n"));
   EXPECT_EQ(map.cells[0], kFree);
   // nav2_map_server counts alpha as a channel: opaque black is a quarter (or half) white.
   EXPECT_EQ(map.cells[1], kOccupied);
@@ -100,41 +107,50 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{PNG_FORMAT_RGB_COLORMAP, std::vector<png_byte>{0, 1}}));
 
 TEST(MapFile, RefusesWithOneLineThatNamesWhatIsWrong) {
-  EXPECT_NE(refusal("image: map.pgm\nresolution: -0.05\norigin: [0, 0, 0]\n").find("resolution"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: 0\norigin: [0, 0, 0]\n").find("map.yaml:2"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: fine\norigin: [0, 0, 0]\n").find("'fine'"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: .nan\norigin: [0, 0, 0]\n").find("resolution"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, 0, 0.7]\n").find("turned"), std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: -0.05\norigin: [0, 0, 0]\n").find("resolution"),
+            std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: 0\norigin: [0, 0, 0]\n").find("map.yaml:2"),
+            std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: fine\norigin: [0, 0, 0]\n").find("'fine'"),
+            std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: .nan\norigin: [0, 0, 0]\n").find("resolution"),
+            std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, 0, 0.7]\n").find("turned"),
+            std::string::npos);
   EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: 3\n").find("origin"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, zero, 0]\n").find("'zero'"), std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, zero, 0]\n").find("'zero'"),
+            std::string::npos);
   EXPECT_NE(refusal("image: map.pgm\nresolution: 1\n").find("key origin"), std::string::npos);
   EXPECT_NE(refusal("resolution: 1\norigin: [0, 0, 0]\n").find("key image"), std::string::npos);
-  EXPECT_NE(refusal(kYaml + "mode: scale\n").find("trinary"), std::string::npos);
-  EXPECT_NE(refusal(kYaml + "occupied_thresh: 0.2\nfree_thresh: 0.3\n").find("thresholds"), std::string::npos);
-  EXPECT_NE(refusal(kYaml + "occupied_thresh: 1.5\n").find("thresholds"), std::string::npos);
-  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n").find("maybe"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml() + "mode: scale\n").find("trinary"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml() + "occupied_thresh: 0.2\nfree_thresh: 0.3\n").find("thresholds"),
+            std::string::npos);
+  EXPECT_NE(refusal(good_yaml() + "occupied_thresh: 1.5\n").find("thresholds"), std::string::npos);
+  EXPECT_NE(refusal("image: map.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n").find("maybe"),
+            std::string::npos);
   EXPECT_NE(refusal("P5 2 1 255\n").find("map.yaml"), std::string::npos);
   EXPECT_NE(refusal("{image: [").find("YAML"), std::string::npos);
 }
 
 TEST(MapFile, RefusesImagesThatCannotBeUsed) {
-  EXPECT_NE(refusal(kYaml, "P5 2 2 255\n\xFE\xFE\xFE").find("truncated"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P5 2").find("truncated"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P2 2 1 255 254").find("truncated"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P2 2 1 255 254 x").find("PGM"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P2 2 1 10 3 11").find("10"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P5 2 1 65535\n\xFE\xFE\xFE\xFE").find("8 bits"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P5 0 1 255\n").find("size"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "P5 900000 900000 255\n").find("size"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "GIF89a").find("another format"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "").find("another format"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, "\x89PNG\r\n\x1a\n and no more").find("PNG"), std::string::npos);
-  EXPECT_NE(refusal(kYaml, std::string("P5 2 1 255\n") + std::string(2, '\0')).find("no free space"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P5 2 2 255\n\xFE\xFE\xFE").find("truncated"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P5 2").find("truncated"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P2 2 1 255 254").find("truncated"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P2 2 1 255 254 x").find("PGM"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P2 2 1 10 3 11").find("10"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P5 2 1 65535\n\xFE\xFE\xFE\xFE").find("8 bits"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P5 0 1 255\n").find("size"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "P5 900000 900000 255\n").find("size"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "GIF89a").find("another format"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "").find("another format"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), "\x89PNG\r\n\x1a\n and no more").find("PNG"), std::string::npos);
+  EXPECT_NE(refusal(good_yaml(), std::string("P5 2 1 255\n") + std::string(2, '\0')).find("no free space"),
+            std::string::npos);
 }
 
 TEST(MapFile, RefusesMissingFilesNamingThem) {
   const TemporaryFolder folder;
-  const auto yaml = folder.write("map.yaml", kYaml);
+  const auto yaml = folder.write("map.yaml", good_yaml());
   EXPECT_THROW(load_map(yaml), MapError);
   EXPECT_THROW(load_map(folder.path()), MapError);
   try {
@@ -156,7 +172,8 @@ TEST(MapFile, ReadsTheMapsOfTheProject) {
 }
 
 TEST(MapFile, ReadsRealMaps) {
-  if (!std::filesystem::exists(testing::shared_map("depot"))) GTEST_SKIP() << "no folder shared/maps beside the clone";
+  if (!std::filesystem::exists(testing::shared_map("depot")))
+    GTEST_SKIP() << "no folder shared/maps beside the clone";
   const GridMap depot = load_map(testing::shared_map("depot"));
   EXPECT_EQ(depot.width, 604);
   EXPECT_EQ(depot.height, 307);

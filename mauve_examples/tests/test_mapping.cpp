@@ -13,7 +13,8 @@
 namespace mauve_examples {
 namespace {
 
-std::vector<Cell> cells_on(const GridGeometry& grid, const Point& from, const Direction& direction, double length_m) {
+std::vector<Cell> cells_on(const GridGeometry& grid, const Point& from, const Direction& direction,
+                           double length_m) {
   std::vector<Cell> cells;
   traverse(grid, from, direction, length_m, [&](Cell cell, double) {
     cells.push_back(cell);

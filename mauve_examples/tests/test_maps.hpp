@@ -14,9 +14,13 @@
 
 namespace mauve_examples::testing {
 
-inline std::filesystem::path source_folder() { return std::filesystem::path(__FILE__).parent_path().parent_path(); }
+inline std::filesystem::path source_folder() {
+  return std::filesystem::path(__FILE__).parent_path().parent_path();
+}
 /// A map that the project ships.
-inline std::filesystem::path own_map(const std::string& name) { return source_folder() / "maps" / (name + ".yaml"); }
+inline std::filesystem::path own_map(const std::string& name) {
+  return source_folder() / "maps" / (name + ".yaml");
+}
 /// A real map beside the clone, which not everybody has.
 inline std::filesystem::path shared_map(const std::string& name) {
   return source_folder().parent_path().parent_path() / "shared" / "maps" / (name + ".yaml");

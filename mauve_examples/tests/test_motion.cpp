@@ -54,7 +54,8 @@ TEST(Unicycle, DrivesCircles) {
 
 TEST(Unicycle, TakesNonsenseForAStop) {
   Unicycle robot;
-  robot.step(velocity(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()), {}, 0.01);
+  robot.step(velocity(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()), {},
+             0.01);
   EXPECT_EQ(robot.speed_mps, 0.0);
   EXPECT_EQ(robot.turn_rate_radps, 0.0);
 }

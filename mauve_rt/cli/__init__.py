@@ -1,1 +1,1 @@
-"""The `mauve` command: an executor's services from a terminal, and a look at architecture files and plug-ins."""
+"""The `mauve` command: an executor's services, architecture files and plug-ins, from a terminal."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -18,7 +18,7 @@ DISCOVERY_TIMEOUT_S = 10.0  # seen here: 0.1 to 2.8 s
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
 LISTING_S = 3.5
 _LIST_SERVICE = "mauve_msgs/srv/ListComponents"
-_POLL_S = 0.05
+_POLL_S = 0.05  # waiting in rclpy does not end at a Ctrl-C: short waits do
 
 
 class NoExecutorError(ParameterError):
@@ -32,7 +32,9 @@ class Client:
         self._node = node
         self._executor = executor
 
-    def call(self, service_type: Any, service: str, request: Any, *, wait_s: float = DISCOVERY_TIMEOUT_S) -> Any:
+    def call(
+        self, service_type: Any, service: str, request: Any, *, wait_s: float = DISCOVERY_TIMEOUT_S
+    ) -> Any:
         """The reply of a service, e.g. `/robot_1/executor/stop`.
 
         Raises:
@@ -47,9 +49,13 @@ class Client:
                 raise NoExecutorError(f"no service {service} within {wait_s:g} s; executors seen: {seen}")
             self._executor.spin_once(timeout_sec=_POLL_S)
         future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, timeout_sec=REPLY_TIMEOUT_S)
+        deadline = time.monotonic() + REPLY_TIMEOUT_S
+        while not future.done() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=_POLL_S)
         if not future.done():
-            raise NoExecutorError(f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?")
+            raise NoExecutorError(
+                f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?"
+            )
         return future.result()
 
     def seen_executors(self) -> list[str]:
@@ -68,7 +74,8 @@ class Client:
     def listen(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
         """Call `heard` with every message, until interrupted."""
         self._node.create_subscription(message_type, topic, heard, QoSProfile(depth=100))
-        self._executor.spin()
+        while True:
+            self._executor.spin_once(timeout_sec=_POLL_S)
 
 
 @contextmanager
@@ -78,13 +85,13 @@ def connected() -> Iterator[Client]:
     context = Context()
     rclpy.init(context=context, args=[])
     try:
-        node = Node(f"mauve_{os.getpid()}", context=context, enable_rosout=False, start_parameter_services=False)
+        node = Node(
+            f"mauve_{os.getpid()}", context=context, enable_rosout=False, start_parameter_services=False
+        )
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         try:
             yield Client(node, executor)
-        except ExternalShutdownException:  # a signal while spinning
-            raise KeyboardInterrupt from None
         finally:
             executor.shutdown(timeout_sec=0)
             node.destroy_node()

@@ -3,7 +3,8 @@
     mauve list /robot_1/executor
     mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration
 
-Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such executor.
+Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such
+executor.
 """
 
 import argparse

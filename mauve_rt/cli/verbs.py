@@ -32,12 +32,16 @@ def _add_request(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("component", help="name of the component")
     parser.add_argument("--cause", default="", help="why, for the record")
     parser.add_argument("--request-id", default="", help="a repeated id returns the first outcome")
-    parser.add_argument("--expected-epoch", type=int, default=0, metavar="N", help="refuse at any other epoch")
+    parser.add_argument(
+        "--expected-epoch", type=int, default=0, metavar="N", help="refuse at any other epoch"
+    )
 
 
 def _add_timed_request(parser: argparse.ArgumentParser) -> None:
     _add_request(parser)
-    parser.add_argument("--timeout", type=float, default=0.0, metavar="S", help="seconds to wait for it (default 1)")
+    parser.add_argument(
+        "--timeout", type=float, default=0.0, metavar="S", help="seconds to wait for it (default 1)"
+    )
 
 
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +98,11 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
         print("\n  ".join([reply.message, *report_lines(reply.report)]))
     else:
         code = next(
-            (word for word in dir(service_type.Response) if word.isupper() and getattr(service_type.Response, word) == reply.code),
+            (
+                word
+                for word in dir(service_type.Response)
+                if word.isupper() and getattr(service_type.Response, word) == reply.code
+            ),
             str(reply.code),
         )
         print(f"refused, {code} ({reply.code}): {reply.message}", file=sys.stderr)
@@ -110,7 +118,10 @@ def _nodes(args: argparse.Namespace) -> int:
     if args.json:
         print_json(found)
     else:
-        print("\n".join(found) if found else "no executor on this machine", file=sys.stdout if found else sys.stderr)
+        print(
+            "\n".join(found) if found else "no executor on this machine",
+            file=sys.stdout if found else sys.stderr,
+        )
     return OK if found else BAD_USAGE
 
 
@@ -147,7 +158,9 @@ def _check(args: argparse.Namespace) -> int:
         print("\n".join(error.lines()), file=sys.stderr)
         return BAD_USAGE
     counts = (len(model.components), len(model.resources), len(model.connections))
-    print(f"{args.file}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found")
+    print(
+        f"{args.file}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found"
+    )
     return OK
 
 
@@ -159,7 +172,9 @@ def _plugins(args: argparse.Namespace) -> int:
     from mauve_rt.model import PluginIndex  # noqa: PLC0415
 
     index = PluginIndex.installed()
-    rows = sorted((plugin.kind, plugin.name, plugin.shell, plugin.target, str(plugin.prefix)) for plugin in index)
+    rows = sorted(
+        (plugin.kind, plugin.name, plugin.shell, plugin.target, str(plugin.prefix)) for plugin in index
+    )
     fields = ("kind", "name", "shell", "target", "prefix")
     if args.json:
         print_json([dict(zip(fields, row, strict=True)) for row in rows])
@@ -189,7 +204,9 @@ VERBS = (
     Verb("list", "show an executor's components", _add_executor, _list),
     Verb("stop", "stop a component", _add_timed_request, _stop),
     Verb("start", "start a stopped component", _add_request, _start),
-    Verb("replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core),
+    Verb(
+        "replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core
+    ),
     Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
     Verb("nodes", "show the executors", _add_json, _nodes),
     Verb("check", "check an architecture file without starting anything", _add_file, _check),

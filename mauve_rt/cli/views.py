@@ -11,7 +11,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-STATES = ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")  # as mauve_msgs/msg/ComponentInfo
+STATES = (
+    "UNCONFIGURED",
+    "STOPPED",
+    "RUNNING",
+    "HELD",
+    "STOPPING",
+    "FAULTED",
+)  # as mauve_msgs/msg/ComponentInfo
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _WIDE = 160
 

@@ -1,6 +1,7 @@
 """Where installed packages say what they have: the ament index, read without ROS.
 
-Prefixes are those of AMENT_PREFIX_PATH, then the interpreter's own (wheels set no path). The first one counts.
+Prefixes are those of AMENT_PREFIX_PATH, then the interpreter's own (wheels set no path). The first one
+counts.
 """
 
 import os
@@ -18,7 +19,7 @@ def prefixes() -> list[Path]:
 
 
 def resources(kind: str) -> Iterator[tuple[str, Path, Path]]:
-    """(package, prefix, index file) of every package with a resource of that kind; an overlaid package once."""
+    """(package, prefix, index file) of every package with a resource of that kind; an overlaid one once."""
     seen: set[str] = set()
     for prefix in prefixes():
         folder = prefix / _INDEX / kind

@@ -27,7 +27,7 @@ class Connection:
 
 
 class ArchitectureModel:
-    """A loaded architecture file: what it says, checked as far as the file alone tells, and where it says it."""
+    """A loaded architecture file: what it says, as far as it alone tells checked, and where it says it."""
 
     def __init__(self, file: YamlFile, content: FileModel, overrides: "Overrides") -> None:
         self.file = file
@@ -49,16 +49,20 @@ class ArchitectureModel:
         ]
         self._overridden = dict(overrides.properties)
 
-    def problem(self, location: Location, what: str, *, key: bool = False, **facts: str) -> Problem:
-        """A problem at an element of the file; names the component and element of its own accord."""
-        component, element = owner(location)
-        return self.file.problem(location, what, key=key, **{"component": component, "element": element, **facts})
+    def problem(self, location: Location, what: str, **facts: str) -> Problem:
+        """A problem at an element of the file; names component and element by itself."""
+        return self.file.problem(location, what, **{**_owner_facts(location), **facts})
+
+    def key_problem(self, location: Location, what: str, **facts: str) -> Problem:
+        """As problem(), but at the element's key rather than at its value."""
+        return self.file.key_problem(location, what, **{**_owner_facts(location), **facts})
 
     def properties(self, component: str) -> dict[str, PropertyValue]:
         """The properties of a component as it gets them: overridden, places replaced, paths made absolute.
 
         Raises:
-            ArchitectureFileError: `$(share PACKAGE)` names a package that is not installed, or an unknown `$(...)`.
+            ArchitectureFileError: `$(share PACKAGE)` names a package that is not installed, or an unknown
+            `$(...)`.
         """
         values = {}
         for name, value in self.components[component].properties.items():
@@ -86,6 +90,11 @@ class ArchitectureModel:
             raise ArchitectureFileError(self.path, [problem]) from None
 
 
+def _owner_facts(location: Location) -> dict[str, str]:
+    component, element = owner(location)
+    return {"component": component, "element": element}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Overrides:
     """What the command line says instead of the file, so that one file serves several robots.
@@ -95,7 +104,9 @@ class Overrides:
 
     namespace: str = ""  # empty: as in the file
     peers: Sequence[str] | None = None  # None: as in the file
-    properties: Mapping[tuple[str, str], PropertyValue] = field(default_factory=dict)  # by (component, property)
+    properties: Mapping[tuple[str, str], PropertyValue] = field(
+        default_factory=dict
+    )  # by (component, property)
 
 
 def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -> ArchitectureModel:
@@ -112,7 +123,12 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
     except ValidationError as error:
         raise ArchitectureFileError(file.path, schema_problems(file, error)) from None
     model = ArchitectureModel(file, content, overrides or Overrides())
-    problems = [*_override_problems(model, overrides or Overrides()), *_component_problems(model), *_resource_problems(model), *_connection_problems(model)]
+    problems = [
+        *_override_problems(model, overrides or Overrides()),
+        *_component_problems(model),
+        *_resource_problems(model),
+        *_connection_problems(model),
+    ]
     if problems:
         raise ArchitectureFileError(file.path, problems)
     return model
@@ -133,7 +149,7 @@ def _override_problems(model: ArchitectureModel, overrides: Overrides) -> Iterat
         if component not in model.components:
             what = f"parameter '{component}.{name}' sets a property of an unknown component"
             remedy = did_you_mean(component, model.components)
-            yield model.problem(("components",), what, key=True, remedy=remedy, code="unknown_component")
+            yield model.key_problem(("components",), what, remedy=remedy, code="unknown_component")
 
 
 def _component_problems(model: ArchitectureModel) -> Iterator[Problem]:
@@ -141,7 +157,7 @@ def _component_problems(model: ArchitectureModel) -> Iterator[Problem]:
     for name, component in model.components.items():
         if name in model.resources:
             what = f"'{name}' is the name of a component and of a resource"
-            yield model.problem(("resources", name), what, key=True, remedy="rename one", code="duplicate_name")
+            yield model.key_problem(("resources", name), what, remedy="rename one", code="duplicate_name")
         for index, cpu in enumerate(component.cpus or ()):
             if cpu not in online:
                 yield model.problem(
@@ -161,11 +177,13 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
             what = f"resource '{name}' has no capacity"
             yield model.problem(location, what, expected="capacity: how many elements the ring_buffer holds")
         if resource.kind in GIVEN_RESOURCES and not resource.type:
-            yield model.problem(location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point")
+            yield model.problem(
+                location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point"
+            )
         for key in ("capacity", "overwrite"):
             if resource.kind != "ring_buffer" and key in resource.model_fields_set:
                 what = f"resource '{name}' of kind {resource.kind} has no {key}"
-                yield model.problem((*location, key), what, key=True, remedy="only a ring_buffer has one")
+                yield model.key_problem((*location, key), what, remedy="only a ring_buffer has one")
 
 
 def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:

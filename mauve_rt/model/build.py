@@ -11,7 +11,9 @@ from mauve_rt.model.plugins import PluginIndex, PluginLoader
 from mauve_rt.model.yaml_file import Location
 
 
-def build(model: ArchitectureModel, registry: PluginRegistry, *, index: PluginIndex | None = None) -> Architecture:
+def build(
+    model: ArchitectureModel, registry: PluginRegistry, *, index: PluginIndex | None = None
+) -> Architecture:
     """Load the plug-ins a model names, check it against them and put the architecture together, unconfigured.
 
     Raises:
@@ -37,7 +39,9 @@ def build(model: ArchitectureModel, registry: PluginRegistry, *, index: PluginIn
                 architecture.publish(name)
     for connection in model.connections:
         with _errors_at(model, connection.location):
-            architecture.connect(connection.component, connection.port, connection.resource, connection.service)
+            architecture.connect(
+                connection.component, connection.port, connection.resource, connection.service
+            )
     return architecture
 
 
@@ -59,7 +63,9 @@ def allowed_cores(model: ArchitectureModel, component: str, index: PluginIndex) 
     return [core for core in index.cores_of(description.shell) if core != description.core]
 
 
-def _add_component(architecture: Architecture, model: ArchitectureModel, *, name: str, loader: PluginLoader) -> None:
+def _add_component(
+    architecture: Architecture, model: ArchitectureModel, *, name: str, loader: PluginLoader
+) -> None:
     component = model.components[name]
     alternatives = allowed_cores(model, name, loader.index)
     for core in alternatives:
@@ -93,7 +99,8 @@ def _errors_at(model: ArchitectureModel, place: Location) -> Iterator[None]:
         raise
     except MauveError as error:
         at = place or _place_of(model, error)
-        problem = model.problem(at, str(error), key=len(at) == 2, code=error.code)  # noqa: PLR2004 - a whole section
+        is_section = len(at) == 2  # noqa: PLR2004 - ("components", NAME)
+        problem = (model.key_problem if is_section else model.problem)(at, str(error), code=error.code)
         raise ArchitectureFileError(model.path, [problem]) from error
 
 
@@ -106,7 +113,8 @@ def _place_of(model: ArchitectureModel, error: MauveError) -> Location:
             return (*place, "fsm")
         if error.code == "bad_period":
             return (*place, "period_ns" if component.period_ns else "fsm")
-        return model.property_place(*(error.component, error.element)) if error.element in component.properties else place
+        is_property = error.element in component.properties
+        return model.property_place(error.component, error.element) if is_property else place
     for name in (error.component, error.element):
         if name in model.resources:
             return ("resources", name)

@@ -85,7 +85,7 @@ class Checks:
             if key not in known:
                 what = f"unknown {self._model.property_words(name, key)}"
                 remedy = did_you_mean(key, known)
-                yield self._model.problem(place, what, key=True, remedy=remedy, code="unknown_property")
+                yield self._model.key_problem(place, what, remedy=remedy, code="unknown_property")
             elif facts := property_mismatch(known[key], value):
                 yield self._model.problem(place, f"bad {self._model.property_words(name, key)}", **facts)
 
@@ -103,14 +103,20 @@ class Checks:
             self._resources[name] = self._loader.registry.describe_resource(resource.kind, resource.type)
         except MauveError as error:
             what = f"bad type '{resource.type}' of resource '{name}': {error}"
-            remedy = did_you_mean(resource.type, self._loader.names("type")) if error.code == "unknown_type" else ""
+            remedy = (
+                did_you_mean(resource.type, self._loader.names("type"))
+                if error.code == "unknown_type"
+                else ""
+            )
             yield self._model.problem((*place, "type"), what, remedy=remedy, code=error.code)
             return
         if resource.topic is not None and message_class(self._resources[name].type) is None:
-            what = f"resource '{name}' is bound to topic '{resource.topic.name}', but its type is no ROS message"
+            what = (
+                f"resource '{name}' is bound to topic '{resource.topic.name}', but its type is no ROS message"
+            )
             expected = "an installed message type such as geometry_msgs/msg/Point"
             found = shown(self._resources[name].type)
-            yield self._model.problem((*place, "topic"), what, key=True, expected=expected, found=found)
+            yield self._model.key_problem((*place, "topic"), what, expected=expected, found=found)
 
     def _connection(self, connection: Connection) -> Iterator[Problem]:
         shell = self._shells.get(connection.component)
@@ -120,17 +126,24 @@ class Checks:
         services = {service.name: service for service in resource.services} if resource else {}
         if shell and connection.port not in ports:
             what = f"component '{connection.component}' has no port '{connection.port}'"
-            yield self._model.problem(at_port, what, remedy=did_you_mean(connection.port, ports), code="unknown_port")
+            yield self._model.problem(
+                at_port, what, remedy=did_you_mean(connection.port, ports), code="unknown_port"
+            )
         if resource and connection.service not in services:
             what = f"resource '{connection.resource}' has no service '{connection.service}'"
             remedy = did_you_mean(connection.service, services)
             yield self._model.problem(at_service, what, remedy=remedy, code="unknown_service")
         port, service = ports.get(connection.port), services.get(connection.service)
         if resource and port and service and (port.kind, port.type) != (service.kind, service.type):
-            fitting = [other.name for other in resource.services if (other.kind, other.type) == (port.kind, port.type)]
+            shell_port = f"{connection.component}.{port.name}"
+            fitting = [
+                other.name
+                for other in resource.services
+                if (other.kind, other.type) == (port.kind, port.type)
+            ]
             yield self._model.problem(
                 at_service,
-                f"port '{connection.component}.{port.name}' does not fit '{connection.resource}.{service.name}'",
+                f"port '{shell_port}' does not fit '{connection.resource}.{service.name}'",
                 expected=f"a service of {_signature(port)}",
                 found=f"one of kind {service.kind} and type {service.type}",
                 remedy=f"connect it to {connection.resource}.{fitting[0]}" if fitting else "",
@@ -142,7 +155,9 @@ def property_mismatch(known: PropertyDescription, value: PropertyValue) -> Mappi
     """Expected and found where a value does not suit a property; empty where it does."""
     kind = {bool: "bool", int: "int", float: "float", str: "str"}[type(value)]
     if kind != known.type and (kind, known.type) != ("int", "float"):
-        wanted = {"bool": "true or false", "int": "a whole number", "float": "a number", "str": "text"}[known.type]
+        wanted = {"bool": "true or false", "int": "a whole number", "float": "a number", "str": "text"}[
+            known.type
+        ]
         remedy = "put it in quotes" if known.type == "str" else ""
         return {"expected": wanted, "found": shown(value), "remedy": remedy, "code": "type_mismatch"}
     if isinstance(value, str | bool):

@@ -11,10 +11,10 @@ Only what an architecture file names is ever loaded: no request from outside mak
 """
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, one_line
@@ -57,11 +57,14 @@ def parse_index(text: str, *, prefix: Path, origin: str) -> tuple[list[Plugin], 
         words = [word.strip() for word in content.split(";")]
         where = f"{origin}:{number}:1"
         if len(words) != _FIELDS:
-            complaints.append(f"{where}: expected 'kind; name; shell; library or module:Class', found '{content}'")
+            complaints.append(
+                f"{where}: expected 'kind; name; shell; library or module:Class', found '{content}'"
+            )
         elif words[0] not in KINDS:
             complaints.append(f"{where}: unknown kind '{words[0]}'; {did_you_mean(words[0], KINDS)}")
         elif not words[1] or not words[3] or (words[0] in ("core", "fsm") and not words[2]):
-            complaints.append(f"{where}: a {words[0]} needs a name, a library or module:Class, and a core or fsm a shell")
+            needs = "a name, a library or module:Class, and a core or fsm a shell too"
+            complaints.append(f"{where}: a {words[0]} needs {needs}")
         elif ":" in words[3] and words[0] != "core":
             complaints.append(f"{where}: only cores can be written in Python, found a {words[0]}")
         else:
@@ -107,7 +110,7 @@ class PluginIndex:
         """Names of the cores written for a shell, sorted."""
         return sorted(plugin.name for plugin in self if plugin.kind == "core" and plugin.shell == shell)
 
-    def __iter__(self) -> "Iterable[Plugin]":  # type: ignore[override]
+    def __iter__(self) -> Iterator[Plugin]:
         return iter(self._plugins.values())
 
 
@@ -162,7 +165,7 @@ class PluginLoader:
         self.registry.add_python_core(plugin.name, plugin.shell, _factory(plugin))
 
 
-def _factory(plugin: Plugin) -> Callable[[object], object]:
+def _factory(plugin: Plugin) -> Callable[[Any], object]:
     from mauve_rt.cores import Shell  # noqa: PLC0415 - needs ROS, which the architecture file does not
 
     module_name, _, class_name = plugin.target.partition(":")

@@ -152,7 +152,7 @@ class RulesFile:
         if kind == "missing":
             return self._file.problem(location, f"{element} is missing")
         if kind == "extra_forbidden":
-            return self._file.problem(location, f"{element} is no known key", key=True)
+            return self._file.key_problem(location, f"{element} is no known key")
         if kind == "expected":
             text, found = item["ctx"]["text"], shown(item["input"])
             return self._file.problem(location, f"bad {element}", expected=text, found=found)

@@ -131,7 +131,7 @@ class ComponentModel(_Section):
     period_ns: Int64 = 0  # 0: as the FSM says
     overrun: Literal["skip", "catch_up", "fault"] = "skip"
     max_backlog: Annotated[int, Field(ge=1, le=1_000_000)] = 10
-    stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 131_072
+    stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 524_288
     reconfigurable: bool = True
     properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
 

@@ -15,7 +15,7 @@ _HINTS: Mapping[str, str] = {
     "priority": "1 is the lowest, 98 the highest; 99 is kept for the conductor",
     "mauve": "this program reads version 1 of the schema",
     "offset_ms": "milliseconds after the epoch",
-    "stack_bytes": "the default of 131072 does for most components",
+    "stack_bytes": "the default of 524288 does for most components",
     "cpus": "leave the key out to allow every CPU",
 }
 
@@ -43,14 +43,16 @@ def _problem(file: YamlFile, location: Location, details: ErrorDetails) -> Probl
     within = _words(location[:-1])
     if kind == "extra_forbidden":
         remedy = did_you_mean(name, _section(location).model_fields)
-        return file.problem(location, f"unknown key '{name}'{within}", key=True, remedy=remedy, **facts)
+        return file.key_problem(location, f"unknown key '{name}'{within}", remedy=remedy, **facts)
     if kind == "missing":
         missing = str(details["loc"][-1])
         return file.problem(location, f"{_subject(location)} has no '{missing}'", remedy="add it", **facts)
     if location and _is_key(details):
         what = f"bad name '{name}'{within}"
-        return file.problem(location, what, key=True, expected=_expected(details), **facts)
-    what = f"bad {_subject(location)}" if location and isinstance(location[-1], int) else f"bad {name}{within}"
+        return file.key_problem(location, what, expected=_expected(details), **facts)
+    what = (
+        f"bad {_subject(location)}" if location and isinstance(location[-1], int) else f"bad {name}{within}"
+    )
     remedy = next((_HINTS[str(part)] for part in reversed(location[-2:]) if str(part) in _HINTS), "")
     if location[:1] == ("connections",):
         remedy = "a connection is [component.port, resource.service]"
@@ -72,37 +74,33 @@ _PLAIN_WORDS: Mapping[str, str] = {
 }
 
 
+_CONTEXT_WORDS: Mapping[str, str] = {
+    "expected": "{text}",  # our own validators
+    "literal_error": "{expected}",
+    "greater_than_equal": "at least {ge:g}",
+    "less_than_equal": "at most {le:g}",
+    "too_short": "at least {min_length} of them",
+    "too_long": "at most {max_length} of them",
+}
+
+
 def _expected(details: ErrorDetails) -> str:
-    context = details.get("ctx", {})
-    match details["type"]:
-        case "expected":
-            return str(context["text"])
-        case "literal_error":
-            return str(context["expected"]).replace("'", "")
-        case "greater_than_equal":
-            return f"at least {context['ge']:g}"
-        case "less_than_equal":
-            return f"at most {context['le']:g}"
-        case "too_short":
-            return f"at least {context['min_length']} of them"
-        case "too_long":
-            return f"at most {context['max_length']} of them"
-        case kind:
-            return _PLAIN_WORDS.get(kind, str(details["msg"]).removeprefix("Input should be "))
+    kind = details["type"]
+    if kind in _CONTEXT_WORDS:
+        return _CONTEXT_WORDS[kind].format(**details.get("ctx", {})).replace("'", "")
+    return _PLAIN_WORDS.get(kind, str(details["msg"]).removeprefix("Input should be "))
 
 
 def _in_file(location: tuple[int | str, ...], data: Any) -> Location:
-    """The part of pydantic's location that stands in the file; pydantic adds the names of a union's members."""
+    """The part of pydantic's location that stands in the file: it adds the names of a union's members."""
     found: list[int | str] = []
     node = data
     for part in location:
-        if isinstance(node, dict) and part in node:
+        is_key = isinstance(node, dict) and part in node
+        is_index = isinstance(node, list) and isinstance(part, int) and part < len(node)
+        if is_key or is_index:
             node = node[part]
-        elif isinstance(node, list) and isinstance(part, int) and part < len(node):
-            node = node[part]
-        else:
-            continue
-        found.append(part)
+            found.append(part)
     return tuple(found)
 
 

@@ -1,7 +1,8 @@
 """What architecture files may write instead of a value that differs from machine to machine.
 
 - `$(share PACKAGE)` - the package's share folder, found through the ament index;
-- `$(namespace)` - the executor's namespace, `$(name)` - its last part, `$(peers)` - its peers, separated by commas;
+- `$(namespace)` - the executor's namespace, `$(name)` - its last part;
+- `$(peers)` - the executor's peers, separated by commas;
 - a relative path in a text property named `map` or ending in `_file` is relative to the architecture file.
 """
 
@@ -22,7 +23,9 @@ class Surroundings(Protocol):
     peers: list[str]
 
 
-def substituted_property(name: str, value: PropertyValue, *, folder: Path, model: Surroundings) -> PropertyValue:
+def substituted_property(
+    name: str, value: PropertyValue, *, folder: Path, model: Surroundings
+) -> PropertyValue:
     """The value of a property with its places replaced and its path made absolute.
 
     Raises:

@@ -30,7 +30,9 @@ class YamlFile:
         try:
             self.data = _Plain().value(self._document)
         except (RecursionError, OverflowError):
-            raise self.error("the file is nested too deeply", remedy="do its aliases refer to each other?") from None
+            raise self.error(
+                "the file is nested too deeply", remedy="do its aliases refer to each other?"
+            ) from None
 
     def position(self, location: Location, *, key: bool = False) -> tuple[int, int]:
         """Line and column, from 1, of the deepest element of `location` that the file has.
@@ -52,13 +54,18 @@ class YamlFile:
                     line, column = marks.item(part)
                 node = node[part]
             except (KeyError, IndexError, TypeError):
-                break  # not in the file (it may come from a merged mapping): its nearest ancestor is the place
+                break  # not in the file, or from a merged mapping: its nearest ancestor is the place
             position = (line + 1, column + 1)
         return position
 
-    def problem(self, location: Location, what: str, *, key: bool = False, **facts: str) -> Problem:
+    def problem(self, location: Location, what: str, **facts: str) -> Problem:
         """A problem at an element of the file; `facts` as the fields of `Problem`."""
-        line, column = self.position(location, key=key)
+        line, column = self.position(location)
+        return Problem(line=line, column=column, what=what, **facts)
+
+    def key_problem(self, location: Location, what: str, **facts: str) -> Problem:
+        """As problem(), but at the element's key rather than at its value."""
+        line, column = self.position(location, key=True)
         return Problem(line=line, column=column, what=what, **facts)
 
     def error(self, what: str, *, line: int = 1, column: int = 1, **facts: str) -> ArchitectureFileError:
@@ -89,10 +96,16 @@ class YamlFile:
             problem = (error.problem or "").split('"')
             name = problem[1] if len(problem) > 1 else "?"
             text = f"key '{name}' given twice"
-            raise self.error(text, line=line, column=column, code="duplicate_name", remedy="remove one") from None
+            raise self.error(
+                text, line=line, column=column, code="duplicate_name", remedy="remove one"
+            ) from None
         except MarkedYAMLError as error:
             line, column = _place(error)
-            reasons = (error.context, error.problem) if (error.problem or "").startswith("but ") else (error.problem,)
+            reasons = (
+                (error.context, error.problem)
+                if (error.problem or "").startswith("but ")
+                else (error.problem,)
+            )
             reason = " ".join(reason for reason in reasons if reason) or "bad syntax"
             raise self.error(f"not YAML: {reason}", line=line, column=column) from None
         except (YAMLError, ValueError) as error:  # ValueError: e.g. a date such as 2001-99-99
@@ -114,7 +127,9 @@ class _Plain:
         if self._nodes > self.MAX_NODES:
             raise OverflowError
         if isinstance(node, Mapping):
-            return {key if isinstance(key, str) else shown(key): self.value(item) for key, item in node.items()}
+            return {
+                key if isinstance(key, str) else shown(key): self.value(item) for key, item in node.items()
+            }
         if isinstance(node, Sequence) and not isinstance(node, str | bytes):
             return [self.value(item) for item in node]
         for kind in (bool, int, float, str):

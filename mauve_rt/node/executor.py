@@ -1,10 +1,11 @@
 """The executor process: runs the architecture of a file.
 
-    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-r __ns:=/robot_1] [-p bag:=DIR] [-p autostart:=false]
-        [-p require_realtime:=true] [-p trace:=false] [-p peers:=[robot_2]] [-p COMPONENT.PROPERTY:=VALUE]
+    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-r __ns:=/robot_1] [-p bag:=DIR]
+        [-p autostart:=false] [-p require_realtime:=true] [-p trace:=false] [-p peers:=[robot_2]]
+        [-p COMPONENT.PROPERTY:=VALUE]
         [-p record_topics:="['supervisor/decisions:mauve_msgs/msg/SupervisorDecision:transient_local']"]
 
-Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 for anything else.
+Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.
 """
 
 import os
@@ -22,11 +23,13 @@ _SPIN_S = 0.2  # how long a stop may go unnoticed
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run until signalled, then end the process.
 
-    It ends without the interpreter's own tidying up: all that has to be ended in order is ended by then, destroying
-    objects while a component's state still executes is not safe, and libraries' exit handlers were seen to hang.
+    It ends without the interpreter's own tidying up: all that has to be ended in order is ended by then,
+    destroying objects while a component's state still executes is not safe, and libraries' exit handlers were
+    seen to hang.
     """
     words = list(sys.argv if arguments is None else arguments)
-    # Without DDS Security anyone who hears us may reconfigure us: this machine only, unless the user says otherwise.
+    # Without DDS Security anyone who hears us may reconfigure us: this machine only, unless the user says
+    # otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     leave_now(run_until_signalled(lambda stop: _work(words, stop)))
@@ -62,24 +65,24 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         complain(f"executor: {error}")
         try_shutdown()
         return BAD_INPUT
-    status = BAD_INPUT
+    status = FAILED
     try:
-        if not settings.autostart or _autostart(node, stop):
+        status = _autostart(node, stop) if settings.autostart else 0
+        if status == 0:
             _spin(node, stop)
-            status = 0
     finally:
         node.close()
         try_shutdown()
     return status
 
 
-def _autostart(node: Any, stop: threading.Event) -> bool:
+def _autostart(node: Any, stop: threading.Event) -> int:
     from rclpy.lifecycle import TransitionCallbackReturn  # noqa: PLC0415
 
-    for transition in (node.trigger_configure, node.trigger_activate):
+    for transition, status in ((node.trigger_configure, BAD_INPUT), (node.trigger_activate, FAILED)):
         if not stop.is_set() and transition() != TransitionCallbackReturn.SUCCESS:
-            return False
-    return True
+            return status
+    return 0
 
 
 def _spin(node: Any, stop: threading.Event) -> None:

@@ -12,6 +12,7 @@ from mauve_msgs.msg import (
     StepReport,
 )
 from mauve_rt._kernel import ComponentDescription, PortDescription
+from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.words import shown
 from mauve_rt.node.executor_requests import Outcome, Report, Request
 from mauve_rt.node.executor_runtime import Runtime
@@ -65,7 +66,9 @@ def realtime_status(runtime: Runtime) -> Any:
 
 def architecture_state(runtime: Runtime, stamp: Any) -> Any:
     """ArchitectureState as it is now."""
-    epoch = runtime.epoch  # before the components: a change in between is published again, under its own epoch
+    epoch = (
+        runtime.epoch
+    )  # before the components: a change in between is published again, under its own epoch
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
@@ -130,5 +133,5 @@ def _port_info(port: PortDescription) -> Any:
     )
 
 
-def _yaml(value: bool | float | str) -> str:
+def _yaml(value: PropertyValue) -> str:
     return f"'{value}'" if isinstance(value, str) else shown(value)

@@ -1,4 +1,4 @@
-"""The executor as a managed ROS 2 node: configure loads, checks and builds, activate deploys, deactivate stops."""
+"""The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
 
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from mauve_rt.node.executor_topics import TopicBridge
 from mauve_rt.trace import TraceError
 
 NODE_NAME = "executor"
+MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
 _PARAMETERS: dict[str, tuple[Any, str]] = {
     "architecture": ("", "architecture file"),
     "bag": ("", "folder of the bag to record, which must not exist yet; empty: record nothing"),
@@ -28,11 +29,11 @@ _PARAMETERS: dict[str, tuple[Any, str]] = {
 }
 
 
-class ExecutorNode(LifecycleNode):  # type: ignore[misc]
+class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
-    Requests, lifecycle transitions, listing and received messages have a callback group each, so that a stop that waits
-    for a component delays none of the others (given a thread for each: `THREADS`).
+    Requests, lifecycle transitions, listing and received messages have a callback group each, so that a stop
+    that waits for a component delays none of the others (given a thread for each: `THREADS`).
     """
 
     THREADS = 4
@@ -46,7 +47,6 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         super().__init__(NODE_NAME, namespace=namespace)  # transitions are in the node's default group
         control_group, query_group = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self._data_group = MutuallyExclusiveCallbackGroup()
-        self.reason = ""  # of the last transition that failed
         self._runtime = runtime
         self._settings = self._declared()
         self._recording = Recording()
@@ -55,14 +55,19 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         self._diagnostics = Diagnostics(self, runtime)
         control = Control(runtime, phase_timeout_s=self._settings["report_phase_timeout_s"])
         Services(
-            self, runtime, control=control, state=self._state, control_group=control_group, query_group=query_group
+            self,
+            runtime,
+            control=control,
+            state=self._state,
+            control_group=control_group,
+            query_group=query_group,
         )
         self.create_timer(1.0, self._diagnostics.publish, callback_group=query_group)
         self.add_on_set_parameters_callback(_refuse_sim_time)
 
-    # ---- transitions ------------------------------------------------------------------------------------------------
+    # ---- transitions
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load and check the file, build the architecture, open topics and bag."""
         try:
             self._runtime.configure()
@@ -71,18 +76,18 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
             if bag:
                 self._recording.start(self, self._runtime.deployer, Path(bag))
                 self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
-        except (MauveError, TraceError) as error:
+        except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
             self._release()
             return self._failed(error)
         self._state.refresh(again=True)
         self._log_realtime()
         return TransitionCallbackReturn.SUCCESS
 
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Deploy: all components start on one grid."""
         try:
             self._runtime.activate()
-        except MauveError as error:
+        except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
             return self._failed(error)
         deployer = self._runtime.deployer
         self._topics.start(deployer)
@@ -90,12 +95,12 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         self._state.refresh()
         return TransitionCallbackReturn.SUCCESS
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Write safe outputs, park the components, end the threads."""
         self.quiesce()
         return TransitionCallbackReturn.SUCCESS
 
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Seal the bag, release the architecture; refused while a component's state still executes."""
         try:
             self._release()
@@ -114,7 +119,7 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         return self.on_shutdown(state)
 
     def quiesce(self) -> None:
-        """Outputs safe, components parked, their last words published, threads joined. May be called again."""
+        """Outputs safe, components parked, last words published, threads joined. May be called again."""
         if self._runtime.active:
             self._runtime.deactivate()
             self._state.refresh()
@@ -139,8 +144,8 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         self._runtime.cleanup()
 
     def _failed(self, error: Exception) -> TransitionCallbackReturn:
-        self.reason = one_line(str(error))
-        self.get_logger().error(self.reason)
+        known = isinstance(error, MauveError | TraceError)
+        self.get_logger().error(one_line(str(error) if known else f"{type(error).__name__}: {error}"))
         return TransitionCallbackReturn.FAILURE
 
     def _log_realtime(self) -> None:
@@ -148,24 +153,32 @@ class ExecutorNode(LifecycleNode):  # type: ignore[misc]
         for missing in status.missing if status is not None else ():
             self.get_logger().warning(f"no real time: {missing}")
 
-    # ---- parameters -------------------------------------------------------------------------------------------------
+    # ---- parameters
 
     def _declared(self) -> dict[str, Any]:
         try:
             settings = {
-                name: self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
+                name: self.declare_parameter(
+                    name, default, ParameterDescriptor(description=description)
+                ).value
                 for name, (default, description) in _PARAMETERS.items()
             }
             strings = ParameterDescriptor(
-                description="further topics to record, each as name:package/msg/Type or name:package/msg/Type:qos",
+                description="further topics to record, name:package/msg/Type or name:package/msg/Type:qos",
                 type=ParameterType.PARAMETER_STRING_ARRAY,
             )
             topics = self.declare_parameter("record_topics", Parameter.Type.STRING_ARRAY, strings).value
         except Exception as error:  # rclpy has an exception class of its own for each mistake
             raise ParameterError(one_line(f"bad parameter: {error}")) from error
         settings["record_topics"] = list(topics or ())
+        phase_timeout_s = settings["report_phase_timeout_s"]
+        if not 0.0 <= phase_timeout_s <= MAX_PHASE_TIMEOUT_S:
+            expected = f"expected 0 to {MAX_PHASE_TIMEOUT_S:g} s, found {phase_timeout_s:g}"
+            raise ParameterError(f"report_phase_timeout_s: {expected}")
         if self.get_parameter("use_sim_time").value:
-            raise ParameterError("use_sim_time: expected false: components run by the monotonic clock; leave it out")
+            raise ParameterError(
+                "use_sim_time: expected false: components run by the monotonic clock; leave it out"
+            )
         return settings
 
 

@@ -1,4 +1,4 @@
-"""The bag of an executor: its trace, the messages it sends and receives, and further topics it is asked to record."""
+"""The bag of an executor: its trace, the messages it sends and receives, and topics it is asked to record."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -51,7 +51,8 @@ class Recording:
             name, type_name, qos = (*topic.split(":"), "best_effort")[:3] if ":" in topic else ("", "", "")
             found = message_class(type_name)
             if not name or found is None or qos not in QOS_NAMES:
-                expected = f"name:package/msg/Type of an installed message, or name:package/msg/Type:{'|'.join(QOS_NAMES)}"
+                expected = "name:package/msg/Type of an installed message, and perhaps one of"
+                expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
                 raise ParameterError(f"parameter record_topics: expected {expected}, found '{topic}'")
             full_name = node.resolve_topic_name(name)
             profile = qos_profile(qos, capacity=_DEPTH)

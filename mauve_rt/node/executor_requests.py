@@ -102,14 +102,14 @@ class RequestLog:
         self._entries: OrderedDict[str, tuple[Request, Outcome]] = OrderedDict()
 
     def find(self, request: Request) -> Outcome | None:
-        """The first outcome of a repeated request; a refusal where its id belongs to another one; None: not seen."""
+        """The first outcome of a repeated request; a refusal for the id of another one; None: not seen."""
         known = self._entries.get(request.request_id) if request.request_id else None
         if known is None:
             return None
         first, outcome = known
         if first == request:
             return outcome
-        message = f"request_id '{request.request_id}' was used before, for: {first}; take a new id for a new request"
+        message = f"request_id '{request.request_id}' was used before, for: {first}; take a new id"
         return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
 
     def add(self, request: Request, outcome: Outcome) -> None:

@@ -13,7 +13,9 @@ class StillRunningError(MauveError):
     """A component that should be parked still executes a state."""
 
     def __init__(self, components: Sequence[ComponentDescription]) -> None:
-        words = ", ".join(f"component '{part.name}' still executes state {part.current_state}" for part in components)
+        words = ", ".join(
+            f"component '{part.name}' still executes state {part.current_state}" for part in components
+        )
         super().__init__(f"{words}; wait for its end, or end the process")
         self.code = "timeout"
         self.component = components[0].name
@@ -23,7 +25,8 @@ class StillRunningError(MauveError):
 class Runtime:
     """One architecture from configure() to cleanup().
 
-    `epoch` grows with every change: of a component's state or core, whoever made it (a fault too), and of a property.
+    `epoch` grows with every change: of a component's state or core, whoever made it (a fault too), and of a
+    property.
 
     | member        | written by                                 | guarded by |
     | ------------- | ------------------------------------------ | ---------- |
@@ -50,7 +53,7 @@ class Runtime:
         self._revision = 0
         self._seen: object = None
 
-    # ---- life cycle -------------------------------------------------------------------------------------------------
+    # ---- life cycle
 
     @property
     def model(self) -> ArchitectureModel:
@@ -113,7 +116,11 @@ class Runtime:
 
     def busy(self) -> list[ComponentDescription]:
         """After deactivate(): the components whose present state has not come to its end yet."""
-        return [] if self.active else [part for part in self.components() if part.state in ("RUNNING", "STOPPING")]
+        return (
+            []
+            if self.active
+            else [part for part in self.components() if part.state in ("RUNNING", "STOPPING")]
+        )
 
     @property
     def configured(self) -> bool:
@@ -127,7 +134,7 @@ class Runtime:
             raise RuntimeError("not configured")
         return self._deployer
 
-    # ---- what it looks like now -------------------------------------------------------------------------------------
+    # ---- what it looks like now
 
     def components(self) -> list[ComponentDescription]:
         """Every component as it is now; none while unconfigured. From any thread."""
@@ -155,7 +162,7 @@ class Runtime:
             return self._epoch
 
     def observe(self) -> bool:
-        """Compare the architecture with what it was at the last look and count a change. True: there was one."""
+        """Compare the architecture with what it was at the last look; count a change. True: there was one."""
         # A component held for a commit, or on its way to a stop, is on its way to something else that counts.
         states = {"HELD": "RUNNING", "STOPPING": "RUNNING"}
         with self._lock:

@@ -15,7 +15,7 @@ from mauve_rt.node.executor_state import StatePublisher
 
 
 class Services:
-    """The services of a node. Requests for changes wait for each other in `control_group`, listing does not."""
+    """The services of a node. Requests for changes wait for each other in `control_group`, lists do not."""
 
     def __init__(
         self,

@@ -31,10 +31,16 @@ class Settings:
         arguments = parse_ros_arguments(words, node="executor")
         given = arguments.parameters
         if given.get("use_sim_time"):
-            raise ParameterError("use_sim_time: expected false: components run by the monotonic clock; leave it out")
+            raise ParameterError(
+                "use_sim_time: expected false: components run by the monotonic clock; leave it out"
+            )
         peers = given.get("peers")
-        if peers is not None and not (isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)):
-            raise ParameterError(f"parameter peers: expected a list of names such as [robot_2], found {peers}")
+        if peers is not None and not (
+            isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)
+        ):
+            raise ParameterError(
+                f"parameter peers: expected a list of names such as [robot_2], found {peers}"
+            )
         properties = {}
         for name, value in given.items():
             component, dot, property_name = name.partition(".")
@@ -62,8 +68,8 @@ class Settings:
 
     def _load(self) -> ArchitectureModel:
         if not self.architecture:
-            text = "parameter 'architecture' is missing: ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
-            raise ParameterError(text)
+            usage = "ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
+            raise ParameterError(f"parameter 'architecture' is missing: {usage}")
         return load_architecture(Path(self.architecture), overrides=self.overrides)
 
 

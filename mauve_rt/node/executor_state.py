@@ -1,4 +1,4 @@
-"""What the executor tells of its own accord: ~/state on every change, ~/events on every request, /diagnostics at 1 Hz."""
+"""What the executor tells by itself: ~/state on changes, ~/events on requests, /diagnostics at 1 Hz."""
 
 import resource
 import threading

@@ -1,4 +1,4 @@
-"""Resources bound to ROS topics, by way of rclpy: what components write is published, what arrives is written for them."""
+"""Resources bound to ROS topics, by way of rclpy: what is written is published, what arrives is written."""
 
 import threading
 from collections.abc import Callable
@@ -62,7 +62,9 @@ class TopicBridge:
             self._outgoing[name] = _Outgoing(publisher, topic, resource.type, qos)
         else:
             receive = self._receiver(name, topic, resource.type, qos)
-            subscription = self._node.create_subscription(found, topic, receive, qos, raw=True, callback_group=group)
+            subscription = self._node.create_subscription(
+                found, topic, receive, qos, raw=True, callback_group=group
+            )
             self._subscriptions.append(subscription)
 
     def start(self, deployer: Deployer) -> None:
@@ -70,7 +72,9 @@ class TopicBridge:
         self._deployer = deployer
         self._ending.clear()
         if self._outgoing:
-            self._thread = threading.Thread(target=self._publish, args=(deployer,), name="topics", daemon=True)
+            self._thread = threading.Thread(
+                target=self._publish, args=(deployer,), name="topics", daemon=True
+            )
             self._thread.start()
 
     def stop(self) -> None:
@@ -100,7 +104,9 @@ class TopicBridge:
                     outgoing.publisher.publish(data)
                     self._recording.record(outgoing.topic, outgoing.type_name, data, qos=outgoing.qos)
 
-    def _receiver(self, resource: str, topic: str, type_name: str, qos: QoSProfile) -> Callable[[bytes], None]:
+    def _receiver(
+        self, resource: str, topic: str, type_name: str, qos: QoSProfile
+    ) -> Callable[[bytes], None]:
         def receive(data: bytes) -> None:
             deployer = self._deployer
             if deployer is None:

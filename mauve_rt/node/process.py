@@ -17,9 +17,9 @@ BAD_INPUT = 2
 def run_until_signalled(work: Callable[[threading.Event], int]) -> int:
     """Run `work(stop)` on a thread of its own and return its exit status; SIGINT and SIGTERM set `stop`.
 
-    Every thread blocks both signals and the main one waits for them: none is lost, none is late, whatever the work is
-    doing. Work that has not returned 2.7 s after a signal ends with the process, with status 1 and the stack of every
-    thread on stderr. For the main thread.
+    Every thread blocks both signals and the main one waits for them: none is lost, none is late, whatever the
+    work is doing. Work that has not returned 2.7 s after a signal ends with the process, with status 1 and
+    the stack of every thread on stderr. For the main thread.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     main_thread = threading.get_ident()

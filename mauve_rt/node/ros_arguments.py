@@ -1,4 +1,4 @@
-"""The part of a ROS command line that must be known before there is a node: the executor's namespace is in its file."""
+"""The part of a ROS command line to know before there is a node: the executor's file has its namespace."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,6 @@ class RosArguments:
 
     parameters: dict[str, Any] = field(default_factory=dict)  # later ones win, as in rcl
     namespace: str = ""  # of __ns:=, empty: not remapped
-    name: str = ""  # of __node:= or __name:=, empty: not remapped
 
 
 def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
@@ -25,22 +24,21 @@ def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
     What rcl would refuse is left out: rcl says so itself when the node is made.
     """
     parameters: dict[str, Any] = {}
-    remapped: dict[str, str] = {}
+    namespace = ""
     for option, value in _options(arguments):
         if option in ("-r", "--remap"):
             source, _, target = value.partition(":=")
             scope, _, rule = source.rpartition(":")
-            if not scope or scope == node:
-                remapped[rule] = target
+            if rule == "__ns" and scope in ("", node):
+                namespace = target
         elif option in ("-p", "--param"):
             source, separator, text = value.partition(":=")
             scope, _, name = source.rpartition(":")
-            if separator and (not scope or scope == node):
+            if separator and scope in ("", node):
                 parameters[name] = _parse(text)
         else:
             parameters.update(_of_file(value, node))
-    name = remapped.get("__node", remapped.get("__name", ""))
-    return RosArguments(parameters=parameters, namespace=remapped.get("__ns", ""), name=name)
+    return RosArguments(parameters=parameters, namespace=namespace)
 
 
 def _options(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:

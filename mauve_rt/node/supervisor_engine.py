@@ -147,7 +147,8 @@ class RuleEngine:
         steps = life.steps(kind)
         if view.shows(steps, unknown=False):
             present = view.describe(steps)
-            self._say(life, "suppressed", f"{kind} not needed: {present} already; {life.last_look.reason}")
+            reason = f"nothing to {kind}: {present} already; {life.last_look.reason}"
+            self._say(life, "suppressed", reason)
             life.settle(kind, now_s)
         elif now_s < life.not_before_s:
             if life.failures == 0:

@@ -22,7 +22,8 @@ components:
     fsm: executor_tests/CounterFsm
     reconfigurable: false
 resources:
-  count: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: count, direction: publish, qos: reliable}}
+  count: {kind: shared_data, type: std_msgs/msg/Float64,
+          topic: {name: count, direction: publish, qos: reliable}}
   queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}
 connections:
   - [source.count, count.write]
@@ -35,57 +36,242 @@ BAD = {
     "version": ("mauve: 1", "mauve: 2", "2", "bad mauve: expected 1, found 2"),
     "no version": ("mauve: 1\n", "", "executor:", "the file has no 'mauve'"),
     "top key": ("resources:", "resorces:", "resorces:", "unknown key 'resorces'; did you mean resources?"),
-    "key": ("priority: 40", "prioritty: 40", "prioritty: 40", "unknown key 'prioritty' of component 'source'; did you mean"),
-    "executor key": ("peers:", "peer:", "peer: [robot_2", "unknown key 'peer' in 'executor'; did you mean peers?"),
+    "key": (
+        "priority: 40",
+        "prioritty: 40",
+        "prioritty: 40",
+        "unknown key 'prioritty' of component 'source'; did you mean",
+    ),
+    "executor key": (
+        "peers:",
+        "peer:",
+        "peer: [robot_2",
+        "unknown key 'peer' in 'executor'; did you mean peers?",
+    ),
     "duplicate key": ("  sink:\n", "  source:\n", "source:", "key 'source' given twice"),
     "missing key": ("    core: executor_tests/Counter\n", "", "sink:", "component 'sink' has no 'core'"),
-    "unknown component": ("[sink.set", "[sinc.set", "sinc.set", "unknown component 'sinc'; did you mean sink?"),
-    "unknown port": ("[sink.set", "[sink.sett", "sink.sett", "component 'sink' has no port 'sett'; did you mean set?"),
-    "unknown resource": ("set, count.", "set, cuont.", "cuont.read", "unknown resource 'cuont'; did you mean count?"),
-    "unknown service": ("count.read", "count.reed", "count.reed", "has no service 'reed'; did you mean read?"),
-    "wrong direction": ("count.read", "count.write", "count.write", "kind read and type std_msgs/msg/Float64, found one of kind write"),
-    "wrong type": ("set, count.read", "set, point.read", "point.read", "type std_msgs/msg/Float64, found one of kind read and type geo"),
-    "half a connection": ("[sink.set, count.read]", "[sink.set]", "[sink.set]", "bad connection 2: expected at least 2"),
-    "no connection": ("[sink.set, count.read]", "sink", "sink", "bad connection 2: expected a list, found 'sink'"),
-    "connected twice": ("[sink.set,", "[source.count,", "source.count", "port 'source.count' is connected twice"),
-    "unknown property": ("step: 2", "stepp: 2", "stepp: 2", "unknown property 'stepp' of component 'source'; did you mean step?"),
-    "property type": ("step: 2", "step: two", "two", "bad property 'step' of component 'source': expected a number"),
+    "unknown component": (
+        "[sink.set",
+        "[sinc.set",
+        "sinc.set",
+        "unknown component 'sinc'; did you mean sink?",
+    ),
+    "unknown port": (
+        "[sink.set",
+        "[sink.sett",
+        "sink.sett",
+        "component 'sink' has no port 'sett'; did you mean set?",
+    ),
+    "unknown resource": (
+        "set, count.",
+        "set, cuont.",
+        "cuont.read",
+        "unknown resource 'cuont'; did you mean count?",
+    ),
+    "unknown service": (
+        "count.read",
+        "count.reed",
+        "count.reed",
+        "has no service 'reed'; did you mean read?",
+    ),
+    "wrong direction": (
+        "count.read",
+        "count.write",
+        "count.write",
+        "kind read and type std_msgs/msg/Float64, found one of kind write",
+    ),
+    "wrong type": (
+        "set, count.read",
+        "set, point.read",
+        "point.read",
+        "type std_msgs/msg/Float64, found one of kind read and type geo",
+    ),
+    "half a connection": (
+        "[sink.set, count.read]",
+        "[sink.set]",
+        "[sink.set]",
+        "bad connection 2: expected at least 2",
+    ),
+    "no connection": (
+        "[sink.set, count.read]",
+        "sink",
+        "sink",
+        "bad connection 2: expected a list, found 'sink'",
+    ),
+    "connected twice": (
+        "[sink.set,",
+        "[source.count,",
+        "source.count",
+        "port 'source.count' is connected twice",
+    ),
+    "unknown property": (
+        "step: 2",
+        "stepp: 2",
+        "stepp: 2",
+        "unknown property 'stepp' of component 'source'; did you mean step?",
+    ),
+    "property type": (
+        "step: 2",
+        "step: two",
+        "two",
+        "bad property 'step' of component 'source': expected a number",
+    ),
     "property range": ("step: 2", "step: 11", "11", "expected at least 0 and at most 10, found 11"),
     "property nan": ("step: 2", "step: .nan", ".nan", "found nan"),
-    "property list": ("step: 2", "step: [2]", "step: [2", "expected true, false, a number or text, found a list of 1"),
-    "text property": ("label: \"$(name) of $(peers)\"", "label: 5", "5", "expected text, found 5; put it in quotes"),
-    "priority 0": ("priority: 40", "priority: 0", "0", "bad priority of component 'source': expected at least 1, found 0"),
-    "priority 99": ("priority: 40", "priority: 99", "99", "at most 98, found 99; 1 is the lowest, 98 the highest; 99 is kept"),
+    "property list": (
+        "step: 2",
+        "step: [2]",
+        "step: [2",
+        "expected true, false, a number or text, found a list of 1",
+    ),
+    "text property": (
+        'label: "$(name) of $(peers)"',
+        "label: 5",
+        "5",
+        "expected text, found 5; put it in quotes",
+    ),
+    "priority 0": (
+        "priority: 40",
+        "priority: 0",
+        "0",
+        "bad priority of component 'source': expected at least 1, found 0",
+    ),
+    "priority 99": (
+        "priority: 40",
+        "priority: 99",
+        "99",
+        "at most 98, found 99; 1 is the lowest, 98 the highest; 99 is kept",
+    ),
     "priority text": ("priority: 40", "priority: high", "high", "expected a whole number, found 'high'"),
-    "cpu": ("cpus: [0]", "cpus: [0, 4000]", "4000", "a CPU that this machine does not have: expected one of 0"),
-    "no cpu": ("cpus: [0]", "cpus: []", "cpus: [", "bad cpus of component 'source': expected at least 1 of them"),
+    "cpu": (
+        "cpus: [0]",
+        "cpus: [0, 4000]",
+        "4000",
+        "a CPU that this machine does not have: expected one of 0",
+    ),
+    "no cpu": (
+        "cpus: [0]",
+        "cpus: []",
+        "cpus: [",
+        "bad cpus of component 'source': expected at least 1 of them",
+    ),
     "overrun": ("offset_ms: 2.5", "overrun: skp", "skp", "expected skip, catch_up or fault, found 'skp'"),
     "negative offset": ("offset_ms: 2.5", "offset_ms: -1", "-1", "expected at least 0, found -1"),
-    "loop without a wait": ("executor_tests/CounterFsm,\n", "executor_tests/LoopFsm,\n", "executor_tests/LoopFsm", "Count"),
-    "unknown class": ("executor_tests/Backwards", "executor_tests/Backward", "executor_tests/Backward", "is not installed; did you mean executor_tests/Backwards?"),
-    "no class name": ("executor_tests/Backwards", "Backwards", "Backwards", "expected package/Class, found 'Backwards'"),
-    "not in the library": ("executor_tests/Backwards", "executor_tests/Missing", "executor_tests/Missing", "has no core 'executor_tests/Missing'"),
-    "not in the module": ("executor_tests/Backwards", "executor_tests/PyMissing", "executor_tests/PyMissing", "cannot load executor_tests_cores:Nobody"),
-    "shell of another": ("shell: executor_tests/CounterShell\n", "shell: executor_tests/OtherShell\n", "executor_tests/Counter", "does not fit component 'sink'"),
-    "alternatives": ("[executor_tests/Backwards]", "all", "all", "a list of cores, or the word installed, found 'all'"),
-    "resource kind": ("kind: ring_buffer", "kind: ringbuffer", "ringbuffer", "expected shared_data, ring_buffer or"),
-    "ring without capacity": (", capacity: 4", "", "queue: {kind: ring_buffer", "resource 'queue' has no capacity"),
-    "ring of nothing": ("capacity: 4", "capacity: 0", "0", "bad capacity of resource 'queue': expected at least 1, found 0"),
-    "capacity of shared data": ("count: {kind: shared_data", "count: {capacity: 2, kind: shared_data", "capacity: 2", "only a ring_buffer has one"),
-    "unknown type": ("Float64, capacity", "Flaot64, capacity", "std_msgs/msg/Flaot64", "did you mean std_msgs/msg/Float64?"),
-    "no type": ("count: {kind: shared_data, type: std_msgs/msg/Float64,", "count: {kind: shared_data,", "count: {kind: shared_data", "resource 'count' has no type"),
-    "topic of no message": ("type: std_msgs/msg/Float64, topic", "type: executor_tests/Private, topic", "topic: {name: count", "its type is no ROS message"),
-    "topic name": ("name: count", "name: 2count", "2count", "expected a ROS name such as scan, /map or ~/status, found '2count'"),
-    "topic direction": ("direction: publish", "direction: out", "out", "expected publish or subscribe, found 'out'"),
+    "loop without a wait": (
+        "executor_tests/CounterFsm,\n",
+        "executor_tests/LoopFsm,\n",
+        "executor_tests/LoopFsm",
+        "Count",
+    ),
+    "unknown class": (
+        "executor_tests/Backwards",
+        "executor_tests/Backward",
+        "executor_tests/Backward",
+        "is not installed; did you mean executor_tests/Backwards?",
+    ),
+    "no class name": (
+        "executor_tests/Backwards",
+        "Backwards",
+        "Backwards",
+        "expected package/Class, found 'Backwards'",
+    ),
+    "not in the library": (
+        "executor_tests/Backwards",
+        "executor_tests/Missing",
+        "executor_tests/Missing",
+        "has no core 'executor_tests/Missing'",
+    ),
+    "not in the module": (
+        "executor_tests/Backwards",
+        "executor_tests/PyMissing",
+        "executor_tests/PyMissing",
+        "cannot load executor_tests_cores:Nobody",
+    ),
+    "shell of another": (
+        "shell: executor_tests/CounterShell\n",
+        "shell: executor_tests/OtherShell\n",
+        "executor_tests/Counter",
+        "does not fit component 'sink'",
+    ),
+    "alternatives": (
+        "[executor_tests/Backwards]",
+        "all",
+        "all",
+        "a list of cores, or the word installed, found 'all'",
+    ),
+    "resource kind": (
+        "kind: ring_buffer",
+        "kind: ringbuffer",
+        "ringbuffer",
+        "expected shared_data, ring_buffer or",
+    ),
+    "ring without capacity": (
+        ", capacity: 4",
+        "",
+        "queue: {kind: ring_buffer",
+        "resource 'queue' has no capacity",
+    ),
+    "ring of nothing": (
+        "capacity: 4",
+        "capacity: 0",
+        "0",
+        "bad capacity of resource 'queue': expected at least 1, found 0",
+    ),
+    "capacity of shared data": (
+        "count: {kind: shared_data",
+        "count: {capacity: 2, kind: shared_data",
+        "capacity: 2",
+        "only a ring_buffer has one",
+    ),
+    "unknown type": (
+        "Float64, capacity",
+        "Flaot64, capacity",
+        "std_msgs/msg/Flaot64",
+        "did you mean std_msgs/msg/Float64?",
+    ),
+    "no type": (
+        "count: {kind: shared_data, type: std_msgs/msg/Float64,",
+        "count: {kind: shared_data,",
+        "count: {kind: shared_data",
+        "resource 'count' has no type",
+    ),
+    "topic of no message": (
+        "type: std_msgs/msg/Float64,\n",
+        "type: executor_tests/Private,\n",
+        "topic: {name: count",
+        "its type is no ROS message",
+    ),
+    "topic name": (
+        "name: count",
+        "name: 2count",
+        "2count",
+        "expected a ROS name such as scan, /map or ~/status, found '2count'",
+    ),
+    "topic direction": (
+        "direction: publish",
+        "direction: out",
+        "out",
+        "expected publish or subscribe, found 'out'",
+    ),
     "topic qos": ("qos: reliable", "qos: relaible", "relaible", "found 'relaible'"),
     "namespace": ("namespace: /robot_1", "namespace: /robot 1", "/robot 1", "bad namespace in 'executor'"),
-    "one name twice": ("  queue:", "  sink:", "sink: {kind: ring_buffer", "'sink' is the name of a component and of a resource"),
+    "one name twice": (
+        "  queue:",
+        "  sink:",
+        "sink: {kind: ring_buffer",
+        "'sink' is the name of a component and of a resource",
+    ),
     "component name": ("  sink:\n", "  my sink:\n", "my sink:", "bad name 'my sink' in 'components'"),
-    "no such package": ("lists/a.txt", "$(share nowhere)/a.txt", "$(share nowhere)", "$(share nowhere), a package that is not installed"),
+    "no such package": (
+        "lists/a.txt",
+        "$(share nowhere)/a.txt",
+        "$(share nowhere)",
+        "$(share nowhere), a package that is not installed",
+    ),
     "unknown place": ("lists/a.txt", "$(shore it)/a.txt", "$(shore it)", "known: $(share PACKAGE)"),
     "syntax": ("resources:", "resources: [}", "}", "not YAML"),
     "tab": ("    core: executor", "\tcore: executor", "\tcore", "not YAML: found character '\\t'"),
-}  # fmt: skip
+}
 
 
 def _load(folder: Path, text: str | bytes, *, overrides: Overrides | None = None) -> Architecture:
@@ -102,7 +288,9 @@ def test_bad_file_gets_one_line_with_its_place(case: str, tmp_path: Path, plugin
     before, after, culprit, message = BAD[case]
     text = GOOD.replace(before, after, 1) if case != "wrong type" else GOOD.replace(before, after)
     if case == "wrong type":
-        text = text.replace("connections:", "  point: {kind: shared_data, type: geometry_msgs/msg/Point}\nconnections:")
+        text = text.replace(
+            "connections:", "  point: {kind: shared_data, type: geometry_msgs/msg/Point}\nconnections:"
+        )
     assert text != GOOD
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, text)
@@ -115,10 +303,14 @@ def test_bad_file_gets_one_line_with_its_place(case: str, tmp_path: Path, plugin
 
 
 def test_all_problems_are_told_in_the_order_of_the_file(tmp_path: Path, plugin_prefix: Path) -> None:
-    text = GOOD.replace("step: 2", "step: 99").replace("[sink.set", "[sink.seet").replace("count.write", "count.rite")
+    text = (
+        GOOD.replace("step: 2", "step: 99")
+        .replace("[sink.set", "[sink.seet")
+        .replace("count.write", "count.rite")
+    )
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, text)
-    assert [problem.line for problem in caught.value.problems] == [6, 16, 17]
+    assert [problem.line for problem in caught.value.problems] == [6, 17, 18]
     assert (caught.value.line, caught.value.code, caught.value.component) == (6, "out_of_range", "source")
 
 
@@ -130,11 +322,15 @@ def test_all_problems_are_told_in_the_order_of_the_file(tmp_path: Path, plugin_p
         (b"mauve: 1\nx: \xe9\n", ":2:4: not text in UTF-8"),
         (b"mauve: 1\n---\nmauve: 1\n", ":2:1: not YAML: expected a single document"),
         (b"a: &a [*a]\n", "the file has no 'mauve'"),
-        (b"a: &a [1,1,1,1,1,1,1,1,1]\n" + b"".join(b"%c: &%c [%s]\n" % (c, c, b",".join([b"*%c" % (c - 1)] * 9)) for c in b"bcdefgh"), "nested"),
+        (
+            b"a: &a [1,1,1,1,1,1,1,1,1]\n"
+            + b"".join(b"%c: &%c [%s]\n" % (c, c, b",".join([b"*%c" % (c - 1)] * 9)) for c in b"bcdefgh"),
+            "nested",
+        ),
         (b"a: " + b"[" * 5000, "nested too deeply"),
         (b"mauve: 1\n#" + b"x" * 2_000_000, "at most 1000000 bytes"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_architecture_file(text: bytes, message: str, tmp_path: Path) -> None:
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, text)
@@ -148,7 +344,11 @@ def test_missing_file(tmp_path: Path) -> None:
 
 def test_good_file_is_built_as_written(tmp_path: Path, plugin_prefix: Path) -> None:
     source, sink = _load(tmp_path, GOOD).components()
-    assert (source.name, source.core, source.alternatives) == ("source", "executor_tests/Counter", ["executor_tests/Backwards"])
+    assert (source.name, source.core, source.alternatives) == (
+        "source",
+        "executor_tests/Counter",
+        ["executor_tests/Backwards"],
+    )
     assert (source.period_ns, source.offset_ns) == (10_000_000, 2_500_000)
     assert (source.reconfigurable, sink.reconfigurable) == (True, False)
     values = {item.name: item.value for item in source.properties}
@@ -162,7 +362,9 @@ def test_good_file_is_built_as_written(tmp_path: Path, plugin_prefix: Path) -> N
 def test_installed_alternatives_are_all_cores_of_the_shell(tmp_path: Path, plugin_prefix: Path) -> None:
     index = plugin_prefix / "share/ament_index/resource_index/mauve_rt_plugins/executor_tests"
     text = index.read_text(encoding="utf-8")
-    index.write_text("".join(line for line in text.splitlines(keepends=True) if "Missing" not in line), encoding="utf-8")
+    index.write_text(
+        "".join(line for line in text.splitlines(keepends=True) if "Missing" not in line), encoding="utf-8"
+    )
     try:
         source, _ = _load(tmp_path, GOOD.replace("[executor_tests/Backwards]", "installed")).components()
     finally:
@@ -182,12 +384,23 @@ def test_overrides_of_the_command_line(tmp_path: Path, plugin_prefix: Path) -> N
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({("source", "step"): 33}, "bad property 'step' of component 'source' (parameter source.step): expected at least 0"),
-        ({("sauce", "step"): 3}, "parameter 'sauce.step' sets a property of an unknown component; did you mean source?"),
-        ({("source", "stap"): 3}, "unknown property 'stap' of component 'source' (parameter source.stap); did you mean step?"),
+        (
+            {("source", "step"): 33},
+            "bad property 'step' of component 'source' (parameter source.step): expected at least 0",
+        ),
+        (
+            {("sauce", "step"): 3},
+            "parameter 'sauce.step' sets a property of an unknown component; did you mean source?",
+        ),
+        (
+            {("source", "stap"): 3},
+            "unknown property 'stap' of component 'source' (parameter source.stap); did you mean step?",
+        ),
     ],
 )
-def test_bad_overrides(given: dict[tuple[str, str], int], message: str, tmp_path: Path, plugin_prefix: Path) -> None:
+def test_bad_overrides(
+    given: dict[tuple[str, str], int], message: str, tmp_path: Path, plugin_prefix: Path
+) -> None:
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, GOOD, overrides=Overrides(properties=given))
     assert message in str(caught.value)

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,8 @@ executor: {namespace: /robot_1}
 components:
   counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
             alternatives: [executor_tests/Backwards, executor_tests/Reluctant, executor_tests/Unready,
-                           executor_tests/PyCounter, executor_tests/Slow], priority: 40, properties: {period_ms: 20}}
+                           executor_tests/PyCounter, executor_tests/Slow],
+            priority: 40, properties: {period_ms: 20}}
   guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
           reconfigurable: false}
   sleepy: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
@@ -41,11 +42,18 @@ connections:
 class ExecutorProcess:
     """`ros2 run mauve_rt executor --ros-args ...`, as a process of its own."""
 
-    def __init__(self, folder: Path, environment: dict[str, str], arguments: list[str]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        environment: dict[str, str],
+        arguments: Sequence[str],
+        *,
+        wrapper: Sequence[str] = (),
+    ) -> None:
         self._log = folder / f"executor_{time.monotonic_ns()}.log"
         with self._log.open("w", encoding="utf-8") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
+                [*wrapper, sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
                 env={**os.environ, **environment},
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -57,16 +65,16 @@ class ExecutorProcess:
         return self._log.read_text(encoding="utf-8")
 
     def wait_begun(self) -> None:
-        """Until it handles signals: the interpreter itself takes a while to load."""
+        """Until it handles signals, as threads that block SIGINT show: loading takes a while."""
         deadline = time.monotonic() + PATIENCE_S
         mask = 1 << (signal.SIGINT - 1)
-        while not self._blocked_signals() & mask:
+        while not any(blocked & mask for blocked in self._blocked_signals()):
             assert time.monotonic() < deadline, self.output
             time.sleep(0.005)
 
-    def _blocked_signals(self) -> int:
-        status = Path(f"/proc/{self.process.pid}/status").read_text(encoding="ascii")
-        return int(status.partition("SigBlk:")[2].split()[0], 16)
+    def _blocked_signals(self) -> list[int]:
+        threads = Path(f"/proc/{self.process.pid}/task").glob("*/status")
+        return [int(thread.read_text("ascii").partition("SigBlk:")[2].split()[0], 16) for thread in threads]
 
     def wait(self, timeout_s: float = PATIENCE_S) -> int:
         """Its exit status."""
@@ -127,7 +135,7 @@ class Graph:
 @pytest.fixture(scope="module")
 def domain() -> int:
     """A ROS domain of this module's own."""
-    return random.randint(1, 100)
+    return random.SystemRandom().randint(1, 100)
 
 
 @pytest.fixture
@@ -148,12 +156,15 @@ def architecture(tmp_path: Path, plugin_prefix: Path) -> Path:
 
 
 @pytest.fixture
-def start_executor(tmp_path: Path, domain: int, plugin_prefix: Path) -> Iterator[Callable[..., ExecutorProcess]]:
+def start_executor(
+    tmp_path: Path, domain: int, plugin_prefix: Path
+) -> Iterator[Callable[..., ExecutorProcess]]:
     """start_executor("-p", "architecture:=FILE", ...): ended with the test, by force if need be."""
     started: list[ExecutorProcess] = []
 
-    def start(*arguments: str, **environment: str) -> ExecutorProcess:
-        started.append(ExecutorProcess(tmp_path, {"ROS_DOMAIN_ID": str(domain), **environment}, list(arguments)))
+    def start(*arguments: str, wrapper: Sequence[str] = ()) -> ExecutorProcess:
+        environment = {"ROS_DOMAIN_ID": str(domain)}
+        started.append(ExecutorProcess(tmp_path, environment, arguments, wrapper=wrapper))
         return started[-1]
 
     yield start

@@ -1,5 +1,6 @@
 """The executor as a process: bad input, signals, kills, faults, lifecycle, names."""
 
+import os
 import signal
 import time
 from collections.abc import Callable
@@ -38,18 +39,24 @@ def _one_line(executor: Any) -> str:
     return lines[0]
 
 
-# ---- bad input ------------------------------------------------------------------------------------------------------
+# ---- bad input
 
 
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("[counter.set, set.read]", "[countr.set, set.read]", "16:6: connection from unknown component 'countr'"),
+        (
+            "[counter.set, set.read]",
+            "[countr.set, set.read]",
+            "17:6: connection from unknown component 'countr'",
+        ),
         ("core: executor_tests/Counter,", "core: executor_tests/Unready,", "4:3: component 'counter'"),
         ("CounterFsm,\n            alt", "LoopFsm,\n            alt", "4:84: component 'counter'"),
     ],
 )
-def test_bad_architecture(before: str, after: str, message: str, architecture: Path, start_executor: Starter) -> None:
+def test_bad_architecture(
+    before: str, after: str, message: str, architecture: Path, start_executor: Starter
+) -> None:
     text = architecture.read_text(encoding="utf-8")
     assert before in text
     architecture.write_text(text.replace(before, after, 1), encoding="utf-8")
@@ -61,19 +68,38 @@ def test_bad_architecture(before: str, after: str, message: str, architecture: P
     ("arguments", "message"),
     [
         ([], "executor: parameter 'architecture' is missing: ros2 run mauve_rt executor"),
-        (["-p", "architecture:=nowhere.yaml"], "executor: nowhere.yaml:1:1: cannot read the file: No such file"),
-        (["-p", "architecture:=FILE", "-p", "use_sim_time:=true"], "use_sim_time: expected false"),
-        (["-p", "architecture:=FILE", "-p", "autostart:=perhaps"], "parameter autostart: expected true or false"),
-        (["-p", "architecture:=FILE", "-p", "bag:=5"], "bag"),
-        (["-p", "architecture:=FILE", "-p", "counter.step:=99"], "(parameter counter.step): expected at least 0"),
         (
-            ["-p", "architecture:=FILE", "-p", "bag:=BAG", "-p", "record_topics:=['talk:std_msgs/msg/Flaot64']"],
+            ["-p", "architecture:=nowhere.yaml"],
+            "executor: nowhere.yaml:1:1: cannot read the file: No such file",
+        ),
+        (["-p", "architecture:=FILE", "-p", "use_sim_time:=true"], "use_sim_time: expected false"),
+        (
+            ["-p", "architecture:=FILE", "-p", "autostart:=perhaps"],
+            "parameter autostart: expected true or false",
+        ),
+        (["-p", "architecture:=FILE", "-p", "bag:=5"], "bag"),
+        (["-p", "architecture:=FILE", "-p", "report_phase_timeout_s:=5.0"], "expected 0 to 2 s, found 5"),
+        (
+            ["-p", "architecture:=FILE", "-p", "counter.step:=99"],
+            "(parameter counter.step): expected at least 0",
+        ),
+        (
+            [
+                "-p",
+                "architecture:=FILE",
+                "-p",
+                "bag:=BAG",
+                "-p",
+                "record_topics:=['talk:std_msgs/msg/Flaot64']",
+            ],
             "parameter record_topics: expected name:package/msg/Type of an installed message",
         ),
         (["-p", "architecture:=FILE", "-p", "conter.step:=1"], "unknown component; did you mean counter?"),
     ],
 )
-def test_bad_parameters(arguments: list[str], message: str, architecture: Path, start_executor: Starter) -> None:
+def test_bad_parameters(
+    arguments: list[str], message: str, architecture: Path, start_executor: Starter
+) -> None:
     bag = architecture.parent / "bag"
     words = [word.replace("FILE", str(architecture)).replace("BAG", str(bag)) for word in arguments]
     assert message in _one_line(start_executor(*words))
@@ -86,7 +112,7 @@ def test_bag_that_exists_already(architecture: Path, start_executor: Starter, tm
     assert str(tmp_path / "bag") in executor.output
 
 
-# ---- ends -----------------------------------------------------------------------------------------------------------
+# ---- ends
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -106,7 +132,9 @@ def test_signal_seals_the_bag(
     assert topics[f"{NODE}/trace/batches"] > 0
 
 
-def test_signal_at_any_moment_of_the_start(architecture: Path, start_executor: Starter, tmp_path: Path) -> None:
+def test_signal_at_any_moment_of_the_start(
+    architecture: Path, start_executor: Starter, tmp_path: Path
+) -> None:
     for number in range(8):
         bag = tmp_path / f"bag_{number}"
         executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
@@ -121,7 +149,9 @@ def test_signal_at_any_moment_of_the_start(architecture: Path, start_executor: S
 
 def test_signal_while_a_request_waits(architecture: Path, start_executor: Starter, graph: Any) -> None:
     text = architecture.read_text(encoding="utf-8")
-    architecture.write_text(text.replace("core: executor_tests/Counter,", "core: executor_tests/Slow,", 1), encoding="utf-8")
+    architecture.write_text(
+        text.replace("core: executor_tests/Counter,", "core: executor_tests/Slow,", 1), encoding="utf-8"
+    )
     executor = start_executor("-p", f"architecture:={architecture}")
     graph.ask_later(Stop, f"{NODE}/stop", component="counter", timeout_s=10.0)
     graph.spin_until(lambda: True, "the request to leave")
@@ -148,7 +178,7 @@ def test_outputs_are_safe_at_the_end(executor: Any, graph: Any) -> None:
     graph.spin_until(lambda: counts[-1].data == 0.0, "the type's zero, written at the stop")
 
 
-# ---- faults ---------------------------------------------------------------------------------------------------------
+# ---- faults
 
 
 def test_fault_is_told_at_once_and_the_others_run_on(executor: Any, graph: Any) -> None:
@@ -173,10 +203,43 @@ def test_fault_is_told_at_once_and_the_others_run_on(executor: Any, graph: Any) 
         return levels.get(f"{NODE}: counter") == DiagnosticStatus.ERROR and f"{NODE}: guard" in levels
 
     graph.spin_until(told, "the fault in /diagnostics")
-    assert graph.ask(ListComponents, f"{NODE}/list_components").components[1].releases > first
+
+    def runs_on() -> bool:
+        return bool(graph.ask(ListComponents, f"{NODE}/list_components").components[1].releases > first)
+
+    graph.spin_until(runs_on, "releases of the others")
 
 
-# ---- lifecycle and names --------------------------------------------------------------------------------------------
+# ---- real-time rights
+
+NO_RIGHTS = ["prlimit", "--rtprio=0", "--memlock=65536"]
+if os.geteuid() == 0:  # root has them whatever the limits say
+    NO_RIGHTS = ["setpriv", "--bounding-set=-sys_nice,-ipc_lock", *NO_RIGHTS]
+
+
+def test_without_real_time_rights_it_runs_and_says_so(
+    architecture: Path, start_executor: Starter, graph: Any
+) -> None:
+    executor = start_executor("-p", f"architecture:={architecture}", wrapper=NO_RIGHTS)
+    reply = graph.ask(ListComponents, f"{NODE}/list_components")
+    assert not reply.realtime.granted
+    assert {part.policy for part in reply.components} == {"SCHED_OTHER"}
+    (about_fifo,) = [line for line in reply.realtime.missing if line.startswith("SCHED_FIFO")]
+    assert "/etc/security/limits.d" in about_fifo  # how to grant it
+    states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
+    graph.spin_until(lambda: bool(states), "~/state")
+    assert states[-1].realtime == reply.realtime
+    assert executor.output.count(about_fifo) == 1
+
+
+def test_require_realtime_refuses_to_run_without(architecture: Path, start_executor: Starter) -> None:
+    arguments = ("-p", f"architecture:={architecture}", "-p", "require_realtime:=true")
+    executor = start_executor(*arguments, wrapper=NO_RIGHTS)
+    assert executor.wait() == 1
+    assert executor.output.startswith("executor: real time is required and was not granted: SCHED_FIFO")
+
+
+# ---- lifecycle and names
 
 
 def test_lifecycle_step_by_step(architecture: Path, start_executor: Starter, graph: Any) -> None:
@@ -211,7 +274,9 @@ def test_lifecycle_step_by_step(architecture: Path, start_executor: Starter, gra
     assert executor.end(signal.SIGTERM)[0] == 0
 
 
-def test_one_file_serves_robots_of_other_names(architecture: Path, start_executor: Starter, graph: Any) -> None:
+def test_one_file_serves_robots_of_other_names(
+    architecture: Path, start_executor: Starter, graph: Any
+) -> None:
     start_executor("-p", f"architecture:={architecture}", "-r", "__ns:=/robot_7", "-p", "counter.step:=3")
     counter = graph.ask(ListComponents, "/robot_7/executor/list_components").components[0]
     assert "step=3.0" in counter.properties

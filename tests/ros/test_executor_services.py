@@ -1,5 +1,6 @@
 """The executor's services, over ROS, with real components."""
 
+import itertools
 import time
 from typing import Any
 
@@ -60,18 +61,24 @@ def test_stop_and_start(graph: Any) -> None:
 def test_replace_core_in_flight_takes_over_the_count(graph: Any) -> None:
     counts = graph.hear(Float64, "/robot_1/count")
     graph.spin_until(lambda: len(counts) > 20, "some counts")
-    reply = graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/Backwards")
+    reply = graph.ask(
+        ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/Backwards"
+    )
     assert reply.success, reply.message
     (step,) = reply.report
     assert (step.component, step.missed_releases, step.phase_nominal_ns) == ("counter", 0, 0)
     assert step.blackout_ns > 0
     assert step.phase_actual_ns != NOT_MEASURED
     component = _component(graph, "counter")
-    assert (component.core, component.alternatives[0]) == ("executor_tests/Backwards", "executor_tests/Counter")
+    assert (component.core, component.alternatives[0]) == (
+        "executor_tests/Backwards",
+        "executor_tests/Counter",
+    )
     highest = max(message.data for message in counts)
     graph.spin_until(lambda: counts[-1].data < highest, "a count downwards")
-    # Samples may be passed over on a busy machine; a core that started from zero would fall further than this.
-    assert all(abs(after.data - before.data) < 15.0 for before, after in zip(counts, counts[1:], strict=False))
+    # Samples may be passed over on a busy machine; a core that started from zero would fall further than
+    # this.
+    assert all(abs(after.data - before.data) < 15.0 for before, after in itertools.pairwise(counts))
     back = graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/Counter")
     assert back.success, back.message  # the core of the file is accepted without being an alternative
 
@@ -79,7 +86,9 @@ def test_replace_core_in_flight_takes_over_the_count(graph: Any) -> None:
 def test_core_written_in_python(graph: Any) -> None:
     counts = graph.hear(Float64, "/robot_1/count")
     voice = graph.voice(Float64, "/robot_1/set")
-    reply = graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/PyCounter")
+    reply = graph.ask(
+        ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/PyCounter"
+    )
     assert reply.success, reply.message
     voice.publish(Float64(data=1_000_000.0))
     graph.spin_until(lambda: bool(counts) and counts[-1].data > 1_000_000.0, "a count of the Python core")
@@ -123,7 +132,11 @@ REFUSED = {
         "the request expected 4711; look at ~/state",
     ),
     "timeout": ((Stop, "stop", {"component": "counter", "timeout_s": -1.0}), Code.INVALID, "bad timeout"),
-    "not a timeout": ((Stop, "stop", {"component": "counter", "timeout_s": float("nan")}), Code.INVALID, "found nan"),
+    "not a timeout": (
+        (Stop, "stop", {"component": "counter", "timeout_s": float("nan")}),
+        Code.INVALID,
+        "found nan",
+    ),
     "clock": ((Start, "start", {"component": "counter", "clock_ns": -5}), Code.INVALID, "bad clock_ns"),
     "long text": ((Stop, "stop", {"component": "c" * 5000}), Code.INVALID, "longer than 1000 characters"),
     "no step": ((Reconfigure, "reconfigure", {}), Code.INVALID, "a transaction without a step"),
@@ -143,21 +156,33 @@ REFUSED = {
         "a transaction of 2 steps is not supported; send them one by one",
     ),
     "unknown property": (
-        (Reconfigure, "reconfigure", {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="stepp")]}),
+        (
+            Reconfigure,
+            "reconfigure",
+            {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="stepp")]},
+        ),
         Code.INVALID,
         "component 'counter' has no property 'stepp'; did you mean step?",
     ),
     "property range": (
-        (Reconfigure, "reconfigure", {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="step", value="99")]}),
+        (
+            Reconfigure,
+            "reconfigure",
+            {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="step", value="99")]},
+        ),
         Code.INVALID,
         "expected at least 0 and at most 10, found 99",
     ),
     "property type": (
-        (Reconfigure, "reconfigure", {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="step", value="[1")]}),
+        (
+            Reconfigure,
+            "reconfigure",
+            {"steps": [ReconfigurationStep(kind="set_property", target="counter", name="step", value="[1")]},
+        ),
         Code.INVALID,
         "the value '[1' is not YAML",
     ),
-}  # fmt: skip
+}
 
 
 def test_refusals_have_their_code_and_change_nothing(graph: Any) -> None:
@@ -192,7 +217,11 @@ def test_event_tells_who_what_and_why(graph: Any) -> None:
     graph.spin_until(lambda: bool(events), "the event")
     (event,) = events
     assert event.request == "replace_core counter executor_tests/Backwards"
-    assert (event.requested_by, event.cause, event.request_id) == ("/robot_1/supervisor", "radio silent", "one")
+    assert (event.requested_by, event.cause, event.request_id) == (
+        "/robot_1/supervisor",
+        "radio silent",
+        "one",
+    )
     assert (event.from_core, event.to_core) == ("executor_tests/Counter", "executor_tests/Backwards")
     assert (event.success, event.epoch) == (True, reply.epoch)
     assert event.report == reply.report

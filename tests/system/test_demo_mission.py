@@ -121,7 +121,8 @@ def test_the_logs_have_no_traceback(mission: Demo):
 
 
 def test_without_supervisors_the_robots_stall(start: Starter):
-    demo = start(*SHORT, "--no-supervisor")
+    long = ("--duration", "36", "--link-loss-at", "6", "--link-back-at", "30")
+    demo = start(*long, "--no-supervisor")
     assert demo.finish(timeout_s=120) == 1
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     assert summary["success"] is False

@@ -11,7 +11,8 @@
 
 namespace mauve_examples {
 
-/// Remembers the revision of every tile it handed out. Not thread-safe; memory is allocated by configure alone.
+/// Remembers the revision of every tile it handed out. Not thread-safe; memory is allocated by configure
+/// alone.
 class ChangedTiles {
  public:
   /// Allocates; everything counts as changed that is not at revision 0. [setup]
@@ -20,7 +21,8 @@ class ChangedTiles {
     next_ = 0;
   }
 
-  /// Fills the list with changed tiles until it is full; `map` offers revision(tile) and copy_tile(tile, MapTile&). [rt]
+  /// Fills the list with changed tiles until it is full; `map` offers revision(tile) and copy_tile(tile,
+  /// MapTile&). [rt]
   template <typename Map>
   void collect(const Map& map, TileList& tiles) noexcept {
     const std::size_t count = seen_.size();

@@ -11,19 +11,23 @@
 
 namespace mauve_examples {
 
-/// Exact squared distances between cell centres, up to a limit. Its cost does not depend on what the map holds.
-/// Source of the two passes: P. Felzenszwalb, D. Huttenlocher, "Distance Transforms of Sampled Functions", 2012; with
-/// a small limit the second pass is a plain minimum over a window, which compilers vectorise.
+/// Exact squared distances between cell centres, up to a limit. Its cost does not depend on what the map
+/// holds. Source of the two passes: P. Felzenszwalb, D. Huttenlocher, "Distance Transforms of Sampled
+/// Functions", 2012; with a small limit the second pass is a plain minimum over a window, which compilers
+/// vectorise.
 class ClearanceField {
  public:
   /// Allocates; distances beyond limit_m are not told apart. [setup]
   void configure(const GridGeometry& geometry, double limit_m);
 
-  /// Takes the occupied cells of a row-major map of the configured geometry; unknown cells are no obstacles. [rt]
+  /// Takes the occupied cells of a row-major map of the configured geometry; unknown cells are no obstacles.
+  /// [rt]
   void compute(std::span<const std::int8_t> cells) noexcept;
 
   /// Whether the cell's centre is at least as far from every obstacle's centre as squared_cells() says. [rt]
-  bool at_least(std::size_t index, std::uint16_t squared) const noexcept { return squared_[index] >= squared; }
+  bool at_least(std::size_t index, std::uint16_t squared) const noexcept {
+    return squared_[index] >= squared;
+  }
   std::uint16_t squared(std::size_t index) const noexcept { return squared_[index]; }
   /// The squared distance in cells that keeps a disc of the radius clear of an obstacle's border. [rt]
   std::uint16_t squared_cells(double radius_m) const noexcept;
@@ -31,8 +35,10 @@ class ClearanceField {
  private:
   GridGeometry geometry_;
   int limit_cells_{0};
-  std::vector<std::uint8_t> column_distance_;  // to the nearest obstacle of the same column, at most limit + 1
-  std::vector<std::uint16_t> row_squares_;     // one row of their squares with limit cells of margin at both ends
+  std::vector<std::uint8_t>
+      column_distance_;  // to the nearest obstacle of the same column, at most limit + 1
+  std::vector<std::uint16_t>
+      row_squares_;  // one row of their squares with limit cells of margin at both ends
   std::vector<std::uint16_t> squared_;
 };
 

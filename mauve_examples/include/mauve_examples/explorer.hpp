@@ -22,13 +22,14 @@ struct ExplorerOptions {
   AuctionOptions auction;
 };
 
-/// The bidding protocol. Each step a robot receives, looks, decides and composes one message; every message carries its
-/// latest answers, so that lost ones cost time and nothing else.
+/// The bidding protocol. Each step a robot receives, looks, decides and composes one message; every message
+/// carries its latest answers, so that lost ones cost time and nothing else.
 ///
-/// A robot without a goal opens a *round* and sends its bids until every peer has answered that very round (the highest round
-/// seen is in every message, also of robots that bid themselves or have nothing left to explore, so two open rounds
-/// answer each other). Only then it takes a frontier. Without the peers' answers it waits, for as long as it takes.
-/// When its peers have taken all there is, it follows them without a claim and asks again: where they look, more opens up.
+/// A robot without a goal opens a *round* and sends its bids until every peer has answered that very round
+/// (the highest round seen is in every message, also of robots that bid themselves or have nothing left to
+/// explore, so two open rounds answer each other). Only then it takes a frontier. Without the peers' answers
+/// it waits, for as long as it takes. When its peers have taken all there is, it follows them without a claim
+/// and asks again: where they look, more opens up.
 ///
 /// Not thread-safe; memory is allocated by configure alone.
 class Explorer {

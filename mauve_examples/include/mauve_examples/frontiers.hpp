@@ -19,8 +19,8 @@ struct Frontier {
 };
 
 struct FrontierOptions {
-  double radius_m{0.25};   // as the planner's
-  double extent_m{1.5};    // a longer stretch of frontier is cut: no cell of one lies farther from its nearest
+  double radius_m{0.25};  // as the planner's
+  double extent_m{1.5};   // a longer stretch of frontier is cut: no cell of one lies farther from its nearest
   double min_size_m{0.2};  // smaller ones are cells that beams missed
   double size_gain{0.5};   // a metre of frontier is worth this many metres of way
 };
@@ -29,8 +29,8 @@ inline constexpr std::size_t kMaxFrontiers = kMaxBids;
 using FrontierList = mauve::BoundedVector<Frontier, kMaxFrontiers>;
 
 /// Finds the frontiers by one shortest-path search from the robot through known free cells.
-/// Source: B. Yamauchi, "A Frontier-Based Approach for Autonomous Exploration", 1997; the search is Dial's, CACM 12, 1969.
-/// Not thread-safe; memory is allocated by configure alone.
+/// Source: B. Yamauchi, "A Frontier-Based Approach for Autonomous Exploration", 1997; the search is Dial's,
+/// CACM 12, 1969. Not thread-safe; memory is allocated by configure alone.
 class FrontierFinder {
  public:
   /// Allocates about 20 bytes a cell. [setup]
@@ -41,6 +41,8 @@ class FrontierFinder {
   /// What the last find() found. [rt]
   const FrontierList& list() const noexcept { return list_; }
 
+  /// Whether the last find() got anywhere: not where the map is still empty around the robot. [rt]
+  bool has_view() const noexcept { return has_view_; }
   /// Length of the way to a place, by the last find(); infinity where it does not lead. [rt]
   double cost_m(const Point& place) const noexcept;
   /// Whether the last find() saw a frontier cell within reach_m of the place. [rt]
@@ -69,8 +71,9 @@ class FrontierFinder {
   std::uint32_t bucket_[kBuckets]{};
   std::vector<std::uint32_t> members_;  // frontier cells, nearest first
   std::size_t member_count_{0};
-  std::vector<std::uint32_t> stack_;    // of the stretch being grown
-  std::vector<std::uint8_t> is_member_; // 1: a frontier cell not yet in a stretch, 2: in one
+  std::vector<std::uint32_t> stack_;     // of the stretch being grown
+  std::vector<std::uint8_t> is_member_;  // 1: a frontier cell not yet in a stretch, 2: in one
+  bool has_view_{false};
   FrontierList list_;
 };
 

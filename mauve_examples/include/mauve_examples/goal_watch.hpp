@@ -25,8 +25,8 @@ class GoalWatch {
 
   /// Sets out for a frontier.
   void set(const Frontier& frontier, std::int64_t now_ns) noexcept;
-  /// Drops the goal when it is reached, explored, unreachable or not coming nearer; gives the place up when that
-  /// would only repeat itself. `frontiers` must have looked from where the robot is.
+  /// Drops the goal when it is reached, explored, unreachable or not coming nearer; gives the place up when
+  /// that would only repeat itself. `frontiers` must have looked from where the robot is.
   void update(const FrontierFinder& frontiers, const Pose2D& robot, std::int64_t now_ns) noexcept;
   /// Leaves the goal to a peer; it is not given up.
   void drop() noexcept { active_ = false; }

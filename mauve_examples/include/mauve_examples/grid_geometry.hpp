@@ -51,7 +51,8 @@ struct GridGeometry {
             static_cast<int>(std::floor((y_m - origin_y_m) / resolution_m))};
   }
   Point centre(Cell cell) const noexcept {
-    return {origin_x_m + (cell.column + 0.5) * resolution_m, origin_y_m + (cell.row + 0.5) * resolution_m, 0.0};
+    return {origin_x_m + (cell.column + 0.5) * resolution_m, origin_y_m + (cell.row + 0.5) * resolution_m,
+            0.0};
   }
 
   int tile_columns() const noexcept { return (width + kTileSide - 1) / kTileSide; }

@@ -15,18 +15,20 @@ struct Direction {
   double y{0.0};
 };
 
-/// Calls visit(cell, entry_m) for every cell the line touches, the start's first with entry 0, until visit returns false or
-/// the next cell would be entered beyond length_m. Cells may lie outside the grid. [rt]
+/// Calls visit(cell, entry_m) for every cell the line touches, the start's first with entry 0, until visit
+/// returns false or the next cell would be entered beyond length_m. Cells may lie outside the grid. [rt]
 /// Source: J. Amanatides, A. Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", Eurographics 1987.
 template <typename Visit>
-void traverse(const GridGeometry& grid, const Point& start, const Direction& direction, double length_m, Visit&& visit) {
+void traverse(const GridGeometry& grid, const Point& start, const Direction& direction, double length_m,
+              Visit&& visit) {
   Cell cell = grid.cell_at(start.x, start.y);
   const double resolution_m = grid.resolution_m;
   const int step_x = direction.x > 0.0 ? 1 : -1;
   const int step_y = direction.y > 0.0 ? 1 : -1;
 
   // Distances along the line to the next border of each axis, and between two borders.
-  const auto next_border_m = [resolution_m](double start_m, double origin_m, int index, int step, double slope) {
+  const auto next_border_m = [resolution_m](double start_m, double origin_m, int index, int step,
+                                            double slope) {
     if (slope == 0.0) return std::numeric_limits<double>::infinity();
     const double border_m = origin_m + (index + (step > 0 ? 1 : 0)) * resolution_m;
     return (border_m - start_m) / slope;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The one error of map files: a single line that says what, where, what was expected and found, and the remedy.
+// The one error of map files: a single line that says what, where, what was expected and found, and the
+// remedy.
 #pragma once
 
 #include <stdexcept>

@@ -20,12 +20,13 @@ struct GridMap : GridGeometry {
   bool is_free(Cell cell) const noexcept { return contains(cell) && at(cell) == kFree; }
 };
 
-/// More cells than this are refused: the planners' arrays would not fit a robot's locked memory. About 100 x 100 m at 5 cm.
+/// More cells than this are refused: the planners' arrays would not fit a robot's locked memory. About 100 x
+/// 100 m at 5 cm.
 inline constexpr std::size_t kMaxMapCells = std::size_t{4} << 20;
 
 /// Reads a map as nav2_map_server does in trinary mode; an image path is relative to the YAML file. [non-rt]
-/// Throws MapError when a file is missing, truncated or of another format, when a value is out of its range, when
-/// the origin is turned, when the mode is not trinary and when no cell is free.
+/// Throws MapError when a file is missing, truncated or of another format, when a value is out of its range,
+/// when the origin is turned, when the mode is not trinary and when no cell is free.
 GridMap load_map(const std::filesystem::path& yaml_path);
 
 }  // namespace mauve_examples

@@ -30,8 +30,10 @@ class MappingCore : public mauve::Core<MappingShell> {
   bool configure_hook() override;
 
  private:
+  bool read_scan_and_its_pose();
   void collect_changes(const OccupancyGrid& map);
 
+  Pose2D pose_;
   std::unique_ptr<Scan> scan_;
   std::unique_ptr<MapUpdate> update_;
   std::vector<std::uint32_t> told_;  // revision of each tile as it was last told

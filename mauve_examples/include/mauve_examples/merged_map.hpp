@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// What the robots know together, as one of them sees it: its own map, and its peers' where its own is unknown.
+// What the robots know together, as one of them sees it: its own map, and its peers' where its own is
+// unknown.
 #pragma once
 
 #include <cstdint>

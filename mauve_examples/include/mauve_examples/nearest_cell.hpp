@@ -10,8 +10,8 @@
 
 namespace mauve_examples {
 
-/// The cell nearest to the centre one, at most `reach` cells away along each axis, that lies in the grid and satisfies
-/// accept(cell). [rt]
+/// The cell nearest to the centre one, at most `reach` cells away along each axis, that lies in the grid and
+/// satisfies accept(cell). [rt]
 template <typename Accept>
 std::optional<Cell> nearest_cell(const GridGeometry& grid, Cell centre, int reach, Accept&& accept) {
   std::optional<Cell> best;

@@ -40,7 +40,8 @@ class OccupancyGrid {
   std::size_t free_count() const noexcept { return free_count_; }
 
  private:
-  // One pass says free; one hit outweighs six passes, since obstacles thinner than a cell are mostly passed by.
+  // One pass says free; one hit outweighs six passes, since obstacles thinner than a cell are mostly passed
+  // by.
   static constexpr int kFreeEvidence = -1;
   static constexpr int kHitEvidence = 6;
   static constexpr int kOccupiedFrom = 1;
@@ -55,7 +56,8 @@ class OccupancyGrid {
   std::size_t free_count_{0};
 };
 
-/// Copies a tile out of row-major cells; what lies beyond the grid is unknown. The revision is left alone. [rt]
+/// Copies a tile out of row-major cells; what lies beyond the grid is unknown. The revision is left alone.
+/// [rt]
 void copy_tile_cells(const GridGeometry& geometry, std::span<const std::int8_t> cells, std::size_t tile,
                      MapTile& out) noexcept;
 

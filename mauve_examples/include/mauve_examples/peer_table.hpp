@@ -15,9 +15,9 @@ namespace mauve_examples {
 /// A peer as of its last message; all zero before the first.
 struct Peer {
   RobotName name;
-  std::uint32_t sequence{0};       // of its last message
-  std::uint32_t highest_round{0};  // the highest bidding round of its that was seen
-  std::uint32_t merged_batch{0};   // the last batch of its tiles that was merged
+  std::uint32_t sequence{0};        // of its last message
+  std::uint32_t highest_round{0};   // the highest bidding round of its that was seen
+  std::uint32_t merged_batch{0};    // the last batch of its tiles that was merged
   std::uint32_t answered_round{0};  // the highest of our rounds that it has answered
   std::uint32_t acked_batch{0};     // the last of our batches that it has merged
   bool bidding{false};
@@ -26,8 +26,9 @@ struct Peer {
   Bid claim;
 };
 
-/// Messages of one peer are taken to arrive in the order they were sent, some of them or none: a sequence number lower
-/// than the last one means that the peer has started anew. Not thread-safe; memory is allocated by configure alone.
+/// Messages of one peer are taken to arrive in the order they were sent, some of them or none: a sequence
+/// number lower than the last one means that the peer has started anew. Not thread-safe; memory is allocated
+/// by configure alone.
 class PeerTable {
  public:
   enum class Received : std::uint8_t { news, repeated, stranger, restarted };

@@ -28,9 +28,10 @@ class BeamTable {
 /// The table all scans share. Call once before real time begins. [rt]
 const BeamTable& beam_table() noexcept;
 
-/// Distance to where the beam enters the first cell that is not free, unknown cells and the map's end included;
-/// infinity when that is beyond max_range_m. [rt]
-double cast_ray(const GridMap& map, const Point& from, const Direction& direction, double max_range_m) noexcept;
+/// Distance to where the beam enters the first cell that is not free, unknown cells and the map's end
+/// included; infinity when that is beyond max_range_m. [rt]
+double cast_ray(const GridMap& map, const Point& from, const Direction& direction,
+                double max_range_m) noexcept;
 
 /// One turn of the range finder at the pose. [rt]
 void range_scan(const GridMap& map, const Pose2D& pose, float max_range_m, Scan& scan) noexcept;

@@ -42,8 +42,11 @@ class RobotCore : public mauve::Core<RobotShell> {
  public:
   /// Moves for one period, unless into something. [rt]
   void move();
-  /// Looks around. [rt]
+  /// Looks around and tells where it is and what it sees. [rt]
   void sense();
+
+  /// Another such core goes on from where the robot is. [rt]
+  void take(mauve::CoreBase& old) noexcept override;
 
  protected:
   bool configure_hook() override;

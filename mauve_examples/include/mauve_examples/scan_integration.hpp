@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// From a scan and the pose it was taken at to the map: what beams passed is free, what ended them is occupied.
+// From a scan and the pose it was taken at to the map: what beams passed is free, what ended them is
+// occupied.
 #pragma once
 
 #include "mauve_examples/occupancy_grid.hpp"

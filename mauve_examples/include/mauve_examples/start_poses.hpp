@@ -11,8 +11,9 @@
 
 namespace mauve_examples {
 
-/// Poses of `count` robots near one another, a robot's width apart and more, in the largest region a robot can move in.
-/// Equal maps and seeds give equal poses on every machine. Throws MapError when there is no room for all. [non-rt]
+/// Poses of `count` robots near one another, a robot's width apart and more, in the largest region a robot
+/// can move in. Equal maps and seeds give equal poses on every machine. Throws MapError when there is no room
+/// for all. [non-rt]
 std::vector<Pose2D> start_poses(const GridMap& map, std::size_t count, std::uint64_t seed);
 
 }  // namespace mauve_examples

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Brings the robot's own map to all peers over a link that may lose messages: one batch of tiles at a time, repeated
-// until every peer has it.
+// Brings the robot's own map to all peers over a link that may lose messages: one batch of tiles at a time,
+// repeated until every peer has it.
 #pragma once
 
 #include <cstdint>

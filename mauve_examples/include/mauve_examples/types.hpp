@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The mission's data: plain structs, each declaring once which ROS message it is. Units: m, rad, m/s, rad/s, ns.
+// The mission's data: plain structs, each declaring once which ROS message it is. Units: m, rad, m/s, rad/s,
+// ns.
 #pragma once
 
 #include <array>
@@ -119,9 +120,9 @@ MAUVE_TYPE(mauve_examples::Twist, "geometry_msgs/msg/Twist", linear, angular)
 MAUVE_TYPE(mauve_examples::Bool, "std_msgs/msg/Bool", data)
 MAUVE_TYPE(mauve_examples::Scan, "mauve_examples/Scan", max_range_m, ranges_m)
 MAUVE_TYPE(mauve_examples::MapTile, "mauve_msgs/msg/MapTile", column, row, revision, cells)
-MAUVE_TYPE(mauve_examples::MapUpdate, "mauve_msgs/msg/MapUpdate", stamp_ns, resolution_m, origin_x_m, origin_y_m,
-           columns, rows, tiles)
+MAUVE_TYPE(mauve_examples::MapUpdate, "mauve_msgs/msg/MapUpdate", stamp_ns, resolution_m, origin_x_m,
+           origin_y_m, columns, rows, tiles)
 MAUVE_TYPE(mauve_examples::Bid, "mauve_msgs/msg/Bid", x, y, cost_m)
 MAUVE_TYPE(mauve_examples::PeerAck, "mauve_msgs/msg/PeerAck", peer, sequence, round, map_batch)
-MAUVE_TYPE(mauve_examples::PeerMessage, "mauve_msgs/msg/PeerMessage", sender, sequence, round, bids, has_claim, claim,
-           acks, x, y, map_batch, resolution_m, origin_x_m, origin_y_m, tiles)
+MAUVE_TYPE(mauve_examples::PeerMessage, "mauve_msgs/msg/PeerMessage", sender, sequence, round, bids,
+           has_claim, claim, acks, x, y, map_batch, resolution_m, origin_x_m, origin_y_m, tiles)

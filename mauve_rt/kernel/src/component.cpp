@@ -216,7 +216,7 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
   const std::string to = core->implementation();
   try {
     prepare(*core, binding);
-  } catch (const Error& failure) {
+  } catch (const std::exception& failure) {
     throw Error(ErrorCode::prepare_failed, failure.what(),
                 {.component = name_, .element = core->description(), .remedy = "the old core goes on"});
   }

@@ -179,9 +179,9 @@ void Task::run_machine() {
 }
 
 const State* Task::execute(const State& state) {
-  trace(TraceKind::state_begin, state.trace_id);
+  trace_at(boundary_ns_, TraceKind::state_begin, state.trace_id);
   // release: who sees the beginning sees which state it is of
-  if (state.max_execution_ns != 0) execution_began_ns_.store(clock_.now_ns(), std::memory_order_release);
+  if (state.max_execution_ns != 0) execution_began_ns_.store(boundary_ns_, std::memory_order_release);
   const auto& methods = fsm_->methods();
   methods[state.action].run(*core_);
   const State* next = state.next;
@@ -192,7 +192,8 @@ const State* Task::execute(const State& state) {
     }
   }
   execution_began_ns_.store(0, std::memory_order_release);
-  trace(TraceKind::state_end, state.trace_id);
+  boundary_ns_ = clock_.now_ns();
+  trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
   if (PiMutex::held_by_this_thread() != 0)
     throw std::logic_error("a lock is still held at the end of the state");
   return condemned_.load(std::memory_order_acquire) == 0 ? next : nullptr;
@@ -200,9 +201,8 @@ const State* Task::execute(const State& state) {
 
 bool Task::wait(const State& state) {
   set_clock_ns(clock_ns() + state.duration_ns);
-  const time_ns_t now = clock_.now_ns();
-  if (active_ring_ != nullptr) active_ring_->push_at(now, TraceKind::wait, state.trace_id, clock_ns());
-  if (now > clock_ns()) handle_overrun(state, now);
+  trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
+  if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
   return sleep_until_clock(state);
 }
 
@@ -251,9 +251,8 @@ bool Task::may_commit_now() noexcept {
 void Task::release(const State& state, time_ns_t actual_ns) noexcept {
   statistics_.releases.fetch_add(1, std::memory_order_relaxed);
   statistics_.wakeup.record(actual_ns - clock_ns());
-  if (active_ring_ != nullptr) {
-    active_ring_->push_at(actual_ns, TraceKind::release, state.trace_id, clock_ns(), actual_ns);
-  }
+  boundary_ns_ = actual_ns;
+  trace_at(actual_ns, TraceKind::release, state.trace_id, clock_ns(), actual_ns);
   if ((control_.load(std::memory_order_relaxed) & kCommit) != 0) ++deferrals_;
   if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
   if (Commit* commit = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
@@ -301,10 +300,7 @@ void Task::carry_out(Commit& commit, const State* state) noexcept {
       awaiting_release_.store(&commit, std::memory_order_release);
     }
     commit.armed_ns = clock_.now_ns();
-    if (active_ring_ != nullptr) {
-      active_ring_->push_at(commit.armed_ns, TraceKind::armed, state->trace_id, clock_ns(),
-                            commit.committed ? 1 : 0);
-    }
+    trace_at(commit.armed_ns, TraceKind::armed, state->trace_id, clock_ns(), commit.committed ? 1 : 0);
   } else {
     commit.armed_ns = parked;  // a parked component has no blackout
   }

@@ -27,12 +27,11 @@ class CommitAction {
 /// taking it out of its task's slot and setting `done` (or, for the release that follows, `released`), so it
 /// cannot outlive the owner.
 ///
-/// | member                 | written by                             | read by               | order |
-/// |------------------------|----------------------------------------|-----------------------|----------------------------|
-/// | results                | component's thread, before done        | requester, after done | through done |
-/// | release_*              | component's thread, before released    | requester, after it   | through
-/// released           | | done, released (futex) | component's thread                     | requester |
-/// release / acquire          |
+/// | member                 | written by                 | read by             | order                               |
+/// | ---------------------- | -------------------------- | ------------------- | ----------------------------------- |
+/// | results                | component, before done     | requester, after it | through done                        |
+/// | release_*              | component, before released | requester, after it | through released                    |
+/// | done, released (futex) | component                  | requester           | release/acquire: hand over the rest |
 struct Commit {
   explicit Commit(CommitAction& what) : action(what) {}
 

@@ -34,11 +34,11 @@ struct CommitTimeouts {
 
 /// One component of an architecture. Its functions are for ordinary threads; its parts run on its task.
 ///
-/// | member                   | written by                                    | read by             | under |
-/// |--------------------------|-----------------------------------------------|---------------------|-------------------|
-/// | core_, binding_          | commanders, parked; the task in a commit      | the task            |
-/// parking, commits  | | shown_core_, _properties | who changed core or property, after the fact  | any
-/// ordinary thread | shown_mutex_      | | the rest                 | [setup] | anyone              | - |
+/// | member                         | written by                               | read by             | under            |
+/// | ------------------------------ | ---------------------------------------- | ------------------- | ---------------- |
+/// | core_, binding_                | commanders, parked; the task, in commits | the task            | parking, commits |
+/// | shown_core_, shown_properties_ | who changed one, after the fact          | any ordinary thread | shown_mutex_     |
+/// | the rest                       | [setup]                                  | anyone              | -                |
 class Component final : public Configurable {
  public:
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);

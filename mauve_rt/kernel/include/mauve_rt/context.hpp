@@ -12,12 +12,12 @@ namespace mauve {
 
 /// The logical side of a component's task.
 ///
-/// | member     | written by             | read by     | order |
-/// |------------|------------------------|-------------|-------------------------------------------------------|
-/// | clock_ns   | the component's thread | any thread  | relaxed: a lone number, nothing is published with it
-/// | | instant_ns | the component's thread | any thread  | relaxed: likewise | | period_ns  | [setup] | any
-/// thread  | -                                                     | | ring       | [setup]                |
-/// component's | -                                                     |
+/// | member     | written by | read by    | order                                                |
+/// | ---------- | ---------- | ---------- | ---------------------------------------------------- |
+/// | clock_ns   | component  | any thread | relaxed: a lone number, nothing is published with it |
+/// | instant_ns | component  | any thread | relaxed: likewise                                    |
+/// | period_ns  | [setup]    | any thread | -                                                    |
+/// | ring       | [setup]    | component  | -                                                    |
 struct Context {
   std::atomic<time_ns_t> clock_ns{0};    // the logical clock
   std::atomic<time_ns_t> instant_ns{0};  // nominal instant of the last entry of the initial state

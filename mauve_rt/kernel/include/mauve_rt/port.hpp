@@ -27,13 +27,11 @@ struct OutputOptions {
 
 /// A port seen without its type. Connected while the component is not running.
 ///
-/// | member                    | written by                      | read by                 | order |
-/// |---------------------------|---------------------------------|-------------------------|-----------------------------|
-/// | service_, resource_name_  | connect(), component parked     | component's thread, any | parking
-/// publishes it        | | context_                  | [setup]                         | component's thread
-/// | -                           | | closed_                   | the watchdog                    |
-/// component's thread      | release/acquire: what the   | |                           | | | watchdog wrote
-/// stays last   |
+/// | member                   | written by                  | read by        | order                                |
+/// | ------------------------ | --------------------------- | -------------- | ------------------------------------ |
+/// | service_, resource_name_ | connect(), component parked | component, any | parking publishes it                 |
+/// | context_                 | [setup]                     | component      | -                                    |
+/// | closed_                  | the watchdog                | component      | release/acquire: its zeros stay last |
 class PortBase {
  public:
   PortBase(std::string name, PortKind kind, std::string type)

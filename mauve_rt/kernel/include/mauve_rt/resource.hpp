@@ -15,10 +15,10 @@ namespace mauve {
 
 /// Tells one waiting thread that some published resource was written.
 ///
-/// | member    | written by            | order |
-/// |-----------|-----------------------|------------------------------------------------------------------------------|
-/// | word_     | writers               | seq_cst with waiters_: either the writer sees the waiter or it sees
-/// the word  | | waiters_  | the thread that waits | seq_cst: likewise |
+/// | member   | written by            | order                                                                    |
+/// | -------- | --------------------- | ------------------------------------------------------------------------ |
+/// | word_    | writers               | seq_cst with waiters_: the writer sees the waiter or the waiter the word |
+/// | waiters_ | the thread that waits | seq_cst: likewise                                                        |
 class Notifier {
  public:
   /// Wakes the waiter if one sleeps. [rt]

@@ -60,23 +60,23 @@ struct ChangeSignal {
 
 /// The thread of one component.
 ///
-/// | member                          | written by                            | read by      | under / order |
-/// |---------------------------------|---------------------------------------|--------------|------------------------------------|
-/// | control_ (futex word)           | commanders set bits, the thread clears| the thread   | acq_rel: a bit
-/// hands over its data | | state_ (futex word)             | the thread (watchdog: faulted)        | anyone
-/// | release/acquire: publishes fault_  | | commit_                         | commanders put in; who takes
-/// out owns | both         | acq_rel: hands over the commit     | | commit_budget_ns_               |
-/// commanders, before commit_            | the thread   | relaxed: control_ orders it        | |
-/// awaiting_release_               | the thread puts in; who takes out owns| both         | acq_rel: likewise
-/// | | parked_, ended_ (futex word)    | the thread                            | commanders   |
-/// release/acquire: all it wrote      | | start_at_ns_                    | commanders, thread parked | the
-/// thread   | control_'s kStart bit              | | current_, context_, statistics_ | the thread | anyone |
-/// relaxed: lone facts                | | core_, fsm_, shell_             | commanders, thread parked;
-/// commits    | the thread   | parking                            | | fault_                          | who
-/// set condemned_, before state_     | anyone after | state_                             | | condemned_ | the
-/// thread or the watchdog, first wins| both         | acq_rel: one writer of fault_      | | facts_ | the
-/// thread, before the barrier        | anyone after | barrier                            | | command_mutex_
-/// | ordinary threads only: one command at a time                                            |
+/// | member                | written by                           | read by      | order                              |
+/// | --------------------- | ------------------------------------ | ------------ | ---------------------------------- |
+/// | control_ (futex)      | commanders set bits, thread clears   | thread       | acq_rel: a bit hands over its data |
+/// | state_ (futex)        | thread; watchdog: faulted            | anyone       | release/acquire: publishes fault_  |
+/// | commit_               | commanders; who takes it out owns it | both         | acq_rel: hands over the commit     |
+/// | commit_budget_ns_     | commanders, before commit_           | thread       | relaxed: control_ orders it        |
+/// | awaiting_release_     | thread; who takes it out owns it     | both         | acq_rel: hands over the commit     |
+/// | parked_, ended_       | thread                               | commanders   | release/acquire: all it wrote      |
+/// | start_at_ns_          | commanders, thread parked            | thread       | the kStart bit of control_         |
+/// | current_              | thread                               | anyone       | relaxed: a lone fact               |
+/// | context_, statistics_ | thread                               | anyone       | relaxed: lone facts                |
+/// | shell_, fsm_, core_   | commanders, thread parked; commits   | thread       | parking                            |
+/// | fault_                | who set condemned_, before state_    | anyone after | through state_                     |
+/// | condemned_            | thread or watchdog, the first wins   | both         | acq_rel: one writer of fault_      |
+/// | facts_                | thread, before the barrier           | anyone after | the barrier                        |
+/// | boundary_ns_ ...      | thread                               | thread       | its own                            |
+/// | command_mutex_        | ordinary threads, a command each     | -            | -                                  |
 class Task {
  public:
   Task(std::string name, std::uint16_t number, ChangeSignal& changes,
@@ -172,6 +172,10 @@ class Task {
              std::int64_t c = 0) noexcept {
     if (active_ring_ != nullptr) active_ring_->push(kind, name, a, b, c);
   }
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0,
+                std::int64_t b = 0) noexcept {
+    if (active_ring_ != nullptr) active_ring_->push_at(time_ns, kind, name, a, b);
+  }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
   void set_clock_ns(time_ns_t instant) noexcept {
     context_.clock_ns.store(instant, std::memory_order_relaxed);
@@ -211,6 +215,8 @@ class Task {
   std::atomic<time_ns_t> execution_began_ns_{0};  // 0: no execution state under way
   std::atomic<Commit*> awaiting_release_{nullptr};
   std::atomic<std::uint32_t> condemned_{0};
+  time_ns_t boundary_ns_{
+      0};             // the thread's own: when the last state ended or the last release came, read once
   int deferrals_{0};  // the thread's own: releases a commit was put off for want of time
 };
 

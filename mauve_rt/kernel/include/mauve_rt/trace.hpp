@@ -56,12 +56,12 @@ class TraceNames {
 
 /// Single producer (the component's thread), single consumer (who drains). wait-free on the producer's side.
 ///
-/// | member   | written by | order                                                                          |
-/// |----------|------------|--------------------------------------------------------------------------------|
-/// | head_    | producer   | release: publishes the record written before; the drain acquires               |
-/// | tail_    | consumer   | release: frees the place only after the copy; the producer acquires            |
-/// | offered_ | producer   | relaxed: a count; its reader takes whatever is newest | | dropped_ | producer |
-/// relaxed: likewise                                                              |
+/// | member   | written by | order                                                               |
+/// | -------- | ---------- | ------------------------------------------------------------------- |
+/// | head_    | producer   | release: publishes the record written before; the drain acquires    |
+/// | tail_    | consumer   | release: frees the place only after the copy; the producer acquires |
+/// | offered_ | producer   | relaxed: a count; its reader takes whatever is newest               |
+/// | dropped_ | producer   | relaxed: likewise                                                   |
 class TraceRing {
  public:
   /// Capacity is rounded up to a power of two; all pages are touched. [setup]

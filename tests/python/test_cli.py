@@ -1,0 +1,124 @@
+"""The `mauve` command without an executor: arguments, files, plug-ins, what it prints."""
+
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from mauve_msgs.msg import ComponentInfo, ReconfigurationEvent, StepReport
+from mauve_msgs.srv import ListComponents
+from mauve_rt.cli import views
+from mauve_rt.cli.main import build_parser, main
+
+GOOD = """\
+mauve: 1
+components:
+  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm}
+"""
+
+
+def test_arguments_of_the_verbs() -> None:
+    parser = build_parser()
+    args = parser.parse_args(
+        ["replace-core", "robot_1/executor/", "exploration", "p/Core", "--timeout", "0.5"]
+    )
+    assert (args.executor, args.component, args.core) == ("/robot_1/executor", "exploration", "p/Core")
+    assert (args.timeout, args.expected_epoch, args.cause, args.json) == (0.5, 0, "", False)
+    for words in (["list", "/e"], ["stop", "/e", "c"], ["start", "/e", "c"], ["events", "/e"], ["nodes"]):
+        assert callable(parser.parse_args(words).run)
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["lst"], ["list"], ["stop", "/e"], ["stop", "/e", "c", "--timeout", "x"]]
+)
+def test_bad_usage_ends_with_status_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2
+    assert "usage: mauve" in capsys.readouterr().err
+
+
+def test_check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(GOOD, encoding="utf-8")
+    assert main(["check", str(file)]) == 0
+    assert "1 components, 0 resources, 0 connections: no error found" in capsys.readouterr().out
+    file.write_text(GOOD.replace("CounterFsm", "CounterFms").replace("core:", "kore:"), encoding="utf-8")
+    assert main(["check", str(file)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.startswith(f"{file}:3:") for line in lines] == [True, True]
+
+
+def test_plugins(plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plugins", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    core = next(plugin for plugin in found if plugin["name"] == "executor_tests/PyCounter")
+    assert (core["kind"], core["target"]) == ("core", "executor_tests_cores:PyCounter")
+    assert main(["plugins"]) == 0
+    assert "executor_tests/PyCounter" in capsys.readouterr().out
+
+
+def test_component_table() -> None:
+    running = ComponentInfo(
+        name="guidance",
+        state=ComponentInfo.RUNNING,
+        core="p/Core",
+        policy="SCHED_FIFO",
+        priority=60,
+        cpus=[0, 1],
+        period_ns=100_000_000,
+        alternatives=["p/Other"],
+        reconfigurable=True,
+    )
+    protected = ComponentInfo(name="robot", state=ComponentInfo.FAULTED, core="p/Robot", policy="SCHED_OTHER")
+    out = io.StringIO()
+    reply = ListComponents.Response(components=[running, protected])
+    Console(file=out, width=120).print(views.component_table(reply))
+    text = out.getvalue()
+    for word in ("guidance", "RUNNING", "100 ms", "60", "0,1", "p/Core", "p/Other", "FAULTED", "(protected)"):
+        assert word in text
+
+
+def test_reports_and_events_in_words() -> None:
+    none = StepReport.NOT_MEASURED
+    measured = StepReport(
+        step="replace_core p/B", prepare_ns=2_000_000, blackout_ns=35_000, phase_actual_ns=-1_500
+    )
+    stop = StepReport(step="stop", blackout_ns=none, phase_actual_ns=none)
+    line = "replace_core p/B: prepared in 2 ms, blackout 35 us, missed releases 0, next release "
+    line += "-1.5 us off the grid"
+    assert views.report_lines([stop, measured]) == [line]
+    event = ReconfigurationEvent(request="stop guidance", requested_by="me", code=4, message="is stopped")
+    event.stamp.sec = 12
+    assert views.event_line(event) == "12.000 stop guidance by me: refused (4): is stopped"
+
+
+@pytest.mark.parametrize(
+    ("nanoseconds", "text"),
+    [(0, "-"), (999, "999 ns"), (1_000, "1 us"), (2_500_000, "2.5 ms"), (-3_000_000_000, "-3 s")],
+)
+def test_durations(nanoseconds: int, text: str) -> None:
+    assert views.duration(nanoseconds) == text
+
+
+def test_messages_as_json() -> None:
+    plain: dict[str, Any] = views.as_plain(ComponentInfo(name="a", cpus=[1, 2]))
+    assert (plain["name"], plain["cpus"], plain["ports"]) == ("a", [1, 2], [])
+    assert json.loads(json.dumps(plain)) == plain
+
+
+def test_states_are_those_of_the_message() -> None:
+    for number, name in enumerate(views.STATES):
+        assert getattr(ComponentInfo, name) == number
+
+
+def test_module_runs_as_a_program() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mauve_rt.cli", "--version"], capture_output=True, check=True
+    )
+    assert done.stdout.strip()

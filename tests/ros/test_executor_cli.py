@@ -1,0 +1,76 @@
+"""The `mauve` command against a running executor."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Mauve = Callable[..., subprocess.CompletedProcess[str]]
+NODE = "/robot_1/executor"
+
+
+@pytest.fixture
+def environment(domain: int) -> dict[str, str]:
+    return {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+
+
+@pytest.fixture
+def mauve(environment: dict[str, str], executor: Any) -> Mauve:
+    assert executor.process.poll() is None
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "mauve_rt.cli", *words]
+        return subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=False, timeout=40
+        )
+
+    return run
+
+
+def test_verbs_do_what_they_say(mauve: Mauve) -> None:
+    listed = mauve("list", NODE)
+    assert (listed.returncode, listed.stderr) == (0, "")
+    assert "counter" in listed.stdout
+    replaced = mauve("replace-core", NODE, "counter", "executor_tests/Backwards", "--cause", "for a test")
+    assert replaced.returncode == 0, replaced.stderr
+    assert "runs executor_tests/Backwards, before executor_tests/Counter" in replaced.stdout
+    assert "missed releases 0" in replaced.stdout
+    stopped = mauve("stop", NODE, "counter")
+    assert (stopped.returncode, stopped.stdout) == (0, "component 'counter' is stopped\n")
+    again = mauve("stop", NODE, "counter")
+    assert (again.returncode, again.stdout) == (1, "")
+    assert again.stderr == "refused, NOT_RUNNING (4): component 'counter' is already stopped\n"
+    started = mauve("start", NODE, "counter", "--json")
+    assert json.loads(started.stdout)["success"] is True
+    states = {part["name"]: part for part in json.loads(mauve("list", NODE, "--json").stdout)["components"]}
+    assert states["counter"]["core"] == "executor_tests/Backwards"
+
+
+def test_events_are_followed(mauve: Mauve, environment: dict[str, str], tmp_path: Path) -> None:
+    command = [sys.executable, "-u", "-m", "mauve_rt.cli", "events", NODE]
+    told = tmp_path / "events.txt"
+    with told.open("w") as out, subprocess.Popen(command, env=environment, stdout=out) as events:
+        for _ in range(20):  # until it has discovered the executor
+            mauve("stop", NODE, "nobody", "--cause", "a test")
+            if told.read_text():
+                break
+        events.send_signal(signal.SIGINT)
+    assert events.returncode == 0
+    assert (
+        "stop nobody by mauve because a test: refused (1): component 'nobody' is unknown" in told.read_text()
+    )
+
+
+def test_executors_are_found(mauve: Mauve) -> None:
+    assert mauve("nodes").stdout == f"{NODE}\n"
+    missing = mauve("list", "/robot_9/executor")
+    assert missing.returncode == 2
+    assert (
+        f"no service /robot_9/executor/list_components within 10 s; executors seen: {NODE}" in missing.stderr
+    )
