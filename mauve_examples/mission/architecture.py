@@ -72,8 +72,6 @@ def load_world(map_file: Path, robots: Sequence[str], *, seed: int) -> World:
         starts = dict(zip(robots, poses, strict=True))
         facts = MissionFacts(map_path=map_file, radius_m=radius_m, starts=starts, started_ns=0, ended_ns=0)
         return World(map_file=map_file, radius_m=radius_m, starts=starts, area=load_area(facts))
-    except UnicodeDecodeError:  # a message that quotes a binary file
-        raise BadInputError(f"map file is not text in UTF-8: {map_file}; name the map's YAML file") from None
     except _mission.MapError as error:
         raise BadInputError(str(error)) from None
 

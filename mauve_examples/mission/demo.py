@@ -21,7 +21,8 @@ class Interrupts:
     def __init__(self) -> None:
         self._asked = False
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._on_signal)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # else: nohup
+                signal.signal(number, self._on_signal)
 
     def asked(self) -> bool:
         """Whether the user wants it to end."""

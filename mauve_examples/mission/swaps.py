@@ -79,8 +79,9 @@ def _tells_of(event: tuple[int, Any], one: Reconfiguration) -> bool:
 
 
 def _joined(evidence: RobotEvidence, one: Reconfiguration, event: Any) -> Swap:
-    step = None
+    step, cause = None, ""
     if event is not None:
+        cause = event.cause
         step = next(step for step in event.report if step.component == one.component)
     replaced = event is not None and bool(event.to_core)
     return Swap(
@@ -88,19 +89,15 @@ def _joined(evidence: RobotEvidence, one: Reconfiguration, event: Any) -> Swap:
         measured=one,
         from_core=event.from_core if replaced else None,
         to_core=event.to_core if replaced else None,
-        cause=event.cause if event is not None else "",
-        silence_ms=_silence_ms(evidence.decisions, one.parked_ns),
+        cause=cause,
+        silence_ms=_silence_ms(evidence.decisions, cause),
         prepare_us=None if step is None else step.prepare_ns / 1e3,
     )
 
 
-def _silence_ms(decisions: Timed, parked_ns: int) -> float | None:
-    """Of the supervisor's last decision to act before the park, when it is recent enough to be its cause."""
-    acted = [
-        (time_ns, message)
-        for time_ns, message in decisions
-        if message.decision in _ACTED and 0 <= parked_ns - time_ns <= _REPLY_WITHIN_NS
-    ]
-    if not acted or acted[-1][1].silence_s < 0:
-        return None
-    return float(acted[-1][1].silence_s) * 1e3
+def _silence_ms(decisions: Timed, cause: str) -> float | None:
+    """Of the supervisor's decision to act that the event names as its cause, whenever it was recorded."""
+    for _, message in decisions:
+        if message.decision in _ACTED and f"{message.rule}: {message.reason}" == cause:
+            return None if message.silence_s < 0 else float(message.silence_s) * 1e3
+    return None

@@ -31,6 +31,7 @@ STATES = {
     "mapping": {"integrate": 3 * MS},
     "exploration": {"decide": 6 * MS, "announce": 300 * US},
 }
+REASONS = {"do": "peer silent for 1.0 s", "undo": "peers heard again for 3.0 s"}  # by decision
 BLACKOUT_NS, PREPARE_NS, SILENCE_S, WAKEUP_NS = 41 * US, 213 * US, 1.02, 23 * US
 PEERS, ALONE = "mauve_examples/Exploration", "mauve_examples/LocalExploration"
 
@@ -220,7 +221,7 @@ class FakeRobot:
             requested_by=f"/{self.name}/supervisor",
             request_id="1",
             request=f"replace_core exploration {core}",
-            cause="peer silent for 1.0 s" if core == ALONE else "peers heard again for 3.0 s",
+            cause=f"link_lost: {REASONS['do' if core == ALONE else 'undo']}",
             success=True,
             code=0,
             message="",
@@ -238,7 +239,7 @@ class FakeRobot:
             stamp=self.messages.make("builtin_interfaces/msg/Time", sec=0, nanosec=0),
             rule="link_lost",
             decision=decision,
-            reason="",
+            reason=REASONS[decision],
             silence_s=SILENCE_S if decision == "do" else 0.04,
             epoch=1,
             message="",

@@ -8,8 +8,10 @@ namespace mauve_examples {
 namespace {
 
 std::string one_line(const MapError::Detail& detail) {
+  std::string found = detail.found;  // may quote a file that is no text at all; the message is to be text
+  std::replace_if(found.begin(), found.end(), [](unsigned char c) { return c >= 0x80; }, '?');
   std::string line = detail.what + ": " + detail.where + ": expected " + detail.expected + ", found " +
-                     detail.found + "; " + detail.remedy;
+                     found + "; " + detail.remedy;
   // File names and YAML values may hold control characters; the promise is one line.
   std::replace_if(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
   return line;

@@ -229,6 +229,25 @@ TEST_F(Rule6StopStart, AStopThatTimesOutNamesTheStateAndStaysPending) {
   wait_until([&] { return component.task().state() == ComponentState::stopped; }, "the pending stop");
 }
 
+TEST_F(Rule6StopStart, WhatAComponentStillUsesIsNotCleanedUp) {
+  Component& component = add("c", 5);
+  std::atomic<bool> go_on{false};
+  core(component).work = [&] {
+    while (!go_on) {
+    }
+  };
+  deploy();
+  wait_runs(component, 1);
+  deployer.shutdown();  // gives up waiting for the state
+  EXPECT_FALSE(component.task().is_parked());
+  EXPECT_THROW(architecture.cleanup(), Error);
+  EXPECT_THROW(component.cleanup(), Error);
+  EXPECT_TRUE(component.is_configured());
+  go_on = true;
+  wait_until([&] { return component.task().is_parked(); }, "the state to end");
+  EXPECT_NO_THROW(architecture.cleanup());
+}
+
 TEST_F(Rule6StopStart, RefusalsSayWhy) {
   add("c", 1);
   deploy();

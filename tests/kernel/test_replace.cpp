@@ -155,6 +155,24 @@ TEST_F(Rule9Replace, AStoppedComponentTakesItHereAndNow) {
   wait_runs(component, runs + 1);
 }
 
+TEST_F(Rule9Replace, ASecondCommitBeforeTheReleaseSupersedesTheFirst) {
+  Component& component = add("c", 400);
+  deploy();
+  wait_runs(component, 1);
+  StepReport first;
+  std::atomic<bool> committed{false};
+  std::thread waiting([&] {
+    first = component.swap_core(std::make_unique<Successor>(),
+                                {.commit_ns = s_to_ns(5), .phase_ns = s_to_ns(5)}, [&] { committed = true; });
+  });
+  wait_until([&] { return committed.load(); }, "the first commit");
+  const StepReport second =
+      component.swap_core(std::make_unique<Successor>(), {.commit_ns = s_to_ns(5), .phase_ns = s_to_ns(5)});
+  waiting.join();
+  EXPECT_EQ(kNotMeasured, first.phase_actual_ns);
+  EXPECT_NE(kNotMeasured, second.phase_actual_ns);
+}
+
 class Rule7Hold : public Deployed {};
 
 TEST_F(Rule7Hold, APropertyIsSetInsideTheWaitAndKeepsTheInstant) {

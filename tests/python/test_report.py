@@ -73,7 +73,7 @@ def test_the_summary_tells_what_was_measured(mission: Mission, summary: dict[str
         "component": "exploration",
         "from": PEERS,
         "to": ALONE,
-        "cause": "peer silent for 1.0 s",
+        "cause": "link_lost: peer silent for 1.0 s",
         "silence_ms": SILENCE_S * 1e3,
         "prepare_us": PREPARE_NS / 1e3,
         "blackout_us": BLACKOUT_NS / 1e3,

@@ -89,7 +89,7 @@ class Band:
         return [decision.decision for decision in self.decisions]
 
     def core(self) -> str:
-        return str(self.states[-1].components[0].core)
+        return str(self.states[-1].components[0].core) if self.states else ""
 
     def close(self) -> None:
         for process in (self.executor_process, self.supervisor_process):
@@ -119,15 +119,11 @@ def test_a_core_is_replaced_in_flight_and_back(band: Band):
     assert swapped[-1].epoch == band.states[-1].epoch
 
 
-def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: Band, tmp_path: Path):
-    band.until(lambda: "armed" in band.said())
+def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: Band):
+    band.until(lambda: "armed" in band.said() and len(band.states) > 0)
     band.executor_process.kill()
     band.executor_process.communicate()
-    share = share_folder("mauve_examples")
-    assert share is not None
-    band.executor_process = band._start(
-        "executor", f"architecture:={share / 'architecture' / 'metronome.yaml'}"
-    )
+    band.start_executor()
     band.until(lambda: band.said().count("armed") == 2)
     band.playing = False
     band.until(lambda: band.said()[-1:] == ["done"])

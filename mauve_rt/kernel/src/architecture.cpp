@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mauve_rt/error.hpp"
+#include "mauve_rt/futex.hpp"
 #include "mauve_rt/plugin.hpp"
 
 namespace mauve {
@@ -34,7 +35,10 @@ void require_new(bool known, const std::string& what, const std::string& name) {
 
 }  // namespace
 
-Architecture::~Architecture() { cleanup(); }
+Architecture::~Architecture() {
+  for (const auto& component : components_) component->task().end_thread(kForever);
+  cleanup();
+}
 
 PluginRegistry& Architecture::require_registry() const {
   if (registry_ != nullptr) return *registry_;
@@ -157,6 +161,18 @@ bool Architecture::configure_hook() {
     throw;
   }
   return true;
+}
+
+void Architecture::check_cleanup() const {
+  for (const auto& component : components_) {
+    if (component->task().is_parked()) continue;
+    throw Error(ErrorCode::already_running, "the component still executes a state",
+                {.component = component->name(),
+                 .element = "state " + component->task().current_state(),
+                 .expected = "a parked component",
+                 .found = std::string(to_string(component->task().state())),
+                 .remedy = "stop it, and wait for the state's end"});
+  }
 }
 
 void Architecture::cleanup_hook() {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mauve_rt/error.hpp"
+#include "mauve_rt/futex.hpp"
 
 namespace mauve {
 
@@ -59,7 +60,10 @@ class PropertySwap final : public CommitAction {
 Component::Component(std::string name, std::uint16_t number, ChangeSignal& changes)
     : name_(std::move(name)), task_(name_, number, changes) {}
 
-Component::~Component() { cleanup(); }
+Component::~Component() {
+  task_.end_thread(kForever);  // before what it runs is taken away
+  cleanup();
+}
 
 void Component::set_parts(std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core,
                           std::unique_ptr<FsmBase> fsm) {
@@ -156,8 +160,7 @@ StepReport Component::set_property(const std::string& name, const PropertyValue&
   const PropertyValue shown = checked;
   PropertySwap swap(property, checked);
   const time_ns_t prepared = monotonic_now_ns();
-  StepReport report = run_commit(swap, timeouts);
-  show_property(property, shown);
+  StepReport report = run_commit(swap, timeouts, [&] { show_property(property, shown); });
   report.step = "set_property " + name + " " + to_string(shown);
   report.prepare_ns = prepared - began;
   return report;
@@ -206,7 +209,8 @@ void Component::prepare(CoreBase& core, CoreBinding& binding) {
   core.configure();
 }
 
-StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts) {
+StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts,
+                                const std::function<void()>& committed) {
   if (!is_configured()) {
     throw Error(ErrorCode::not_configured, "the component is not configured", {.component = name_});
   }
@@ -224,13 +228,15 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
   CoreSwap swap(core_, binding_, core, binding);
   StepReport report;
   try {
-    report = run_commit(swap, timeouts);
+    report = run_commit(swap, timeouts, [&] {
+      show_core();
+      if (committed) committed();
+    });
   } catch (...) {
     core->cleanup();
     throw;
   }
   core->cleanup();  // the old one by now: retire
-  show_core();
   report.step = "replace_core " + to;
   report.from_core = from;
   report.to_core = to;
@@ -238,21 +244,24 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
   return report;
 }
 
-StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& timeouts) {
+StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& timeouts,
+                                 const std::function<void()>& committed) {
   Commit commit(action);
-  bool committed = false;
+  bool made = false;
   try {
-    committed = task_.commit(commit, timeouts.commit_ns);
+    made = task_.commit(commit, timeouts.commit_ns);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& refusal) {
     throw Error(ErrorCode::adopt_refused, std::string("adopt refused: ") + refusal.what(),
                 {.component = name_, .remedy = "the old core goes on"});
   }
-  if (!committed) {
+  if (!made) {
     throw Error(ErrorCode::adopt_refused, "adopt refused the old core's state",
                 {.component = name_, .remedy = "the old core goes on"});
   }
+  committed();
+  task_.signal_change();
   StepReport report;
   report.component = name_;
   report.blackout_ns = commit.armed_ns - commit.parked_ns;
@@ -317,6 +326,8 @@ bool Component::configure_hook() {
   task_.set_state(ComponentState::stopped);
   return true;
 }
+
+void Component::check_cleanup() const { require_parked("cleanup"); }
 
 void Component::cleanup_hook() {
   core_->cleanup();

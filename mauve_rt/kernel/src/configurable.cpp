@@ -21,8 +21,9 @@ void Configurable::configure() {
   configured_ = true;
 }
 
-void Configurable::cleanup() noexcept {
+void Configurable::cleanup() {
   if (!configured_) return;
+  check_cleanup();
   configured_ = false;
   try {
     cleanup_hook();

@@ -99,10 +99,12 @@ void Deployer::shutdown() noexcept {
   watchdog_stop_.store(1, std::memory_order_release);
   futex_wake_all(watchdog_stop_);
   watchdog_.join();
+  const time_ns_t stopped_by = monotonic_now_ns() + kStopTimeout;  // all of them together
   const auto& components = architecture_.components();
   for (auto component = components.rbegin(); component != components.rend(); ++component) {
     try {
-      if ((*component)->task().state() == ComponentState::running) (*component)->task().stop(kStopTimeout);
+      if ((*component)->task().state() != ComponentState::running) continue;
+      (*component)->task().stop(std::max<time_ns_t>(0, stopped_by - monotonic_now_ns()));
     } catch (const Error&) {  // still in a state, or faulted by now: joining its thread is the answer
     }
   }
@@ -144,11 +146,12 @@ time_ns_t Deployer::get_time(const std::string& component) const {
 
 StepReport Deployer::replace_core(const std::string& component_name, const std::string& core,
                                   const CommitTimeouts& timeouts) {
-  const std::lock_guard lock(command_mutex_);
+  std::unique_lock lock(command_mutex_);
   Component& component = architecture_.component(component_name);
   std::unique_ptr<CoreBase> fresh = architecture_.make_core(core);
   component.check_allowed(core);
-  return component.swap_core(std::move(fresh), timeouts);
+  // Waiting for the release that follows keeps nobody else from the deployer.
+  return component.swap_core(std::move(fresh), timeouts, [&lock] { lock.unlock(); });
 }
 
 StepReport Deployer::set_property(const std::string& component, const std::string& name,

@@ -197,7 +197,6 @@ bool Task::commit(Commit& commit, time_ns_t timeout_ns) {
     throw Error(ErrorCode::faulted, "the component parked before the change: " + fault_.what,
                 {.component = name_});
   }
-  changes_.bump();
   return commit.committed;
 }
 
@@ -209,7 +208,7 @@ bool Task::wait_release(Commit& commit, time_ns_t until_ns) noexcept {
     if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) return false;
     futex_wait_until(commit.released, 0, kForever);
   }
-  return true;
+  return commit.released.load(std::memory_order_acquire) == Commit::kReleased;
 }
 
 bool Task::check_execution(time_ns_t now_ns) {

@@ -258,7 +258,7 @@ void Task::release(const State& state, time_ns_t actual_ns) noexcept {
   if (Commit* commit = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
     commit->release_nominal_ns = clock_ns();
     commit->release_actual_ns = actual_ns;
-    commit->released.store(1, std::memory_order_release);
+    commit->released.store(Commit::kReleased, std::memory_order_release);
     futex_wake_all(commit->released);
   }
 }
@@ -297,7 +297,10 @@ void Task::carry_out(Commit& commit, const State* state) noexcept {
     trace(TraceKind::reconfiguration, commit.action.trace_id(), kAdopt, commit.adopt_ns);
     if (commit.committed) {
       trace(TraceKind::reconfiguration, commit.action.trace_id(), kTake, commit.take_ns);
-      awaiting_release_.store(&commit, std::memory_order_release);
+      if (Commit* earlier = awaiting_release_.exchange(&commit, std::memory_order_acq_rel)) {
+        earlier->released.store(Commit::kSuperseded, std::memory_order_release);
+        futex_wake_all(earlier->released);
+      }
     }
     commit.armed_ns = clock_.now_ns();
     trace_at(commit.armed_ns, TraceKind::armed, state->trace_id, clock_ns(), commit.committed ? 1 : 0);

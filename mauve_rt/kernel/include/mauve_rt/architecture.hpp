@@ -77,6 +77,7 @@ class Architecture final : public Configurable {
   };
 
   bool configure_hook() override;
+  void check_cleanup() const override;
   void cleanup_hook() override;
   PluginRegistry& require_registry() const;
 

@@ -33,6 +33,9 @@ class CommitAction {
 /// | release_*              | component, before released | requester, after it | through released                    |
 /// | done, released (futex) | component                  | requester           | release/acquire: hand over the rest |
 struct Commit {
+  static constexpr std::uint32_t kReleased = 1;
+  static constexpr std::uint32_t kSuperseded = 2;  // another commit came before the release
+
   explicit Commit(CommitAction& what) : action(what) {}
 
   CommitAction& action;

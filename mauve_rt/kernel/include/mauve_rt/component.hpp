@@ -3,6 +3,7 @@
 // runs.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -99,16 +100,20 @@ class Component final : public Configurable {
   /// Replaces the core in flight: prepare, commit inside a wait, retire the old one. [non-rt]
   /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted; the
   /// old core then goes on as if nothing had been asked.
-  StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {});
+  /// `committed` is called once the new core is in, before the release that follows is waited for.
+  StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {},
+                       const std::function<void()>& committed = {});
 
  private:
   bool configure_hook() override;
+  void check_cleanup() const override;
   void cleanup_hook() override;
   PropertyBase& require_property(const std::string& name);
   void require_parked(const std::string& what) const;
   void prepare(CoreBase& core, CoreBinding& binding);
   void settle_period();
-  StepReport run_commit(CommitAction& action, const CommitTimeouts& timeouts);
+  StepReport run_commit(CommitAction& action, const CommitTimeouts& timeouts,
+                        const std::function<void()>& committed);
   void show_core();
   void show_property(const PropertyBase& property, PropertyValue value);
 

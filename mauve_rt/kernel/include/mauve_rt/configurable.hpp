@@ -20,8 +20,8 @@ class Configurable {
   /// Throws Error (configure_failed) with the reason and stays unconfigured when the hook throws or returns
   /// false.
   void configure();
-  /// Runs the cleanup hook if configured. [non-rt]
-  void cleanup() noexcept;
+  /// Runs the cleanup hook if configured. [non-rt] Throws Error when it cannot be cleaned up now; nothing was done then.
+  void cleanup();
 
   /// What messages call this object, e.g. "core mauve_examples/Guidance".
   virtual std::string description() const = 0;
@@ -29,6 +29,8 @@ class Configurable {
  protected:
   /// Allocate and check here; false or an exception means that it failed.
   virtual bool configure_hook() { return true; }
+  /// Throws Error when cleaning up would take something away from who still uses it.
+  virtual void check_cleanup() const {}
   /// Give back what configure_hook took.
   virtual void cleanup_hook() {}
 

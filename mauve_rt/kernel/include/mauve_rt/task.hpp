@@ -120,7 +120,8 @@ class Task {
   /// Returns false when adopt returned false; rethrows what it threw. Throws Error (timeout) naming the state
   /// still running; nothing was changed then.
   bool commit(Commit& commit, time_ns_t timeout_ns);
-  /// Waits for the release that follows a commit; false when it had not come by the instant. [non-rt]
+  /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
+  /// came first. [non-rt]
   bool wait_release(Commit& commit, time_ns_t until_ns) noexcept;
 
   /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component
@@ -134,6 +135,8 @@ class Task {
   void set_state(ComponentState state) noexcept;
   /// Forgets a fault, for configure; the thread must be parked. [non-rt]
   void clear_fault() noexcept;
+  /// Tells who waits for changes that there was one. [rt]
+  void signal_change() noexcept { changes_.bump(); }
   /// Whether the thread is out of user code for good, until the next start. [non-rt]
   bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
   /// The state being executed or waited in; empty before the start. [non-rt]
