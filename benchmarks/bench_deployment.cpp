@@ -43,7 +43,8 @@ void measure_component(const Settings& settings) {
   std::vector<std::int64_t> spreads;
   for (std::int64_t i = 0; i < settings.count; ++i) {
     deployer.deploy();
-    bench::sleep_until(deployer.epoch_ns() + mauve::ms_to_ns(2));
+    bench::sleep_until(deployer.epoch_ns() +
+                       mauve::ms_to_ns(20));  // longer than most of the machine's stalls
     deployer.shutdown();
     const mauve::TraceDrain drain = deployer.drain_trace();
     std::vector<time_ns_t> instants;
