@@ -89,7 +89,7 @@ def report_lines(report: Sequence[Any]) -> list[str]:
             facts = [f"prepared in {duration(step.prepare_ns)}", f"blackout {duration(step.blackout_ns)}"]
             facts.append(f"missed releases {step.missed_releases}")
         if step.phase_actual_ns != type(step).NOT_MEASURED:
-            facts.append(f"next release {duration(step.phase_actual_ns)} off the grid")
+            facts.append(f"next release woken {duration(step.phase_actual_ns)} after its instant")
         if facts:
             lines.append(f"{step.step}: {', '.join(facts)}")
     return lines

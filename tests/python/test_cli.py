@@ -91,7 +91,7 @@ def test_reports_and_events_in_words() -> None:
     )
     stop = StepReport(step="stop", blackout_ns=none, phase_actual_ns=none)
     line = "replace_core p/B: prepared in 2 ms, blackout 35 us, missed releases 0, next release "
-    line += "-1.5 us off the grid"
+    line += "woken -1.5 us after its instant"
     assert views.report_lines([stop, measured]) == [line]
     event = ReconfigurationEvent(request="stop guidance", requested_by="me", code=4, message="is stopped")
     event.stamp.sec = 12
