@@ -64,18 +64,20 @@ TEST_F(Rule9Replace, AThousandTimesAtRandomPhasesMissesNoRelease) {
   deploy();
   std::mt19937 random(3);
   std::uniform_int_distribution<int> phase_us(0, 900);
-  int missed = 0;
+  int in_time = 0;
   for (int i = 0; i < 1000; ++i) {
     std::this_thread::sleep_for(std::chrono::microseconds(phase_us(random)));
+    deployer.drain_trace();
     const StepReport report = component.swap_core(std::make_unique<Successor>(),
                                                   {.commit_ns = s_to_ns(10), .phase_ns = s_to_ns(10)});
     ASSERT_EQ(0, report.phase_nominal_ns);
-    missed += static_cast<int>(report.missed_releases);
+    const auto armed = records_of(deployer.drain_trace(), TraceKind::armed);
+    ASSERT_EQ(1U, armed.size());
+    if (armed[0].time_ns > armed[0].a) continue;  // the machine stalled the commit past the instant
+    ++in_time;
+    ASSERT_EQ(0, report.missed_releases) << "armed before the pending instant, it was released at it";
   }
-  // The machine may stall under us; the kernel by itself leaves no instant out.
-  const std::uint64_t skipped = component.task().statistics().skipped;
-  EXPECT_LE(static_cast<std::uint64_t>(missed), skipped);
-  EXPECT_LE(missed, 10);
+  EXPECT_GT(in_time, 500) << "a commit is made while there is time for it";
   EXPECT_GE(core(component).runs, 1000) << "take() carried the count over each time";
 }
 
