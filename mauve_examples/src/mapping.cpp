@@ -19,8 +19,7 @@ bool MappingCore::configure_hook() {
   update_->origin_y_m = world.origin_y_m;
   update_->columns = static_cast<std::uint16_t>(world.tile_columns());
   update_->rows = static_cast<std::uint16_t>(world.tile_rows());
-  told_.assign(world.tile_count(), 0);
-  next_tile_ = 0;
+  changes_.configure(world.tile_count());
   return true;
 }
 
@@ -43,25 +42,14 @@ void MappingCore::integrate() {
   const bool has_scan = read_scan_and_its_pose();
   shell().map_update([&](OccupancyGrid& map) {
     if (has_scan) integrate_scan(*scan_, pose_, map);
-    collect_changes(map);
+    update_->tiles.clear();
+    changes_.collect(map, update_->tiles);
   });
   if (update_->tiles.empty()) return;
   update_->stamp_ns = clock_ns();
-  if (shell().map_updates.write(*update_)) {
-    for (const MapTile& tile : update_->tiles) {
-      told_[static_cast<std::size_t>(tile.row) * update_->columns + tile.column] = tile.revision;
-    }
-  }
-}
-
-void MappingCore::collect_changes(const OccupancyGrid& map) {
-  update_->tiles.clear();
-  for (std::size_t looked = 0; looked < told_.size() && !update_->tiles.full(); ++looked) {
-    const std::size_t tile = next_tile_;
-    next_tile_ = (next_tile_ + 1) % told_.size();
-    if (map.revision(tile) == told_[tile]) continue;
-    update_->tiles.resize(update_->tiles.size() + 1);
-    map.copy_tile(tile, update_->tiles[update_->tiles.size() - 1]);
+  if (shell().map_updates.write(*update_)) return;
+  for (const MapTile& tile : update_->tiles) {  // no room for them: they are to be told yet
+    changes_.forget(static_cast<std::size_t>(tile.row) * update_->columns + tile.column);
   }
 }
 

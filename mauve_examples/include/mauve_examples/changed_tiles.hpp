@@ -36,6 +36,8 @@ class ChangedTiles {
     }
   }
 
+  /// The tile counts as changed again, as when it did not arrive. [rt]
+  void forget(std::size_t tile) noexcept { seen_[tile] = 0; }
   /// Everything counts as changed again. [rt]
   void forget() noexcept { std::fill(seen_.begin(), seen_.end(), 0); }
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
+#include "mauve_examples/changed_tiles.hpp"
 #include "mauve_examples/occupancy_map.hpp"
 #include "mauve_examples/types.hpp"
 
@@ -31,13 +31,11 @@ class MappingCore : public mauve::Core<MappingShell> {
 
  private:
   bool read_scan_and_its_pose();
-  void collect_changes(const OccupancyGrid& map);
 
   Pose2D pose_;
   std::unique_ptr<Scan> scan_;
   std::unique_ptr<MapUpdate> update_;
-  std::vector<std::uint32_t> told_;  // revision of each tile as it was last told
-  std::size_t next_tile_{0};         // where to look on: with more changes than fit, all get their turn
+  ChangedTiles changes_;  // since they were last told
 };
 
 struct MappingFsm : mauve::Fsm<MappingShell, MappingCore> {
