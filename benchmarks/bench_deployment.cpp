@@ -19,6 +19,12 @@ using mauve::time_ns_t;
 constexpr std::int64_t kPeriodUs = 1000;
 
 struct Settings {
+  explicit Settings(const bench::Options& options)
+      : count(options.number("count", 20)),
+        threads(options.number("threads", 8)),
+        cpus(options.number("cpus", 1)),
+        priority(options.priority()) {}
+
   std::int64_t count;
   std::int64_t threads;
   std::int64_t cpus;
@@ -96,18 +102,6 @@ void measure_bare(const Settings& settings) {
   bench::JsonLine().add("spreads_ns", spreads).print();
 }
 
-void measure(bench::Options& options) {
-  const Settings settings{.count = options.number("count", 20),
-                          .threads = options.number("threads", 8),
-                          .cpus = options.number("cpus", 1),
-                          .priority = static_cast<int>(options.number("priority", 80))};
-  if (options.who() == bench::Who::component) {
-    measure_component(settings);
-  } else {
-    measure_bare(settings);
-  }
-}
-
 }  // namespace
 
-int main(int count, char** words) { return bench::run_program(count, words, measure); }
+int main(int count, char** words) { return bench::run_sides(count, words, measure_component, measure_bare); }

@@ -3,26 +3,21 @@
 //   bench_restart [--count 100] [--priority 80] [--cpu 0] [--work-us 100] [--seed 1]
 // Prints {"nominal_phase_ns": [...], "actual_phase_ns": [...]}: of the first release after each start,
 // against the grid that deployment recorded.
-#include <chrono>
-#include <random>
-#include <thread>
-
 #include "support/components.hpp"
 #include "support/options.hpp"
+#include "support/random_pause.hpp"
 
 namespace {
 
 constexpr std::int64_t kPeriodUs = 1000;
 
-void measure(bench::Options& options) {
+void measure(const bench::Options& options) {
   mauve::Architecture architecture;
-  bench::add_worker(architecture, "worker", static_cast<int>(options.number("priority", 80)),
-                    static_cast<int>(options.number("cpu", 0)), kPeriodUs, options.number("work-us", 100));
+  bench::add_worker(architecture, "worker", options.priority(), options.cpu(), kPeriodUs,
+                    options.number("work-us", 100));
   architecture.configure();
   mauve::Deployer deployer(architecture);
-  std::mt19937_64 random(static_cast<std::uint64_t>(options.number("seed", 1)));
-  std::uniform_int_distribution<std::int64_t> pause_us(0, 3 * kPeriodUs);
-  const auto pause = [&] { std::this_thread::sleep_for(std::chrono::microseconds(pause_us(random))); };
+  bench::RandomPause pause(options.seed(), {0, 3 * kPeriodUs});
 
   std::vector<mauve::TraceRecord> records;
   deployer.deploy();

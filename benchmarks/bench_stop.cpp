@@ -4,19 +4,26 @@
 // Prints {"durations_ns": [...]}: of the call of stop(); of the bare thread from before the wake to its first
 // instruction.
 #include <chrono>
-#include <random>
 #include <thread>
 
 #include "mauve_rt/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"
+#include "support/random_pause.hpp"
 
 namespace {
 
 using mauve::time_ns_t;
 
 struct Settings {
+  explicit Settings(const bench::Options& options)
+      : count(options.number("count", 100)),
+        priority(options.priority()),
+        cpu(options.cpu()),
+        wait_ms(options.number("wait-ms", 5000)),
+        seed(options.seed()) {}
+
   std::int64_t count;
   int priority;
   int cpu;
@@ -24,16 +31,8 @@ struct Settings {
   std::uint64_t seed;
 };
 
-/// Sleeps 1 to 10 ms: the sleeper is deep in its wait by then.
-class RandomPause {
- public:
-  explicit RandomPause(std::uint64_t seed) : random_(seed) {}
-  void operator()() { std::this_thread::sleep_for(std::chrono::microseconds(pause_us_(random_))); }
-
- private:
-  std::mt19937_64 random_;
-  std::uniform_int_distribution<std::int64_t> pause_us_{1'000, 10'000};
-};
+/// The sleeper is deep in its wait by then.
+constexpr bench::RangeUs kDeepUs{1'000, 10'000};
 
 void measure_component(const Settings& settings) {
   mauve::Architecture architecture;
@@ -42,7 +41,7 @@ void measure_component(const Settings& settings) {
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
-  RandomPause pause(settings.seed);
+  bench::RandomPause pause(settings.seed, kDeepUs);
   std::vector<std::int64_t> durations;
   for (std::int64_t i = 0; i < settings.count; ++i) {
     const std::uint64_t releases = component.task().statistics().releases;
@@ -76,7 +75,7 @@ void measure_bare(const Settings& settings) {
         woken_ns.store(now, std::memory_order_release);
       }
     });
-    RandomPause pause(settings.seed);
+    bench::RandomPause pause(settings.seed, kDeepUs);
     const auto wake = [&] {
       word.store(1, std::memory_order_release);
       mauve::futex_wake_all(word);
@@ -95,19 +94,6 @@ void measure_bare(const Settings& settings) {
   bench::JsonLine().add("durations_ns", durations).print();
 }
 
-void measure(bench::Options& options) {
-  const Settings settings{.count = options.number("count", 100),
-                          .priority = static_cast<int>(options.number("priority", 80)),
-                          .cpu = static_cast<int>(options.number("cpu", 0)),
-                          .wait_ms = options.number("wait-ms", 5000),
-                          .seed = static_cast<std::uint64_t>(options.number("seed", 1))};
-  if (options.who() == bench::Who::component) {
-    measure_component(settings);
-  } else {
-    measure_bare(settings);
-  }
-}
-
 }  // namespace
 
-int main(int count, char** words) { return bench::run_program(count, words, measure); }
+int main(int count, char** words) { return bench::run_sides(count, words, measure_component, measure_bare); }

@@ -5,14 +5,12 @@
 // Prints {"blackout_ns": [...]}; for the component also what its trace tells of releases missed and of its
 // phase.
 #include <array>
-#include <chrono>
-#include <random>
-#include <thread>
 
 #include "mauve_rt/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"
+#include "support/random_pause.hpp"
 #include "support/witness.hpp"
 
 namespace {
@@ -22,22 +20,18 @@ using mauve::time_ns_t;
 constexpr std::int64_t kPeriodUs = 1000;
 
 struct Settings {
+  explicit Settings(const bench::Options& options)
+      : count(options.number("count", 100)),
+        priority(options.priority()),
+        cpu(options.cpu()),
+        work_us(options.number("work-us", 100)),
+        seed(options.seed()) {}
+
   std::int64_t count;
   int priority;
   int cpu;
   std::int64_t work_us;
   std::uint64_t seed;
-};
-
-/// Sleeps anything up to two periods, so that swaps fall on every phase.
-class RandomPause {
- public:
-  explicit RandomPause(std::uint64_t seed) : random_(seed) {}
-  void operator()() { std::this_thread::sleep_for(std::chrono::microseconds(pause_us_(random_))); }
-
- private:
-  std::mt19937_64 random_;
-  std::uniform_int_distribution<std::int64_t> pause_us_{0, 2 * kPeriodUs};
 };
 
 void measure_component(const Settings& settings) {
@@ -48,7 +42,7 @@ void measure_component(const Settings& settings) {
   mauve::Deployer deployer(architecture);
   deployer.deploy();
   bench::Witness witness(settings.cpu);
-  RandomPause pause(settings.seed);
+  bench::RandomPause pause(settings.seed, {0, 2 * kPeriodUs});  // on every phase
   std::vector<std::int64_t> blackouts;
   std::vector<mauve::TraceRecord> releases;
   for (std::int64_t i = 0; i < settings.count; ++i) {
@@ -162,8 +156,8 @@ void measure_bare(const Settings& settings) {
   mauve::RealtimeProcess process;
   process.acquire(settings.priority, false);
   Relay relay(settings);
-  bench::Witness witness(settings.cpu);  // as beside the component
-  RandomPause pause(settings.seed);
+  bench::Witness witness(settings.cpu);                         // as beside the component
+  bench::RandomPause pause(settings.seed, {0, 2 * kPeriodUs});  // on every phase
   std::vector<std::int64_t> blackouts;
   for (std::int64_t i = 0; i < settings.count; ++i) {
     pause();
@@ -172,19 +166,6 @@ void measure_bare(const Settings& settings) {
   bench::JsonLine().add("blackout_ns", blackouts).print();
 }
 
-void measure(bench::Options& options) {
-  const Settings settings{.count = options.number("count", 100),
-                          .priority = static_cast<int>(options.number("priority", 80)),
-                          .cpu = static_cast<int>(options.number("cpu", 0)),
-                          .work_us = options.number("work-us", 100),
-                          .seed = static_cast<std::uint64_t>(options.number("seed", 1))};
-  if (options.who() == bench::Who::component) {
-    measure_component(settings);
-  } else {
-    measure_bare(settings);
-  }
-}
-
 }  // namespace
 
-int main(int count, char** words) { return bench::run_program(count, words, measure); }
+int main(int count, char** words) { return bench::run_sides(count, words, measure_component, measure_bare); }

@@ -1,14 +1,12 @@
 """cyclictest of Debian's rt-tests, the field's own yardstick of wake-up latency."""
 
 import json
-import os
-import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+import packages
 from native import BenchmarkError
 
 _OVERFLOW_NS = 1_000_000
@@ -16,18 +14,8 @@ _OVERFLOW_NS = 1_000_000
 
 
 def available() -> str:
-    """Empty when cyclictest can be run, else why not; installs it where that is allowed."""
-    if shutil.which("cyclictest"):
-        return ""
-    remedy = "cyclictest is not installed: apt-get install rt-tests"
-    if os.geteuid() != 0 or not shutil.which("apt-get"):
-        return remedy
-    sys.stderr.write("bench: installing rt-tests for cyclictest\n")
-    return "" if _apt("install", "rt-tests") or (_apt("update") and _apt("install", "rt-tests")) else remedy
-
-
-def _apt(*words: str) -> bool:
-    return subprocess.run(["apt-get", "-y", "-qq", *words], capture_output=True, check=False).returncode == 0
+    """Empty when cyclictest can be run, else why not."""
+    return packages.available("cyclictest", "rt-tests")
 
 
 def latencies_ns(*, priority: int, cpu: int, duration_s: float) -> list[float]:

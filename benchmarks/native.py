@@ -8,16 +8,17 @@ from typing import Any, TypeVar
 
 ROOT = Path(__file__).resolve().parent.parent
 _BUILT = ROOT / "build" / "benchmarks"
-_TIMEOUT_S = 300
 
 Result = TypeVar("Result")
+Measure = Callable[[int], dict[str, Any]]
+"""Runs a program; gets the number of the round."""
 
 
 class BenchmarkError(Exception):
     """A measurement that could not be made."""
 
 
-def run(program: str, **options: float | str) -> dict[str, Any]:
+def run(program: str, *, timeout_s: float = 300, **options: float | str) -> dict[str, Any]:
     """Run a program with --name value for each option; what it printed.
 
     Raises:
@@ -27,7 +28,7 @@ def run(program: str, **options: float | str) -> dict[str, Any]:
     for name, value in options.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False)
+        done = subprocess.run(words, capture_output=True, text=True, timeout=timeout_s, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BenchmarkError(f"{program}: {error}") from None
     if done.returncode:
@@ -47,3 +48,12 @@ def interleaved(rounds: int, *measures: Callable[[int], Result]) -> list[list[Re
         found = {which: measures[which](number) for which in order}
         results.append([found[which] for which in range(len(measures))])
     return results
+
+
+def both(program: str, rounds: int, **options: int) -> list[list[dict[str, Any]]]:
+    """Rounds of [component, bare]: the two sides of a program, seeded by the round's number."""
+
+    def side(who: str) -> Measure:
+        return lambda number: run(program, who=who, seed=number, **options)
+
+    return interleaved(rounds, side("component"), side("bare"))

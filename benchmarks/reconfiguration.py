@@ -21,7 +21,8 @@ def swap_rows(settings: Settings) -> Iterator[Row]:
     components = [component for component, _ in rounds]
     releases = sum(found["releases"] for found in components)
     stalled = sum(found["missed_in_stalls"] for found in components)
-    note = f"{stalled} of {releases} releases were missed inside stalls of the machine that a witness marked"
+    note = f"{settings.rounds * settings.swaps} replacements; {stalled} of {releases} releases were missed "
+    note += "inside stalls of the machine that a witness marked"
     yield compared(
         f"{what}, blackout p50", _pairs(rounds, "blackout_ns", 50), unit="us", beside=beside, ratio_limit=1.5
     )
@@ -34,13 +35,25 @@ def swap_rows(settings: Settings) -> Iterator[Row]:
 
 
 def stop_rows(settings: Settings) -> Iterator[Row]:
-    """Stop a component that is asleep."""
-    rounds = _both("bench_stop", settings, count=settings.stops, cpu=settings.cpu, wait_ms=5000)
-    beside = "futex wake-to-run of a thread"
-    for percent, limit_us in ((50, 50), (99, 200)):
-        pairs = _pairs(rounds, "durations_ns", percent)
-        what = f"stop inside a 5 s wait, p{percent}"
-        yield compared(what, pairs, unit="us", beside=beside, limit=limit_us)
+    """Stop a component that is asleep, then one that is not."""
+    for wait_ms in (500, 5000):
+        rounds = _both("bench_stop", settings, count=settings.stops, cpu=settings.cpu, wait_ms=wait_ms)
+        for percent, limit_us in ((50, 50), (99, 200)):
+            what = f"stop while asleep, {wait_ms / 1000:g} s period, p{percent}"
+            pairs = _pairs(rounds, "durations_ns", percent)
+            yield compared(what, pairs, unit="us", beside="futex wake-to-run of a thread", limit=limit_us)
+    rounds = _both("bench_stop_busy", settings, count=settings.busy_stops, cpu=settings.cpu)
+    left_ms = percentile([left for component, _ in rounds for left in component["left_ns"]], 50) / 1e6
+    note = f"over what was left of the execution, {left_ms:.4g} ms when it was asked"
+    for percent in (50, 99):
+        yield compared(
+            f"stop in mid-execution, 20 ms left, 5 s period, over the 20 ms, p{percent}",
+            _pairs(rounds, "late_ns", percent),
+            unit="us",
+            beside="a thread that ends its work and wakes who waits",
+            limit=100,
+            note=note,
+        )
 
 
 def deployment_rows(settings: Settings) -> Iterator[Row]:
@@ -73,19 +86,14 @@ def restart_rows(settings: Settings) -> Iterator[Row]:
     starts = sum(len(one["nominal_phase_ns"]) for one in found)
     actual = percentile([phase for one in found for phase in one["actual_phase_ns"]], 50)
     late_us = actual / _NS_PER_US
-    note = f"{starts} starts that came to a release, the actual one {late_us:.3g} us after the nominal (p50)"
-    yield exactly_zero("phase error after random stop/start, nominal, worst", worst, unit="ns", note=note)
+    asked = settings.rounds * settings.restarts
+    note = f"{starts} of them came to a release, the actual one {late_us:.3g} us after the nominal (p50)"
+    what = f"phase error after {asked} random stop/start, nominal, worst"
+    yield exactly_zero(what, worst, unit="ns", note=note)
 
 
 def _both(program: str, settings: Settings, **options: int) -> Rounds:
-    """Rounds of [component, bare]."""
-
-    def measure(who: str, number: int) -> dict[str, Any]:
-        return native.run(program, who=who, seed=number, priority=settings.priority, **options)
-
-    return native.interleaved(
-        settings.rounds, lambda number: measure("component", number), lambda number: measure("bare", number)
-    )
+    return native.both(program, settings.rounds, priority=settings.priority, **options)
 
 
 def _pairs(rounds: Rounds, name: str, percent: float) -> list[tuple[float, float]]:

@@ -49,7 +49,8 @@ def compared(
     """
     measured = median_interval([pair[0] for pair in pairs])
     ratio = ratio_interval(pairs)
-    target, outcome = "-", "reported"
+    target: str = "-"
+    outcome: Verdict = "reported"
     if ratio_limit is not None:
         target, outcome = f"ratio <= {ratio_limit:g}", verdict(ratio, ratio_limit, rounds=len(pairs))
     elif limit is not None:
@@ -70,16 +71,42 @@ def compared(
     )
 
 
+def alone(
+    what: str, values: Sequence[float], *, unit: str, limit: float | None = None, note: str = ""
+) -> Row:
+    """A row of rounds that stand beside nothing."""
+    measured = median_interval(values)
+    target: str = "-"
+    outcome: Verdict = "reported"
+    if limit is not None:
+        target, outcome = f"<= {limit:g} {unit}", verdict(measured, limit, rounds=len(values))
+    return Row(
+        what=what,
+        unit=unit,
+        measured=measured.value,
+        measured_interval=measured,
+        target=target,
+        verdict=outcome,
+        note=note,
+        rounds=[(value,) for value in values],
+    )
+
+
 def exactly_zero(what: str, values: Sequence[float], *, unit: str = "", note: str = "") -> Row:
     """A row about something that must not happen at all; the worst round counts."""
+    return never_over(what, values, limit=0, unit=unit, note=note)
+
+
+def never_over(what: str, values: Sequence[float], *, limit: float, unit: str = "", note: str = "") -> Row:
+    """A row about a bound that no round may break; the worst one counts."""
     worst = max(values)
-    met = worst == 0
+    bound = f"{limit:g} {unit}".strip()
     return Row(
         what=what,
         unit=unit,
         measured=worst,
-        target=f"0 {unit}".strip(),
-        verdict="met" if met else "missed",
+        target=f"<= {bound}" if limit else bound,
+        verdict="met" if worst <= limit else "missed",
         note=note,
         rounds=[(value,) for value in values],
     )

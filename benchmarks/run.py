@@ -14,18 +14,31 @@ from dataclasses import replace
 from pathlib import Path
 
 import machine
+from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from native import BenchmarkError
 from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
 from rows import Row, markdown, not_available
+from scale import scale_rows
 from settings import FULL, QUICK, Settings
+from transactions import soak_rows, transaction_rows
 from wakeup import wakeup_rows
+from wakeup_executor import executor_wakeup_rows
 
 BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "wakeup": wakeup_rows,
+    "executor-wakeup": executor_wakeup_rows,
     "deployment": deployment_rows,
     "restart": restart_rows,
     "stop": stop_rows,
     "swap": swap_rows,
+    "transaction": transaction_rows,
+    "shared-data": shared_data_rows,
+    "latest-value": latest_value_rows,
+    "activation": activation_rows,
+    "trace": trace_rows,
+    "inversion": inversion_rows,
+    "scale": scale_rows,
+    "soak": soak_rows,
 }
 
 
@@ -75,8 +88,8 @@ def _measure(names: Sequence[str], settings: Settings) -> tuple[list[Row], bool]
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
     amount = parser.add_mutually_exclusive_group()
-    amount.add_argument("--quick", action="store_true", help="about 2 minutes (the default)")
-    amount.add_argument("--full", action="store_true", help="about 10 minutes")
+    amount.add_argument("--quick", action="store_true", help="about 3 minutes (the default)")
+    amount.add_argument("--full", action="store_true", help="about 20 minutes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows, with every round, to FILE")
     parser.add_argument(
         "--only", action="append", choices=BENCHMARKS, help="only this one; may be given again"

@@ -12,11 +12,42 @@ class Settings:
     wakeup_s: float
     swaps: int
     stops: int
+    busy_stops: int
     deployments: int
     restarts: int
+    inversions: int
+    scale_s: float
+    transactions: int
+    soak: int
     priority: int = 80
     cpu: int = 0
 
 
-QUICK = Settings(mode="quick", rounds=10, wakeup_s=2.0, swaps=100, stops=60, deployments=15, restarts=20)
-FULL = Settings(mode="full", rounds=20, wakeup_s=5.0, swaps=500, stops=300, deployments=50, restarts=50)
+QUICK = Settings(
+    mode="quick",
+    rounds=10,
+    wakeup_s=1.0,
+    swaps=100,
+    stops=30,
+    busy_stops=10,
+    deployments=8,
+    restarts=100,
+    inversions=2,
+    scale_s=0.3,
+    transactions=100,
+    soak=500,
+)
+FULL = Settings(
+    mode="full",
+    rounds=20,
+    wakeup_s=3.0,
+    swaps=500,
+    stops=100,
+    busy_stops=40,
+    deployments=30,
+    restarts=50,
+    inversions=10,
+    scale_s=1.0,
+    transactions=300,
+    soak=10_000,
+)

@@ -1,82 +1,77 @@
-"""Wake-up latency of a 1 kHz component in the executor process, beside a bare loop and cyclictest."""
+"""Wake-up latency of a 1 kHz component, idle and under stress, beside a bare loop and cyclictest."""
 
-import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import cyclictest
 import native
-import numpy as np
-from busy_executor import COMPONENT, BusyExecutor
+import stress
 from ratios import percentile
 from rows import Row, compared, not_available
 from settings import Settings
 
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.trace import Trace
-
 _NS_PER_US = 1000
-_SETTLE_S = 0.02  # left out on both sides: caches are cold
+_SETTLE_MS = 20  # left out on both sides: caches are cold
+_LIMITS = ((50, 1.1), (99, 1.2))
 
 
 def wakeup_rows(settings: Settings) -> Iterator[Row]:
-    """Rounds of component, bare loop and cyclictest, while the executor is busy in all three.
+    """Rounds of component, bare loop and cyclictest, each alone on its CPU."""
+    yield from _rows("wake-up latency of a 1 kHz component, machine idle", settings)
+    what = "wake-up latency of a 1 kHz component, stress-ng"
+    missing = stress.available()
+    if missing:
+        yield not_available(what, missing)
+    else:
+        yield from _rows(what, settings, under_stress=True)
 
-    The component is stopped through its service while the others run: they have its priority for themselves.
-    """
-    what = "wake-up latency of a 1 kHz component in the executor, rclpy busy"
-    no_cyclictest = cyclictest.available()
-    with BusyExecutor() as executor:
-        place = {"priority": executor.priority, "cpu": executor.cpu}
-        executor.stop()
 
-        def component(_: int) -> tuple[int, int]:
-            executor.start()
-            time.sleep(_SETTLE_S)
-            begin_ns = time.monotonic_ns()
-            time.sleep(settings.wakeup_s)
-            end_ns = time.monotonic_ns()
-            executor.stop()
-            return begin_ns, end_ns
-
-        def bare(_: int) -> list[float]:
-            duration_ms = round((_SETTLE_S + settings.wakeup_s) * 1000)
-            found = native.run("bench_wakeup", **place, duration_ms=duration_ms)
-            latencies: list[float] = found["latencies_ns"][round(_SETTLE_S * 1000) :]
-            return latencies
-
-        def cyclic(_: int) -> list[float]:
-            return cyclictest.latencies_ns(**place, duration_s=settings.wakeup_s)
-
-        measures = [component, bare] if no_cyclictest else [component, bare, cyclic]
-        rounds = native.interleaved(settings.rounds, *measures)
-        trace = executor.finish()
-        note = executor.load_report
-    lost = trace.losses[COMPONENT].lost
-    note += f"; {lost} trace records were lost" if lost else ""
-    samples = [[_latencies_ns(trace, *found[0]), *found[1:]] for found in rounds]
-    for percent, limit in ((50, 1.1), (99, 1.2)):
-        pairs = _pairs(samples, percent, 1)
+def percentile_rows(
+    what: str, rounds: list[list[list[float]]], *, no_cyclictest: str, note: str = ""
+) -> Iterator[Row]:
+    """Rows of rounds of [component, bare loop, cyclictest if there is one], latencies in nanoseconds."""
+    for percent, limit in _LIMITS:
         beside = "bare clock_nanosleep loop"
+        pairs = _pairs(rounds, percent, 1)
         yield compared(f"{what}, p{percent}", pairs, unit="us", beside=beside, ratio_limit=limit, note=note)
-    for percent in (50, 99):
+    for percent, _ in _LIMITS:
         row = f"{what}, p{percent}, against cyclictest"
         if no_cyclictest:
             yield not_available(row, no_cyclictest)
         else:
-            yield compared(row, _pairs(samples, percent, 2), unit="us", beside="cyclictest", note=note)
+            yield compared(row, _pairs(rounds, percent, 2), unit="us", beside="cyclictest", note=note)
 
 
-def _latencies_ns(trace: Trace, begin_ns: int, end_ns: int) -> list[float]:
-    """Actual minus nominal instant of the releases in a window."""
-    releases = trace.of(COMPONENT, Kind.RELEASE)
-    chosen = releases[(releases["a"] >= begin_ns) & (releases["a"] < end_ns)]
-    latencies: list[float] = np.asarray(chosen["b"] - chosen["a"], np.float64).tolist()
+def bare_latencies_ns(*, priority: int, cpu: int, duration_s: float) -> list[float]:
+    """Of the bare loop."""
+    return _native("bare", priority=priority, cpu=cpu, duration_s=duration_s)
+
+
+def _rows(what: str, settings: Settings, *, under_stress: bool = False) -> Iterator[Row]:
+    place = {"priority": settings.priority, "cpu": settings.cpu}
+    no_cyclictest = cyclictest.available()
+    measures = [
+        lambda _: _native("component", **place, duration_s=settings.wakeup_s),
+        lambda _: _native("bare", **place, duration_s=settings.wakeup_s),
+    ]
+    if not no_cyclictest:
+        measures.append(lambda _: cyclictest.latencies_ns(**place, duration_s=settings.wakeup_s))
+    with stress.stressed() if under_stress else nullcontext():
+        rounds = native.interleaved(settings.rounds, *measures)
+    note = stress.DESCRIPTION if under_stress else ""
+    yield from percentile_rows(what, rounds, no_cyclictest=no_cyclictest, note=note)
+
+
+def _native(who: str, *, priority: int, cpu: int, duration_s: float) -> list[float]:
+    duration_ms = round(duration_s * 1000) + _SETTLE_MS
+    found = native.run("bench_wakeup", who=who, priority=priority, cpu=cpu, duration_ms=duration_ms)
+    latencies: list[float] = found["latencies_ns"][_SETTLE_MS:]
     return latencies
 
 
-def _pairs(samples: list[list[list[float]]], percent: float, other: int) -> list[tuple[float, float]]:
+def _pairs(rounds: list[list[list[float]]], percent: float, other: int) -> list[tuple[float, float]]:
     """(component, other) of each round, in us."""
     return [
         (percentile(found[0], percent) / _NS_PER_US, percentile(found[other], percent) / _NS_PER_US)
-        for found in samples
+        for found in rounds
     ]

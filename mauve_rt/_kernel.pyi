@@ -1,7 +1,12 @@
 """The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC."""
 
 from collections.abc import Callable
-from typing import Protocol, TypeAlias, final
+from typing import Any, ClassVar, Final, Literal, TypeAlias, final, overload
+
+from mauve_rt.cores import Core
+from mauve_rt.fsms import Fsm
+from mauve_rt.resources import AnyResource, Resource
+from mauve_rt.shells import Shell
 
 PropertyValue: TypeAlias = bool | int | float | str
 
@@ -17,101 +22,194 @@ class MauveError(Exception):
     """
 
     code: str
+    statement: str  # what alone
     component: str
     element: str
     expected: str
     found: str
     remedy: str
+    step: int  # of a transaction, from 1; 0: none
+    step_name: str
 
 @final
 class PortDescription:
-    name: str
-    kind: str  # 'read', 'write', 'call', 'event'
+    name: Final[str]
+    kind: Final[str]  # 'read', 'write', 'call', 'event'
     type: str  # 'geometry_msgs/msg/Point', or 'void(package/Name)' for call ports
-    resource: str  # '' when not connected
-    service: str
+    resource: Final[str]  # '' when not connected
+    service: Final[str]
 
 @final
 class PropertyDescription:
-    name: str
-    type: str  # 'bool', 'int', 'float', 'str'
-    value: PropertyValue  # default, or the present value for a component
-    unit: str
-    description: str
-    minimum: float | None
-    maximum: float | None
+    name: Final[str]
+    type: Final[str]  # 'bool', 'int', 'float', 'str'
+    value: Final[PropertyValue]  # default, or the present value for a component
+    unit: Final[str]
+    description: Final[str]
+    minimum: Final[float | None]
+    maximum: Final[float | None]
 
 @final
 class ShellDescription:
-    name: str
-    ports: list[PortDescription]
-    properties: list[PropertyDescription]
+    name: Final[str]
+    ports: Final[list[PortDescription]]
+    properties: Final[list[PropertyDescription]]
 
 @final
 class ServiceDescription:
-    name: str
-    kind: str  # as PortDescription.kind: the kind of port that connects to it
-    type: str
+    name: Final[str]
+    kind: Final[str]  # as PortDescription.kind: the kind of port that connects to it
+    type: Final[str]
 
 @final
 class ResourceDescription:
-    name: str
-    kind: str  # 'shared_data', 'ring_buffer', or the plug-in's name
-    type: str
-    services: list[ServiceDescription]
+    name: Final[str]
+    kind: Final[str]  # 'shared_data', 'ring_buffer', 'latest_value', 'event', or the plug-in's name
+    type: Final[str]
+    services: Final[list[ServiceDescription]]
+
+@final
+class ExecutionTimeDescription:
+    """How long an execution state took since its machine was configured."""
+
+    state: Final[str]
+    count: Final[int]
+    mean_ns: Final[int]
+    max_ns: Final[int]
 
 @final
 class ComponentDescription:
     """A snapshot; fields as mauve_msgs/msg/ComponentInfo."""
 
-    name: str
-    shell: str
-    core: str
-    fsm: str
-    state: str  # 'UNCONFIGURED', 'STOPPED', 'RUNNING', 'HELD', 'STOPPING', 'FAULTED'
-    current_state: str  # FSM state being executed or waited in
-    clock_ns: int
-    period_ns: int
-    offset_ns: int
-    policy: str  # 'SCHED_FIFO' | 'SCHED_OTHER' | '' before deployment
-    priority: int
-    cpus: list[int]
-    alternatives: list[str]
-    reconfigurable: bool
-    ports: list[PortDescription]
-    properties: list[PropertyDescription]
-    fault: str
-    releases: int
-    overruns: int
-    skipped: int
-    wakeup_p50_ns: int
-    wakeup_p99_ns: int
-    wakeup_max_ns: int
+    name: Final[str]
+    shell: Final[str]
+    core: Final[str]
+    fsm: Final[str]
+    state: Final[str]  # 'UNCONFIGURED', 'STOPPED', 'RUNNING', 'HELD', 'STOPPING', 'FAULTED'
+    current_state: Final[str]  # FSM state being executed or waited in
+    clock_ns: Final[int]
+    period_ns: Final[int]
+    offset_ns: Final[int]
+    policy: Final[str]  # 'SCHED_FIFO' | 'SCHED_OTHER' | '' before deployment
+    priority: Final[int]
+    cpus: Final[list[int]]
+    alternatives: Final[list[str]]
+    reconfigurable: Final[bool]
+    ports: Final[list[PortDescription]]
+    properties: Final[list[PropertyDescription]]
+    fault: Final[str]  # also of a core that the fallback has replaced
+    fallback: Final[str]  # the core that takes over after a fault; '' when none was declared
+    fell_back: Final[bool]  # it took over
+    releases: Final[int]
+    overruns: Final[int]
+    skipped: Final[int]
+    wakeup_p50_ns: Final[int]
+    wakeup_p99_ns: Final[int]
+    wakeup_max_ns: Final[int]
+    allocations: Final[int]  # C++ operators new of its thread since its last start; see allocation_counting()
+    page_faults: Final[int]  # of its thread since its last start, minor and major
+    execution_times: Final[list[ExecutionTimeDescription]]  # one for each execution state
 
 @final
 class StepReport:
     """Fields as mauve_msgs/msg/StepReport."""
 
-    step: str
-    component: str
-    from_core: str
-    to_core: str
-    prepare_ns: int
-    blackout_ns: int
-    missed_releases: int
-    phase_nominal_ns: int
-    phase_actual_ns: int  # NOT_MEASURED until the first release after the commit
+    step: Final[str]
+    component: Final[str]
+    from_core: Final[str]
+    to_core: Final[str]
+    prepare_ns: Final[int]
+    blackout_ns: Final[int]
+    missed_releases: Final[int]
+    phase_nominal_ns: Final[int]
+    phase_actual_ns: Final[int]  # NOT_MEASURED until the first release after the commit
 
-NOT_MEASURED: int
+NOT_MEASURED: Final[int]
 
-class PythonCore(Protocol):
-    """What a core written in Python offers: a method per action and guard of the FSM.
+DEFAULT_MAX_READERS: Final[int]  # of a latest_value
 
-    And, if it likes, these and adopt(old), which may refuse by returning False or raising.
+@final
+class ShellView:
+    """What a part written in Python reaches of its component's shell; messages in serialized form.
+
+    Raises MauveError (not_configured) once the component is gone.
     """
 
-    def configure(self) -> bool | None: ...
-    def cleanup(self) -> None: ...
+    def read(self, port: str) -> tuple[bytes, int, int]:
+        """(message, 0 none - 1 old - 2 new, writer's time in ns)."""
+    def write(self, port: str, data: bytes) -> bool:
+        """False when there was no room."""
+    def call(self, port: str, *args: Any, **kwargs: Any) -> Any:
+        """Calls a service in Python."""
+    def raise_event(self, port: str) -> None: ...
+    def property(self, name: str) -> Any:
+        """The value in force."""
+    def ports(self) -> list[PortDescription]: ...
+    def properties(self) -> list[PropertyDescription]: ...
+    def clock(self) -> int:
+        """The component's logical clock, ns of CLOCK_MONOTONIC."""
+    def period(self) -> int:
+        """The component's period g in ns."""
+    def python(self) -> Shell | None:
+        """The shell's own object, when it is written in Python."""
+    def implementation(self) -> str: ...
+
+@final
+class ShellBuilder:
+    """Takes the declarations of a shell written in Python. `zero`: the message's default, serialized."""
+
+    def read_port(self, name: str, type: str, zero: bytes | None) -> None: ...
+    def write_port(self, name: str, type: str, zero: bytes | None, on_commit: str, on_stop: str) -> None: ...
+    def call_port(self, name: str, type: str) -> None: ...
+    def event_port(self, name: str) -> None: ...
+    def property(
+        self,
+        name: str,
+        value: PropertyValue,
+        unit: str,
+        description: str,
+        minimum: float | None,
+        maximum: float | None,
+    ) -> None: ...
+
+@final
+class FsmBuilder:
+    """Takes the declarations of a state machine written in Python; states by their names."""
+
+    def execution(self, name: str, method: str, max_execution_ns: int) -> None: ...
+    def wait(self, name: str, duration_ns: int) -> None: ...
+    def wait_event(self, name: str, port: str, timeout_ns: int, min_interarrival_ns: int) -> None: ...
+    def set_initial(self, state: str) -> None: ...
+    def next(self, state: str, to: str) -> None: ...
+    def transition(self, state: str, guard: str, to: str) -> None: ...
+
+@final
+class PartFactory:
+    """How to make a part written in Python."""
+
+    def __init__(
+        self, kind: Literal["shell", "core", "fsm", "resource"], name: str, make: Callable[..., object]
+    ) -> None: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+
+@final
+class DataResource:
+    """A resource of a data type. `zero`: the message's default, serialized; None when it is no message."""
+
+    def __init__(
+        self,
+        *,
+        kind: str,
+        type: str,
+        capacity: int,
+        overwrite: bool,
+        max_bytes: int,
+        max_readers: int,
+        zero: bytes | None,
+    ) -> None: ...
 
 @final
 class PluginRegistry:
@@ -121,11 +219,17 @@ class PluginRegistry:
 
         A second call for one path does nothing.
         """
-    def add_python_core(self, name: str, shell: str, factory: Callable[[object], object]) -> None:
+    def add_python_core(self, name: str, shell: str, factory: Callable[[ShellView], object]) -> None:
         """factory(shell_view) -> core object.
 
         Its actions run on the component's thread under the interpreter's lock.
         """
+    def shell(self, name: str, shell_class: type[Shell]) -> None:
+        """Registers a class under a name, package/Class."""
+    def core(self, name: str, core_class: type[Core[Any]], shell_name: str) -> None: ...
+    def fsm(self, name: str, fsm_class: type[Fsm[Any, Any]], shell_name: str) -> None: ...
+    def resource(self, name: str, resource_class: type[Resource]) -> None:
+        """`name` is its kind in architecture files."""
     def names(self, kind: str) -> list[str]:
         """kind: 'shell', 'core', 'fsm', 'resource', 'type'."""
     def describe_shell(self, name: str) -> ShellDescription: ...
@@ -135,15 +239,71 @@ class PluginRegistry:
     def fsm_shell(self, name: str) -> str: ...
 
 @final
-class Architecture:
-    def __init__(self, registry: PluginRegistry) -> None: ...
+class Component:
+    """One component of an architecture, by name: it keeps the architecture. For ordinary threads."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def shell(self) -> Any:
+        """Its shell's object; None when that is written in C++."""
+    @property
+    def core(self) -> Any:
+        """Its core's object; None when that is written in C++. Not while somebody replaces the core."""
+    @property
+    def state(self) -> str:
+        """As ComponentDescription.state."""
+    def get_time(self) -> int:
+        """The nominal instant of the last entry of the initial state."""
+    def describe(self) -> ComponentDescription: ...
+    def is_configured(self) -> bool: ...
+    def configure(self) -> None: ...
+    def cleanup(self) -> None: ...
+    def set_property(self, name: str, value: PropertyValue) -> None:
+        """At once before the start, else in the component's next wait."""
+    def cleanup_core(self) -> None:
+        """Listing 3 of the paper: of a stopped component, cleanup_core, replace_core, configure_core."""
+    def replace_core(self, core: str | type[Core[Any]]) -> None: ...
+    def configure_core(self) -> None: ...
+    def swap_core(
+        self,
+        core: str | type[Core[Any]],
+        *,
+        commit_timeout_ns: int = 1_000_000_000,
+        phase_timeout_ns: int = 1_000_000_000,
+    ) -> StepReport:
+        """Replaces the core in flight: prepare, commit inside a wait, retire the old one."""
+
+@final
+class ArchitectureDescription:
+    """Equal to another exactly when nothing was changed; str() has one line a fact."""
+
+    def __eq__(self, value: object) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+@final
+class Transaction:
+    """A list of steps that come into force as one, or not at all; nothing happens before Deployer.commit.
+
+    Parts are classes or registered names. Each step returns the transaction.
+    """
+
+    def __init__(self) -> None: ...
+    def replace_core(self, component: str, core: str | type[Core[Any]]) -> Transaction: ...
+    def replace_fsm(self, component: str, fsm: str | type[Fsm[Any, Any]]) -> Transaction:
+        """The new one starts in its initial state, on its own period, on the deployment's epoch."""
+    def replace_shell(self, component: str, shell: str | type[Shell]) -> Transaction:
+        """Ports keep their connections by name, properties their values."""
+    def set_property(self, component: str, name: str, value: PropertyValue) -> Transaction: ...
+    def connect(self, component: str, port: str, resource: str, service: str) -> Transaction: ...
+    def disconnect(self, component: str, port: str) -> Transaction: ...
     def add_component(
         self,
         name: str,
+        shell: str | type[Shell],
+        core: str | type[Core[Any]],
+        fsm: str | type[Fsm[Any, Any]],
         *,
-        shell: str,
-        core: str,
-        fsm: str,
         priority: int = 50,
         cpus: list[int] = [],
         offset_ns: int = 0,
@@ -151,12 +311,82 @@ class Architecture:
         overrun: str = "skip",
         max_backlog: int = 10,
         stack_bytes: int = 524288,
+        trace_records: int = 2048,
+        properties: dict[str, PropertyValue] = {},
         alternatives: list[str] = [],
+        fallback: str = "",
         reconfigurable: bool = True,
-    ) -> None: ...
+    ) -> Transaction:
+        """It arrives STOPPED; a start step starts it."""
+    def remove_component(self, name: str) -> Transaction: ...
+    @overload
+    def add_resource(self, name: str, resource: AnyResource) -> Transaction: ...
+    @overload
     def add_resource(
-        self, name: str, *, kind: str, type: str = "", capacity: int = 0, overwrite: bool = False
-    ) -> None: ...
+        self,
+        name: str,
+        *,
+        kind: str,
+        type: str = "",
+        capacity: int = 0,
+        overwrite: bool = False,
+        max_readers: int = 14,
+    ) -> Transaction: ...
+    def remove_resource(self, name: str) -> Transaction:
+        """Refused while a port is connected to it."""
+    def start(self, component: str, clock_ns: int | None = None) -> Transaction: ...
+    def stop(self, component: str) -> Transaction: ...
+
+@final
+class TransactionReport:
+    steps: Final[list[StepReport]]
+    epoch: Final[int]  # of the architecture, after
+    prepare_ns: Final[int]
+    blackout_ns: Final[int]  # the longest of any component's
+
+@final
+class Architecture:
+    """Components and resources, connected. Parts are classes written in Python or registered names."""
+
+    def __init__(self, registry: PluginRegistry) -> None: ...
+    def add_component(
+        self,
+        name: str,
+        shell: str | type[Shell],
+        core: str | type[Core[Any]],
+        fsm: str | type[Fsm[Any, Any]],
+        *,
+        priority: int = 50,
+        cpus: list[int] = [],
+        offset_ns: int = 0,
+        period_ns: int = 0,
+        overrun: str = "skip",
+        max_backlog: int = 10,
+        stack_bytes: int = 524288,
+        trace_records: int = 2048,
+        alternatives: list[str] = [],
+        fallback: str | type[Core[Any]] | None = None,
+        reconfigurable: bool = True,
+    ) -> Component:
+        """`fallback`: the core that takes over after a fault."""
+    def component(self, name: str) -> Component: ...
+    @overload
+    def add_resource(self, name: str, resource: AnyResource) -> None: ...
+    @overload
+    def add_resource(
+        self,
+        name: str,
+        *,
+        kind: str,
+        type: str = "",
+        capacity: int = 0,
+        overwrite: bool = False,
+        max_readers: int = 14,
+    ) -> None:
+        """Adds a resource of a given kind or a plug-in's.
+
+        Given: 'shared_data', 'ring_buffer' (capacity, overwrite), 'latest_value' (max_readers), 'event'.
+        """
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
     def set_property(self, component: str, name: str, value: PropertyValue) -> None:
         """Before configure. Once configured use Deployer.set_property."""
@@ -165,23 +395,33 @@ class Architecture:
 
         Deployer.wait_published yields what is written to it.
         """
+    def subscribe(self, resource: str) -> None:
+        """Counts an incoming topic, which uses Deployer.write_resource, as a writer of a resource.
+
+        Refused for a latest_value that has one.
+        """
     def configure(self) -> None: ...
     def cleanup(self) -> None: ...
+    def is_configured(self) -> bool: ...
+    def describe(self) -> ArchitectureDescription:
+        """Components, implementations, wiring, properties, states, grids and resources, as of one moment."""
+    def epoch(self) -> int:
+        """Grows with every committed change and every start, stop and fault; never 0."""
     def components(self) -> list[ComponentDescription]: ...
     def resources(self) -> list[ResourceDescription]: ...
 
 @final
 class RealtimeStatus:
-    granted: bool
-    missing: list[str]
+    granted: Final[bool]
+    missing: Final[list[str]]
 
 @final
 class TraceDrain:
-    records: bytes  # n * 48, layout of mauve_msgs/msg/TraceRecord, little-endian, no padding
-    written: list[int]  # per component
-    dropped: list[int]
-    monotonic_ns: int
-    realtime_ns: int
+    records: Final[bytes]  # n * 48, layout of mauve_msgs/msg/TraceRecord, little-endian, no padding
+    written: Final[list[int]]  # per component
+    dropped: Final[list[int]]
+    monotonic_ns: Final[int]
+    realtime_ns: Final[int]
 
 @final
 class Deployer:
@@ -196,7 +436,10 @@ class Deployer:
         Called by deploy() if not before.
         """
     def deploy(self) -> None:
-        """Creates the threads, meets them at the barrier, publishes the epoch, starts every component."""
+        """Creates the threads, meets them at the barrier, publishes the epoch, starts every component.
+
+        Shortens the interpreter's switch interval to 0.1 ms where it is longer, for components in Python.
+        """
     def shutdown(self) -> None:
         """Stops in reverse order (outputs written), joins the threads.
 
@@ -205,15 +448,30 @@ class Deployer:
     def stop(self, component: str, timeout_ns: int = 1_000_000_000) -> None: ...
     def start(self, component: str, clock_ns: int | None = None) -> None: ...
     def get_time(self, component: str) -> int: ...
+    def commit(
+        self,
+        transaction: Transaction,
+        *,
+        dry_run: bool = False,
+        expected_epoch: int = 0,
+        commit_timeout_ns: int = 1_000_000_000,
+        phase_timeout_ns: int = 1_000_000_000,
+    ) -> TransactionReport:
+        """Carries out a transaction, deployed or not.
+
+        Raises MauveError with the number of the failed step (`step`); nothing was changed then.
+        """
     def replace_core(
         self,
         component: str,
-        core: str,
+        core: str | type[Core[Any]],
         *,
         commit_timeout_ns: int = 1_000_000_000,
         phase_timeout_ns: int = 1_000_000_000,
     ) -> StepReport:
         """Prepare, commit, retire.
+
+        A name must be one that the component declares; a class is the program's own choice.
 
         Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.
         """
@@ -224,7 +482,8 @@ class Deployer:
     @property
     def epoch_ns(self) -> int: ...
     def drain_trace(self) -> TraceDrain: ...
-    def trace_components(self) -> list[str]: ...
+    def trace_components(self) -> list[str]:
+        """Names by the numbers that records carry; those of removed components stay."""
     def trace_names(self) -> list[str]: ...
     def wait_published(self, timeout_ns: int) -> list[tuple[str, bytes, int]]:
         """What was written to published resources since the last call.
@@ -232,7 +491,7 @@ class Deployer:
         (resource, serialized message with its CDR header, writer's time), one thread at a time.
         """
     def write_resource(self, resource: str, data: bytes) -> bool:
-        """Writes a serialized message to a shared_data or ring_buffer resource; False when a ring is full."""
+        """Writes a serialized message to a given resource, raises an event; False when a ring is full."""
     def read_resource(self, resource: str) -> tuple[bytes, int, int]:
         """Looks at a shared_data resource.
 
@@ -242,5 +501,64 @@ class Deployer:
         """Waits until any component changes its state or core (a fault included); False at the timeout."""
     def wake(self) -> None:
         """Ends every wait_published and wait_change at once (for shutting down)."""
+
+@final
+class Simulation:
+    """Architectures in virtual time on the calling thread, the same every time.
+
+    Time passes without the interpreter's lock; callbacks and components written in Python take it.
+    An exception of a callback ends run_until, which may be called again. A reference from a callback to the
+    simulation's owner lives until shutdown().
+    """
+
+    def __init__(self, *, trace: bool = True, begin_ns: int = 1_000_000_000) -> None: ...
+    def add(self, architecture: Architecture) -> None:
+        """Takes in a configured architecture, before deploy(); it lives as long as the simulation."""
+    def deploy(self) -> None:
+        """Gives all components one epoch and starts them."""
+    def shutdown(self) -> None:
+        """Stops every component, drops the callbacks and lets the architectures go."""
+    def at(self, instant_ns: int, callback: Callable[[], object]) -> None:
+        """Calls back once, at the instant or now if that is past."""
+    def every(self, first_ns: int, period_ns: int, callback: Callable[[], object]) -> None: ...
+    def run_until(self, instant_ns: int) -> None:
+        """Lets virtual time pass up to the instant, that instant included."""
+    def now_ns(self) -> int: ...
+    def epoch_ns(self) -> int:
+        """The instant that all grids are counted from; 0 before deploy()."""
+    def start(self, architecture: Architecture, component: str, clock_ns: int | None = None) -> None: ...
+    def stop(self, architecture: Architecture, component: str) -> None: ...
+    def get_time(self, architecture: Architecture, component: str) -> int: ...
+    def commit(
+        self,
+        architecture: Architecture,
+        transaction: Transaction,
+        *,
+        dry_run: bool = False,
+        expected_epoch: int = 0,
+    ) -> TransactionReport:
+        """As Deployer.commit, in virtual time."""
+    def replace_core(self, architecture: Architecture, component: str, core: str) -> StepReport:
+        """In the component's present wait. Preparing takes no virtual time."""
+    def set_property(
+        self, architecture: Architecture, component: str, name: str, value: PropertyValue
+    ) -> StepReport: ...
+    def drain_trace(self, architecture: Architecture) -> TraceDrain:
+        """As Deployer.drain_trace; both times of the drain are virtual."""
+    def trace_components(self, architecture: Architecture) -> list[str]: ...
+    def trace_names(self) -> list[str]: ...
+    def take_published(self, architecture: Architecture) -> list[tuple[str, bytes, int]]:
+        """What was written to published resources since the last call; as Deployer.wait_published."""
+    def write_resource(self, architecture: Architecture, resource: str, data: bytes) -> bool:
+        """As Deployer.write_resource, stamped with the virtual time."""
+    def read_resource(self, architecture: Architecture, resource: str) -> tuple[bytes, int, int]: ...
+
+def allocation_counting() -> str:
+    """Which C++ allocations the counters see: 'none', 'some' or 'all'.
+
+    'none' under a sanitizer. 'some': not those inside the C++ standard library (streams), when the process
+    had loaded it before; start it with LD_PRELOAD=libmauve_rt.so and it is 'all'. malloc, called directly by
+    C code or by the interpreter, is never counted.
+    """
 
 def monotonic_ns() -> int: ...

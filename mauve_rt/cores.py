@@ -1,8 +1,8 @@
-"""What the author of a core in Python needs.
+"""Cores written in Python.
 
-    from mauve_rt.cores import Core
+    from mauve_rt.api import Core
 
-    class Hover(Core):
+    class Hover(Core[HoverShell]):
         def configure(self) -> None:
             self.height = self.shell.height.value
 
@@ -16,168 +16,78 @@
 
 A core has one method for every action and guard of its component's FSM; the kernel checks that when it
 prepares the core. Its methods run on the component's thread, under the interpreter's lock: soft real time.
-List it in the package's `mauve_rt_plugins` (see `mauve_rt.model.plugins`).
+What they raise is a fault of the component, with its traceback; all others run on. A core for a shell in C++
+is a plain `Core`; list it in the package's `mauve_rt_plugins` (see `mauve_rt.model.plugins`).
 """
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Literal, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, get_args
 
-from rclpy.serialization import deserialize_message, serialize_message
+from mauve_rt._kernel import PartFactory, ShellView
+from mauve_rt.parts import Configurable, implementation_name
+from mauve_rt.ports import Property, ReadPort, Sample, WritePort
+from mauve_rt.shells import Shell, shell_of
 
-from mauve_rt._kernel import PortDescription, PropertyDescription
-from mauve_rt.model.message_types import message_class
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
 
-__all__ = ["Core", "Property", "ReadPort", "Sample", "Shell", "ShellView", "WritePort"]
+    ShellT = TypeVar("ShellT", bound=Shell, default=Any)
+else:
+    from typing import TypeVar
 
-Status = Literal["none", "old", "new"]
-_STATUSES: tuple[Status, Status, Status] = ("none", "old", "new")
+    ShellT = TypeVar("ShellT")
 
-
-class ShellView(Protocol):
-    """What the kernel hands to a Python core: its component's shell, messages in serialized form."""
-
-    def read(self, port: str) -> tuple[bytes, int, int]:
-        """(message, 0 none - 1 old - 2 new, writer's time in ns)."""
-
-    def write(self, port: str, data: bytes) -> object:
-        """Write a serialized message to a port."""
-
-    def property(self, name: str) -> bool | float | str:
-        """The value in force."""
-
-    def ports(self) -> list[PortDescription]:
-        """The shell's ports."""
-
-    def properties(self) -> list[PropertyDescription]:
-        """The shell's properties."""
-
-    def clock(self) -> int:
-        """The component's logical clock, ns of CLOCK_MONOTONIC."""
-
-    def period(self) -> int:
-        """The component's period g in ns."""
+__all__ = ["Core", "Property", "ReadPort", "Sample", "Shell", "ShellT", "WritePort", "core_factory"]
 
 
-@dataclass(frozen=True)
-class Sample:
-    """What a read found."""
+class Core(Configurable, Generic[ShellT]):
+    """Base of cores written in Python, for a shell: `class Hover(Core[HoverShell])`."""
 
-    value: Any  # a ROS message; the type's zero when nothing was written yet
-    status: Status  # none: nothing written yet, old: read before by this port, new: not yet
-    time_ns: int  # the writer's clock, CLOCK_MONOTONIC
+    budget_ns: ClassVar[int] = 2_000_000
+    """The time adopt and take need together: a change with less left before the next release waits."""
 
-    @property
-    def is_new(self) -> bool:
-        """Whether this port had not read the value before."""
-        return self.status == "new"
+    _shell_class: ClassVar[type[Any]] = Shell
 
-    def age_ns(self, now_ns: int) -> int:
-        """Age against a later instant; 0 when nothing was written yet."""
-        return 0 if self.status == "none" else now_ns - self.time_ns
-
-
-class _Port:
-    def __init__(self, view: ShellView, description: PortDescription) -> None:
-        self._view = view
-        self.name = description.name
-        self.type = description.type
-
-    @cached_property
-    def message_class(self) -> Any:
-        """The class of the port's messages.
-
-        Raises:
-            TypeError: the port's type is no installed ROS message; only C++ cores can use such a port.
-        """
-        found = message_class(self.type)
-        if found is None:
-            raise TypeError(
-                f"port '{self.name}': type '{self.type}' is no installed ROS message; use a core in C++"
-            )
-        return found
-
-
-class ReadPort(_Port):
-    """A port to read from."""
-
-    def read(self) -> Sample:
-        """The present value. On the component's thread only."""
-        data, status, time_ns = self._view.read(self.name)
-        return Sample(deserialize_message(data, self.message_class), _STATUSES[status], time_ns)
-
-
-class WritePort(_Port):
-    """A port to write to."""
-
-    def write(self, value: Any) -> bool:
-        """Write a ROS message; False when there was no room. On the component's thread only.
-
-        Raises:
-            TypeError: a message of another type.
-        """
-        if not isinstance(value, self.message_class):
-            raise TypeError(f"port '{self.name}' takes {self.type}, not {type(value).__name__}")
-        return self._view.write(self.name, serialize_message(value)) is not False
-
-
-class Property:
-    """A property of the shell."""
-
-    def __init__(self, view: ShellView, name: str) -> None:
-        self._view = view
-        self.name = name
-
-    @property
-    def value(self) -> Any:
-        """The value in force since the component last left a wait."""
-        return self._view.property(self.name)
-
-
-class Shell:
-    """A component's shell: every port and property by its name, and the component's clock."""
-
-    def __init__(self, view: ShellView) -> None:
-        self._view = view
-        self._members: dict[str, ReadPort | WritePort | Property] = {
-            description.name: Property(view, description.name) for description in view.properties()
-        }
-        for port in view.ports():
-            if port.kind in ("read", "write"):
-                self._members[port.name] = (ReadPort if port.kind == "read" else WritePort)(view, port)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._members[name]
-        except KeyError:
-            known = ", ".join(self._members)
-            raise AttributeError(f"the shell has no port or property '{name}'; it has {known}") from None
-
-    @property
-    def clock_ns(self) -> int:
-        """The component's logical clock: the nominal instant of this execution, CLOCK_MONOTONIC."""
-        return self._view.clock()
-
-    @property
-    def period_ns(self) -> int:
-        """The component's period."""
-        return self._view.period()
-
-
-class Core:
-    """Base of cores written in Python.
-
-    A core may also have `adopt(old)`: called on the component's thread when it takes over from `old` (the
-    other core object, None when that is written in C++); returning False leaves everything as it was.
-    """
-
-    def __init__(self, shell: Shell) -> None:
+    def __init__(self, shell: ShellT) -> None:
         self.shell = shell
 
-    def configure(self) -> bool | None:
-        """Get ready, on an ordinary thread. Return False or raise to refuse, with the reason."""
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for base in getattr(cls, "__orig_bases__", ()):
+            shells = [shell for shell in get_args(base)[:1] if isinstance(shell, type)]
+            if shells and issubclass(shells[0], Shell):
+                cls._shell_class = shells[0]
 
-    def cleanup(self) -> None:
-        """Let go of what configure() took, on an ordinary thread."""
+    def adopt(self, old: Any) -> bool | None:
+        """Look whether to take over from `old`, and copy what is small; False or raising refuses.
+
+        Called on the component's thread inside its wait. `old` is the other core object, None when that is
+        written in C++. After a refusal the old core goes on as if nothing had been asked: leave it as it is.
+        """
+
+    def take(self, old: Any) -> None:
+        """Move bulk data over from `old`, after adopt().
+
+        The change is decided by then: what is raised here is a fault of this core at its first action.
+        """
+
+    @classmethod
+    def _part(cls) -> PartFactory:
+        return PartFactory("core", implementation_name(cls), cls._make)
+
+    @classmethod
+    def _make(cls, view: ShellView) -> "Core[Any]":
+        shell: Any = shell_of(view)
+        if not isinstance(shell, cls._shell_class):
+            raise TypeError(
+                f"the core was written for another shell: {cls.__qualname__} is for "
+                f"{cls._shell_class.__qualname__}, found {view.implementation()}"
+            )
+        return cls(shell)
+
+
+def core_factory(core_class: Any) -> Callable[[ShellView], object]:
+    """What `PluginRegistry.add_python_core` takes; also of a class that only looks like a Core."""
+    if isinstance(core_class, type) and issubclass(core_class, Core):
+        return core_class._make
+    return lambda view: core_class(shell_of(view))

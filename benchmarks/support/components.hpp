@@ -19,7 +19,7 @@ struct WorkerShell : mauve::Shell {
 };
 
 struct Worker : mauve::Core<WorkerShell> {
-  void work() {
+  virtual void work() {
     if (shell().work_us > 0) spin_for(mauve::us_to_ns(shell().work_us));
   }
   void take(mauve::CoreBase& old) noexcept override { state = static_cast<Worker&>(old).state; }

@@ -24,7 +24,7 @@ class Options {
     if (count % 2 == 0) fail(std::string("no value follows ") + words[count - 1]);
   }
 
-  std::int64_t number(const std::string& name, std::int64_t otherwise) {
+  std::int64_t number(const std::string& name, std::int64_t otherwise) const {
     const auto found = values_.find(name);
     if (found == values_.end()) return otherwise;
     try {
@@ -33,11 +33,18 @@ class Options {
       fail("--" + name + ": expected a number, found " + found->second);
     }
   }
-  Who who() {
-    const std::string word = values_.contains("who") ? values_["who"] : "component";
+  Who who() const {
+    const auto found = values_.find("who");
+    const std::string word = found == values_.end() ? "component" : found->second;
     if (word != "component" && word != "bare") fail("--who: expected component or bare, found " + word);
     return word == "component" ? Who::component : Who::bare;
   }
+
+  // What nearly every program takes.
+
+  int priority() const { return static_cast<int>(number("priority", 80)); }
+  int cpu() const { return static_cast<int>(number("cpu", 0)); }
+  std::uint64_t seed() const { return static_cast<std::uint64_t>(number("seed", 1)); }
 
  private:
   [[noreturn]] static void fail(const std::string& text) {
@@ -52,13 +59,23 @@ class Options {
 template <typename Body>
 int run_program(int count, char** words, Body&& body) {
   try {
-    Options options(count, words);
+    const Options options(count, words);
     body(options);
     return 0;
   } catch (const std::exception& failure) {
     std::cerr << words[0] << ": " << failure.what() << '\n';
     return 1;
   }
+}
+
+/// The same of a program with two sides: makes the settings of the options, then measures the side that --who
+/// names.
+template <typename Settings>
+int run_sides(int count, char** words, void (*component)(const Settings&), void (*bare)(const Settings&)) {
+  return run_program(count, words, [&](const Options& options) {
+    const Settings settings(options);
+    (options.who() == Who::component ? component : bare)(settings);
+  });
 }
 
 }  // namespace bench

@@ -60,9 +60,21 @@ inline void sleep_until(mauve::time_ns_t instant_ns) {
 }
 
 /// Keeps the CPU busy.
-inline void spin_for(mauve::time_ns_t duration_ns) {
-  const mauve::time_ns_t until = mauve::monotonic_now_ns() + duration_ns;
-  while (mauve::monotonic_now_ns() < until) {
+inline void spin_until(mauve::time_ns_t instant_ns) {
+  while (mauve::monotonic_now_ns() < instant_ns) {
+  }
+}
+inline void spin_for(mauve::time_ns_t duration_ns) { spin_until(mauve::monotonic_now_ns() + duration_ns); }
+
+/// Keeps the CPU busy for so much time of this very thread, whoever else gets some meanwhile.
+inline void burn(mauve::time_ns_t duration_ns) {
+  const auto used_ns = [] {
+    timespec used{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    return mauve::s_to_ns(used.tv_sec) + used.tv_nsec;
+  };
+  const mauve::time_ns_t until = used_ns() + duration_ns;
+  while (used_ns() < until) {
   }
 }
 

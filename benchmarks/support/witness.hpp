@@ -63,21 +63,31 @@ class Witness {
 struct Missed {
   std::int64_t ours{0};
   std::int64_t machines{0};
+
+  Missed& operator+=(const Missed& other) {
+    ours += other.ours;
+    machines += other.machines;
+    return *this;
+  }
 };
 
+/// Those that are missing between two instants that followed each other.
+inline Missed count_missed(mauve::time_ns_t before_ns, mauve::time_ns_t after_ns, mauve::time_ns_t period_ns,
+                           const std::vector<Stall>& stalls) {
+  const std::int64_t count = (after_ns - before_ns) / period_ns - 1;
+  if (count <= 0) return {};
+  mauve::time_ns_t stalled_ns = 0;
+  for (const Stall& stall : stalls) {
+    stalled_ns +=
+        std::max<mauve::time_ns_t>(0, std::min(stall.end_ns, after_ns) - std::max(stall.begin_ns, before_ns));
+  }
+  return stalled_ns > mauve::us_to_ns(500) ? Missed{.machines = count} : Missed{.ours = count};
+}
 inline Missed count_missed(const std::vector<mauve::time_ns_t>& nominal_ns, mauve::time_ns_t period_ns,
                            const std::vector<Stall>& stalls) {
   Missed missed;
-  for (std::size_t i = 1; i < nominal_ns.size(); ++i) {
-    const mauve::time_ns_t before = nominal_ns[i - 1];
-    const mauve::time_ns_t after = nominal_ns[i];
-    mauve::time_ns_t stalled_ns = 0;
-    for (const Stall& stall : stalls) {
-      stalled_ns +=
-          std::max<mauve::time_ns_t>(0, std::min(stall.end_ns, after) - std::max(stall.begin_ns, before));
-    }
-    (stalled_ns > mauve::us_to_ns(500) ? missed.machines : missed.ours) += (after - before) / period_ns - 1;
-  }
+  for (std::size_t i = 1; i < nominal_ns.size(); ++i)
+    missed += count_missed(nominal_ns[i - 1], nominal_ns[i], period_ns, stalls);
   return missed;
 }
 

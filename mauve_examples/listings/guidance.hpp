@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Listings 1 and 2 of the paper, and the state machine of its Fig. 4: the component Guidance, as short as it
-// can be. The mission's own, in mauve_examples/guidance.hpp, plans around obstacles.
+// Listings 1 and 2 of the paper, and the state machines of its Fig. 2 and Fig. 4: the component Guidance, as
+// short as it can be. The mission's own, in mauve_examples/guidance.hpp, plans around obstacles.
 #pragma once
 
 #include "mauve_rt/mauve_rt.hpp"
@@ -10,6 +10,7 @@
 
 namespace listings {
 
+using mauve_examples::distance_m;
 using mauve_examples::Point;
 
 /// Listing 1: the shell is what others see.
@@ -56,6 +57,22 @@ class GuidanceCore : public mauve::Core<GuidanceShell> {
   Point current_goal_;
   mauve::BoundedVector<Point, 64> path_;
   std::size_t next_{0};
+};
+
+/// Fig. 2: the same as periodic state machine. One action in each period, and one period, which must do for
+/// planning too.
+struct GuidancePsm : mauve::PeriodicFsm<GuidanceShell, GuidanceCore> {
+  void define() override {
+    period(mauve::ms_to_ns(50));
+    const PeriodicState idle = periodic_state("Idle", "read_inputs", &GuidanceCore::read_inputs);
+    const PeriodicState planning = periodic_state("Planning", "compute_path", &GuidanceCore::compute_path);
+    const PeriodicState following = periodic_state("Following", "follow_path", &GuidanceCore::follow_path);
+    set_initial(idle);
+    transition(idle, "has_new_goal", &GuidanceCore::has_new_goal, planning);
+    transition(idle, "has_path", &GuidanceCore::has_path, following);
+    next(planning, idle);
+    next(following, idle);
+  }
 };
 
 /// Fig. 4: execution states take no time, and one leads to the next at once; waits of 1, 2 and 5 units of 10

@@ -16,15 +16,16 @@ namespace {
 using listings::Point;
 using namespace std::chrono_literals;
 
-/// Says where the robot is told to go, then lets the given time pass.
-void watch(mauve::SharedData<Point>& goal, const char* when, std::chrono::milliseconds duration) {
+/// Lets the given time pass, then says where the robot is told to go.
+void watch(mauve::SharedData<Point>& point, const char* when, std::chrono::milliseconds duration,
+           const char* what = "goal") {
   std::this_thread::sleep_for(duration);
   Point value;
   mauve::time_ns_t time_ns = 0;
-  std::uint64_t sequence = 0;
-  goal.read.read(value, time_ns, sequence);
-  std::printf("%-45s goal number %llu is (%.0f, %.0f)\n", when, static_cast<unsigned long long>(sequence),
-              value.x, value.y);
+  mauve::ReaderState reader;
+  point.read.read(value, time_ns, reader);
+  std::printf("%-45s %s number %llu is (%.1f, %.1f)\n", when, what,
+              static_cast<unsigned long long>(reader.seen), value.x, value.y);
 }
 
 void run() {
@@ -72,11 +73,37 @@ void run() {
   }
 }
 
+/// Adds a Guidance with the machine given, whose robot is at once where it is told to go.
+template <typename FsmType>
+mauve::SharedData<Point>& add_guidance(mauve::Architecture& architecture, const std::string& name) {
+  architecture.add_component<listings::GuidanceShell, listings::GuidanceCore, FsmType>(name);
+  auto& target = architecture.add_resource<mauve::SharedData<Point>>(name + "_target");
+  architecture.connect(name, "goal", "goal", "read");
+  architecture.connect(name, "target", name + "_target", "write");
+  architecture.connect(name, "position", name + "_target", "read");
+  return target;
+}
+
+/// The two machines of Guidance side by side, given the same goal.
+void compare_machines() {
+  mauve::Architecture architecture;
+  auto& goal = architecture.add_resource<mauve::SharedData<Point>>("goal");
+  auto& psm_target = add_guidance<listings::GuidancePsm>(architecture, "psm");
+  auto& fsm_target = add_guidance<listings::GuidanceFsm>(architecture, "fsm");
+  architecture.configure();
+  mauve::Deployer deployer(architecture);
+  deployer.deploy();
+  goal.write.write({2.0, 0.0, 0.0}, mauve::monotonic_now_ns());
+  watch(psm_target, "Fig. 2, one action in each period of 50 ms:", 500ms, "target");
+  watch(fsm_target, "Fig. 4, cycles of 50, 20 and 10 ms:", 0ms, "target");
+}
+
 }  // namespace
 
 int main() {
   try {
     run();
+    compare_machines();
   } catch (const std::exception& failure) {
     std::fprintf(stderr, "%s\n", failure.what());
     return 1;

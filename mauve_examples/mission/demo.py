@@ -1,7 +1,7 @@
 """The exploration mission from one command: runs it, shows how it goes, tells its story, writes the report.
 
     python -m mauve_examples.mission.demo [--map FILE.yaml] [--robots N] [--duration S] [--link-loss-at S]
-        [--link-back-at S] [--no-supervisor] [--drop-share P] [--seed K] [--out DIR]
+        [--link-back-at S] [--no-supervisor] [--drop-share P] [--seed K] [--simulated-time] [--out DIR]
 
 Exit status: 0 success, 1 failure, 2 bad input (one line on stderr, nothing started), 130 interrupted.
 """
@@ -53,17 +53,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], interrupts: Interrupts) -> int:
+    from mauve_examples.mission.architecture import load_world  # noqa: PLC0415
+    from mauve_examples.mission.demo_options import parse_options  # noqa: PLC0415
+
+    options = parse_options(arguments)
+    world = load_world(options.map_file, options.names, seed=options.seed)
+    mission = (_simulate if options.simulated_time else _play)(options, world, interrupts)
+    if not mission.started:
+        return INTERRUPTED
+    return _report(options, world, mission, interrupts)
+
+
+def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
+    """In real time: processes, and ROS 2 to see them by."""
     import rclpy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
-    from mauve_examples.mission.architecture import load_world  # noqa: PLC0415
-    from mauve_examples.mission.demo_options import parse_options  # noqa: PLC0415
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
 
-    options = parse_options(arguments)
-    world = load_world(options.map_file, options.names, seed=options.seed)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         with open_progress() as progress:
@@ -71,9 +80,17 @@ def _run(arguments: list[str], interrupts: Interrupts) -> int:
             mission.run()
     finally:
         try_shutdown()
-    if not mission.started:
-        return INTERRUPTED
-    return _report(options, world, mission, interrupts)
+    return mission
+
+
+def _simulate(options: Any, world: Any, interrupts: Interrupts) -> Any:
+    from mauve_examples.mission.demo_simulated import SimulatedMission  # noqa: PLC0415
+    from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
+
+    with open_progress() as progress:
+        mission = SimulatedMission(options, world, progress=progress, interrupted=interrupts.asked)
+        mission.run()
+    return mission
 
 
 def _report(options: Any, world: Any, mission: Any, interrupts: Interrupts) -> int:

@@ -41,7 +41,7 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
     together = shares.pop("union")
     explored = ", ".join(f"{robot} {share:.0%}" for robot, share in shares.items())
     yield f"\nExplored: {explored}, together {together:.0%}."
-    yield from _realtime(summary["realtime"])
+    yield from _realtime(summary["realtime"]) if summary["simulation"] is None else [_speed(summary)]
     if summary["success"]:
         yield "SUCCESS."
     else:
@@ -53,7 +53,9 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
 
 
 def _swap(swap: dict[str, Any]) -> str:
-    words = [f"{swap['component']}: {_class(swap['from'])} -> {_class(swap['to'])}"]
+    known = swap["from"] or swap["to"]  # neither is where only properties or wires were changed
+    change = f"{_class(swap['from'])} -> {_class(swap['to'])}" if known else "changed"
+    words = [f"{swap['component']}: {change}"]
     if swap["silence_ms"] is not None:
         words.append(f"{swap['silence_ms']:.0f} ms after the last sample")
     if swap["prepare_us"] is not None:
@@ -67,6 +69,14 @@ def _swap(swap: dict[str, Any]) -> str:
 
 def _class(name: str | None) -> str:
     return name.rsplit("/", 1)[-1] if name else "?"
+
+
+def _speed(summary: dict[str, Any]) -> str:
+    run = summary["simulation"]
+    speed = (
+        f"{run['virtual_s']:.1f} s in {run['wall_s']:.1f} s, {run['speed_up']:.1f} times as fast as real time"
+    )
+    return f"Simulated time: {speed}."
 
 
 def _realtime(realtime: dict[str, Any]) -> Iterator[str]:

@@ -32,6 +32,7 @@ class Options:
     supervisor: bool
     drop_share: float
     seed: int
+    simulated_time: bool
     out: Path
 
     @property
@@ -64,6 +65,7 @@ def parse_options(arguments: list[str]) -> Options:
         supervisor=not given.no_supervisor and given.robots > 1,
         drop_share=given.drop_share,
         seed=given.seed,
+        simulated_time=given.simulated_time,
         out=_out_folder(given.out),
     )
 
@@ -85,6 +87,11 @@ def _parser() -> argparse.ArgumentParser:
     add("--no-supervisor", action="store_true", help="nobody swaps anything: the robots stall")
     add("--drop-share", metavar="P", type=float, default=0.0, help="share of messages lost (default: 0)")
     add("--seed", metavar="K", type=int, default=1, help="of starts and losses (default: %(default)s)")
+    add(
+        "--simulated-time",
+        action="store_true",
+        help="no threads, no ROS graph, no real time: as fast as it goes; equal seeds give equal traces",
+    )
     add("--out", metavar="DIR", help="results (default: out/mission_DATE_TIME in the current folder)")
     return parser
 

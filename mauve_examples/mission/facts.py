@@ -28,9 +28,17 @@ class RealtimeFacts(TypedDict):
     missing: list[str]
 
 
+class SimulationFacts(TypedDict):
+    """How fast a mission in simulated time ran, and how long."""
+
+    virtual_s: float
+    wall_s: float
+    speed_up: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class MissionFacts:
-    """One mission, as its driver saw it. Times in ns of CLOCK_MONOTONIC."""
+    """One mission, as its driver saw it. Times in ns of CLOCK_MONOTONIC, or of simulated time."""
 
     map_path: Path
     """The map server's YAML file."""
@@ -52,6 +60,8 @@ class MissionFacts:
     realtime: RealtimeFacts = field(default_factory=lambda: RealtimeFacts(granted=False, missing=[]))
     faults: list[str] = field(default_factory=list)
     """What went wrong, one line each; empty when nothing did."""
+    simulation: SimulationFacts | None = None
+    """None: it ran in real time."""
 
     @property
     def robots(self) -> tuple[str, ...]:

@@ -161,7 +161,15 @@ def _component_table(data: ReportData, evidence: RobotEvidence) -> str:
 
 
 def _realtime(data: ReportData) -> str:
-    realtime = data.facts.realtime
+    realtime, simulation = data.facts.realtime, data.facts.simulation
+    if simulation is not None:
+        speed = f"{simulation['speed_up']:.1f} times as fast as real time"
+        took = f"{simulation['virtual_s']:.1f} s passed in {simulation['wall_s']:.1f} s, {speed}."
+        return section(
+            "Simulated time",
+            "Execution takes no longer than declared, so that times here are of the model, not of a machine.",
+            f"<p>{escape(took)}</p>",
+        )
     if realtime["granted"]:
         return section("Real time", "", "<p>Every real-time right that was asked for was granted.</p>")
     missing = bullets(realtime["missing"] or ["the executors did not say what"])

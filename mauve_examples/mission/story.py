@@ -56,6 +56,10 @@ def key_figures(
     measured = [swap.measured.missed_releases for swap in every]
     if measured and None not in measured:
         figures.append(KeyFigure(str(sum(count or 0 for count in measured)), "releases missed by them"))
+    if facts.simulation is not None:
+        speed = f"{facts.simulation['speed_up']:.0f} \N{MULTIPLICATION SIGN}"
+        figures.append(KeyFigure(speed, "as fast as real time, simulated"))
+        return figures
     figures.append(KeyFigure("yes" if facts.realtime["granted"] else "no", "real-time rights granted"))
     return figures
 
@@ -89,7 +93,8 @@ def happenings(
 ) -> list[Happening]:
     """Return what happened, by time."""
     robots = ", ".join(facts.robots)
-    found = [Happening(0.0, f"The mission begins: {robots}, each in an executor of its own.")]
+    where = "each in an executor of its own" if facts.simulation is None else "in simulated time"
+    found = [Happening(0.0, f"The mission begins: {robots}, {where}.")]
     for begin_ns, end_ns in facts.link_down_ns:
         begin_s, end_s = facts.seconds(begin_ns), facts.seconds(end_ns)
         found.append(

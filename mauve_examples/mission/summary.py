@@ -11,6 +11,7 @@ from mauve_rt.trace.records import Kind
 from mauve_rt.trace.statistics import ComponentStatistics, all_statistics
 
 SUMMARY = "summary.json"
+_WHOLE = 0.995  # a share of the map above which the robots may find nothing new
 _NOT_DEPLOYED: dict[str, Any] = {"policy": "", "priority": 0, "cpus": []}
 
 
@@ -32,6 +33,7 @@ def build_summary(
         "coverage": {**shares, "union": union},
         "robots": robots,
         "realtime": {"granted": facts.realtime["granted"], "missing": list(facts.realtime["missing"])},
+        "simulation": None if facts.simulation is None else dict(facts.simulation),
     }
 
 
@@ -60,9 +62,14 @@ def failure_reasons(
     elif facts.expected_swaps:
         for robot, found in swaps.items():
             reasons += swap_problems(facts, robot, found)
-    if facts.link_down_ns and union_growth(facts, coverage) <= 0.0:
+    if _something_left(facts, coverage) and union_growth(facts, coverage) <= 0.0:
         reasons.append("the robots together explored nothing while the link was down")
     return reasons
+
+
+def _something_left(facts: MissionFacts, coverage: CoverageHistory) -> bool:
+    """Whether the map was not yet whole when the link was first lost."""
+    return bool(facts.link_down_ns) and coverage.union_at(facts.seconds(facts.link_down_ns[0][0])) < _WHOLE
 
 
 def union_growth(facts: MissionFacts, coverage: CoverageHistory) -> float:

@@ -110,9 +110,9 @@ class RobotArchitecture {
   std::uint64_t goals() {
     Point goal;
     mauve::time_ns_t time_ns = 0;
-    std::uint64_t sequence = 0;
-    goal_->read.read(goal, time_ns, sequence);
-    return sequence;
+    mauve::ReaderState reader;
+    goal_->read.read(goal, time_ns, reader);
+    return reader.seen;
   }
   bool wait_done(std::chrono::seconds timeout) {
     const auto until = std::chrono::steady_clock::now() + timeout;
@@ -129,8 +129,8 @@ class RobotArchitecture {
   T value(SharedData<T>& resource) {
     T value{};
     mauve::time_ns_t time_ns = 0;
-    std::uint64_t seen = 0;
-    resource.read.read(value, time_ns, seen);
+    mauve::ReaderState reader;
+    resource.read.read(value, time_ns, reader);
     return value;
   }
 

@@ -6,16 +6,9 @@
 
 namespace mauve_tutorials {
 
-struct Beat {
-  double number{};
-};
-
-}  // namespace mauve_tutorials
-
-// The type's identity and its fields, in the order of the ROS message.
-MAUVE_TYPE(mauve_tutorials::Beat, "std_msgs/msg/Float64", number)
-
-namespace mauve_tutorials {
+/// What goes over the port: the std_msgs/msg/Float64 that all components share. A type of one's own is a struct
+/// and a line MAUVE_TYPE, as in mauve_rt/elements/types.hpp.
+using Beat = mauve::types::Float64;
 
 /// The shell: what others see of the component.
 struct MetronomeShell : mauve::Shell {
@@ -33,7 +26,7 @@ class Metronome : public mauve::Core<MetronomeShell> {
   virtual bool is_beat_due() const { return ticks_ >= shell().ticks_per_beat; }
   void beat() {
     ticks_ = 0;
-    shell().beat.write({.number = static_cast<double>(++beats_)});
+    shell().beat.write({.data = static_cast<double>(++beats_)});
   }
 
   /// Replacing another metronome while it runs, this one goes on counting where that one was.

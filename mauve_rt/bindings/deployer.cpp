@@ -3,7 +3,7 @@
 
 #include "mauve_rt/futex.hpp"
 
-#include "translate.hpp"
+#include "transaction.hpp"
 
 namespace mauve::bindings {
 
@@ -19,9 +19,13 @@ py::bytes to_bytes(const void* data, std::size_t size) { return {static_cast<con
 class PyDeployer {
  public:
   PyDeployer(PyArchitecture& architecture, bool require_realtime, bool trace)
-      : architecture_(architecture.architecture),
-        deployer_(architecture_, {.require_realtime = require_realtime, .trace = trace}) {}
+      : registry_(architecture.registry),
+        architecture_(architecture.architecture),
+        deployer_(architecture_, {.require_realtime = require_realtime, .trace = trace}) {
+    living().insert(this);
+  }
   ~PyDeployer() {
+    living().erase(this);
     const py::gil_scoped_release release;  // a component thread may need the interpreter to come to its end
     deployer_.shutdown();
   }
@@ -29,6 +33,19 @@ class PyDeployer {
   PyDeployer& operator=(const PyDeployer&) = delete;
 
   Deployer& deployer() noexcept { return deployer_; }
+  const PluginRegistry& registry() const noexcept { return registry_; }
+
+  /// Every deployer there is, under the interpreter's lock: at its end no component thread may want that any
+  /// more.
+  static std::set<PyDeployer*>& living() {
+    static std::set<PyDeployer*> all;
+    return all;
+  }
+  static void shut_down_all() {
+    const std::set<PyDeployer*> all = living();
+    const py::gil_scoped_release release;
+    for (PyDeployer* deployer : all) deployer->deployer().shutdown();
+  }
 
   std::vector<PublishedSample> wait_published(time_ns_t timeout_ns) {
     const time_ns_t until = monotonic_now_ns() + timeout_ns;
@@ -61,7 +78,7 @@ class PyDeployer {
   }
 
   bool write_resource(const std::string& name, std::string_view data) {
-    return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)));
+    return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)), monotonic_now_ns());
   }
 
   py::tuple read_resource(const std::string& name) {
@@ -76,15 +93,12 @@ class PyDeployer {
     return py::make_tuple(to_bytes(message.data(), message.size()), sequence, time_ns);
   }
 
-  std::vector<std::string> trace_components() const {
-    std::vector<std::string> names;
-    for (const auto& component : architecture_.components()) names.push_back(component->name());
-    return names;
-  }
+  std::vector<std::string> trace_components() const { return architecture_.trace_components(); }
 
  private:
   bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
 
+  const PluginRegistry& registry_;
   Architecture& architecture_;
   Deployer deployer_;
   std::atomic<bool> woken_{false};  // release/acquire: set once, for good
@@ -93,6 +107,40 @@ class PyDeployer {
 
 CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
   return {.commit_ns = commit_ns, .phase_ns = phase_ns};
+}
+
+/// By its registered name, which the component must declare; or by its class, which is the program's own.
+StepReport replace_core(PyDeployer& self, const std::string& component, const py::object& core,
+                        time_ns_t commit_timeout_ns, time_ns_t phase_timeout_ns) {
+  const CommitTimeouts limits = timeouts(commit_timeout_ns, phase_timeout_ns);
+  if (py::isinstance<py::str>(core)) {
+    const auto name = core.cast<std::string>();
+    const py::gil_scoped_release release;
+    return self.deployer().replace_core(component, name, limits);
+  }
+  Transaction transaction;
+  transaction.replace_core(component, make_core(core, self.registry()));
+  const py::gil_scoped_release release;
+  return self.deployer().commit(std::move(transaction), {.timeouts = limits}).steps.at(0);
+}
+
+TransactionReport commit(PyDeployer& self, const PyTransaction& steps, bool dry_run,
+                         std::uint64_t expected_epoch, time_ns_t commit_timeout_ns,
+                         time_ns_t phase_timeout_ns) {
+  Transaction transaction = steps.build(self.registry());
+  const py::gil_scoped_release release;
+  return self.deployer().commit(std::move(transaction),
+                                {.timeouts = timeouts(commit_timeout_ns, phase_timeout_ns),
+                                 .dry_run = dry_run,
+                                 .expected_epoch = expected_epoch});
+}
+
+/// With Python's 5 ms a component in Python would wait that long for a thread that computes; DESIGN section 4.
+void shorten_switch_interval() {
+  constexpr double kSwitchIntervalS = 1e-4;
+  const py::module_ sys = py::module_::import("sys");
+  if (sys.attr("getswitchinterval")().cast<double>() > kSwitchIntervalS)
+    sys.attr("setswitchinterval")(kSwitchIntervalS);
 }
 
 void bind_reports(py::module_& module) {
@@ -125,13 +173,18 @@ void bind_reports(py::module_& module) {
 
 void bind_deployer(py::module_& module) {
   bind_reports(module);
+  py::module_::import("atexit").attr("register")(py::cpp_function(&PyDeployer::shut_down_all));
   py::class_<PyDeployer>(module, "Deployer")
       .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
            py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>())
       .def(
           "prepare_process", [](PyDeployer& self) { self.deployer().prepare_process(); }, Unlocked())
-      .def(
-          "deploy", [](PyDeployer& self) { self.deployer().deploy(); }, Unlocked())
+      .def("deploy",
+           [](PyDeployer& self) {
+             shorten_switch_interval();
+             const py::gil_scoped_release release;
+             self.deployer().deploy();
+           })
       .def(
           "shutdown", [](PyDeployer& self) { self.deployer().shutdown(); }, Unlocked())
       .def(
@@ -150,15 +203,11 @@ void bind_deployer(py::module_& module) {
           "get_time",
           [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
           py::arg("component"), Unlocked())
-      .def(
-          "replace_core",
-          [](PyDeployer& self, const std::string& component, const std::string& core,
-             time_ns_t commit_timeout_ns, time_ns_t phase_timeout_ns) {
-            return self.deployer().replace_core(component, core,
-                                                timeouts(commit_timeout_ns, phase_timeout_ns));
-          },
-          py::arg("component"), py::arg("core"), py::kw_only(), py::arg("commit_timeout_ns") = s_to_ns(1),
-          py::arg("phase_timeout_ns") = s_to_ns(1), Unlocked())
+      .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
+           py::arg("expected_epoch") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
+           py::arg("phase_timeout_ns") = s_to_ns(1))
+      .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
+           py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(
           "set_property",
           [](PyDeployer& self, const std::string& component, const std::string& name,

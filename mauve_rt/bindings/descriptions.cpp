@@ -10,28 +10,26 @@ py::object to_python(const PropertyValue& value) {
 std::vector<PortDescription> describe_ports(const Shell& shell) {
   std::vector<PortDescription> ports;
   for (const auto& port : shell.ports()) {
-    ports.push_back({port->name(), std::string(to_string(port->kind())), port->type(), port->resource_name(),
-                     port->service() == nullptr ? "" : port->service()->name()});
+    auto [resource, service] = port->connected_to();
+    ports.push_back({port->name(), std::string(to_string(port->kind())), port->type(), std::move(resource),
+                     std::move(service)});
   }
   return ports;
 }
 
 std::vector<PropertyDescription> describe_properties(const Shell& shell) {
-  std::vector<PropertyValue> values;
-  for (const auto& property : shell.properties()) values.push_back(property->boxed());
-  return describe_properties(shell, values);
+  std::vector<PropertyDescription> properties;
+  for (const auto& property : shell.properties())
+    properties.push_back(describe_property({property->name(), property->boxed(), property->options()}));
+  return properties;
 }
 
-std::vector<PropertyDescription> describe_properties(const Shell& shell,
-                                                     const std::vector<PropertyValue>& values) {
-  std::vector<PropertyDescription> properties;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const PropertyBase& property = *shell.properties()[i];
-    const PropertyOptions& options = property.options();
-    properties.push_back({property.name(), std::string(property_type_name(values[i])), values[i],
-                          options.unit, options.description, options.minimum, options.maximum});
-  }
-  return properties;
+PropertyDescription describe_property(const ShownProperty& property) {
+  const PropertyOptions& options = property.options;
+  return {property.name,       std::string(property_type_name(property.value)),
+          property.value,      options.unit,
+          options.description, options.minimum,
+          options.maximum};
 }
 
 ResourceDescription describe_resource(const Resource& resource) {
@@ -43,19 +41,39 @@ ResourceDescription describe_resource(const Resource& resource) {
   return description;
 }
 
+namespace {
+
+std::vector<ExecutionTimeDescription> describe_execution_times(const StateTimes& states) {
+  std::vector<ExecutionTimeDescription> times;
+  for (const auto& [state, time] : states)
+    times.push_back({state, time.count(), time.mean_ns(), time.max_ns()});
+  return times;
+}
+
+}  // namespace
+
 ComponentDescription describe_component(Component& component) {
+  const ShownParts shown = component.shown();
+  std::vector<PortDescription> ports;
+  ports.reserve(shown.ports.size());
+  for (const ShownPort& port : shown.ports)
+    ports.push_back({port.name, std::string(to_string(port.kind)), port.type, port.resource, port.service});
+  std::vector<PropertyDescription> properties;
+  properties.reserve(shown.properties.size());
+  for (const ShownProperty& property : shown.properties) properties.push_back(describe_property(property));
   const Task& task = component.task();
   const ComponentState state = task.state();
   const bool faulted = state == ComponentState::faulted;
-  const Fault fault = faulted ? task.fault() : Fault{};
+  const bool fell_back = task.has_fallen_back();
+  const Fault fault = faulted || fell_back ? task.fault() : Fault{};
   const bool deployed = task.has_thread();
   const TaskStatistics& statistics = task.statistics();
   constexpr double kMedian = 0.5;
   constexpr double kTail = 0.99;
   return {.name = component.name(),
-          .shell = component.shell().implementation(),
-          .core = component.core_implementation(),
-          .fsm = component.fsm().implementation(),
+          .shell = shown.shell,
+          .core = shown.core,
+          .fsm = shown.fsm,
           .state = std::string(to_string(state)),
           .current_state = task.current_state(),
           .clock_ns = task.get_time(),
@@ -66,17 +84,22 @@ ComponentDescription describe_component(Component& component) {
           .cpus = deployed ? task.facts().cpus : task.settings().cpus,
           .alternatives = component.alternatives(),
           .reconfigurable = component.is_reconfigurable(),
-          .ports = describe_ports(component.shell()),
-          .properties = describe_properties(component.shell(), component.property_values()),
-          .fault = faulted ? fault.what + " (in state " + fault.where + ", at " +
-                                 std::to_string(fault.when_ns) + " ns)"
-                           : "",
+          .ports = std::move(ports),
+          .properties = std::move(properties),
+          .fault = fault.what.empty() ? ""
+                                      : fault.what + " (in state " + fault.where + ", at " +
+                                            std::to_string(fault.when_ns) + " ns)",
+          .fallback = component.fallback_implementation(),
+          .fell_back = fell_back,
           .releases = statistics.releases.load(std::memory_order_relaxed),
           .overruns = statistics.overruns.load(std::memory_order_relaxed),
           .skipped = statistics.skipped.load(std::memory_order_relaxed),
           .wakeup_p50_ns = statistics.wakeup.quantile_ns(kMedian),
           .wakeup_p99_ns = statistics.wakeup.quantile_ns(kTail),
-          .wakeup_max_ns = statistics.wakeup.max_ns()};
+          .wakeup_max_ns = statistics.wakeup.max_ns(),
+          .allocations = task.counters().allocations(),
+          .page_faults = task.counters().page_faults(),
+          .execution_times = describe_execution_times(*component.state_times())};
 }
 
 void bind_descriptions(py::module_& module) {
@@ -107,6 +130,12 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("kind", &ResourceDescription::kind)
       .def_readonly("type", &ResourceDescription::type)
       .def_readonly("services", &ResourceDescription::services);
+  using E = ExecutionTimeDescription;
+  py::class_<E>(module, "ExecutionTimeDescription")
+      .def_readonly("state", &E::state)
+      .def_readonly("count", &E::count)
+      .def_readonly("mean_ns", &E::mean_ns)
+      .def_readonly("max_ns", &E::max_ns);
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription")
       .def_readonly("name", &C::name)
@@ -126,12 +155,18 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("ports", &C::ports)
       .def_readonly("properties", &C::properties)
       .def_readonly("fault", &C::fault)
+      .def_readonly("fallback", &C::fallback)
+      .def_readonly("fell_back", &C::fell_back)
       .def_readonly("releases", &C::releases)
       .def_readonly("overruns", &C::overruns)
       .def_readonly("skipped", &C::skipped)
       .def_readonly("wakeup_p50_ns", &C::wakeup_p50_ns)
       .def_readonly("wakeup_p99_ns", &C::wakeup_p99_ns)
-      .def_readonly("wakeup_max_ns", &C::wakeup_max_ns);
+      .def_readonly("wakeup_max_ns", &C::wakeup_max_ns)
+      .def_readonly("allocations", &C::allocations)
+      .def_readonly("page_faults", &C::page_faults)
+      .def_readonly("execution_times", &C::execution_times);
+  module.def("allocation_counting", [] { return std::string(to_string(allocation_counting())); });
 }
 
 }  // namespace mauve::bindings

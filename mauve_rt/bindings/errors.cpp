@@ -3,25 +3,39 @@
 
 namespace mauve::bindings {
 
-void bind_errors(py::module_& module) {
-  // Static: exceptions are translated for as long as the interpreter lives, and it never unloads the module.
-  static const py::handle mauve_error = PyErr_NewExceptionWithDoc(
+// Static: exceptions are translated for as long as the interpreter lives, and it never unloads the module.
+py::handle mauve_error_type() {
+  static const py::handle type = PyErr_NewExceptionWithDoc(
       "mauve_rt._kernel.MauveError",
       "An error of the kernel: code, component, element, expected, found, remedy.", nullptr, nullptr);
-  module.attr("MauveError") = mauve_error;
+  return type;
+}
+
+ErrorCode error_code_of(std::string_view name) noexcept {
+  for (auto code = std::uint16_t{0}; code < static_cast<std::uint16_t>(ErrorCode::internal); ++code) {
+    if (to_string(static_cast<ErrorCode>(code)) == name) return static_cast<ErrorCode>(code);
+  }
+  return ErrorCode::internal;
+}
+
+void bind_errors(py::module_& module) {
+  module.attr("MauveError") = mauve_error_type();
   // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
   py::register_exception_translator([](std::exception_ptr pending) {
     try {
       if (pending) std::rethrow_exception(pending);
     } catch (const Error& error) {
-      py::object exception = mauve_error(error.what());
+      py::object exception = mauve_error_type()(error.what());
       exception.attr("code") = std::string(to_string(error.code()));
+      exception.attr("statement") = error.statement();
       exception.attr("component") = error.detail().component;
       exception.attr("element") = error.detail().element;
       exception.attr("expected") = error.detail().expected;
       exception.attr("found") = error.detail().found;
       exception.attr("remedy") = error.detail().remedy;
-      PyErr_SetObject(mauve_error.ptr(), exception.ptr());
+      exception.attr("step") = error.detail().step;
+      exception.attr("step_name") = error.detail().step_name;
+      PyErr_SetObject(mauve_error_type().ptr(), exception.ptr());
     }
   });
 }

@@ -6,6 +6,8 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <mutex>
+
 #include "mauve_rt/mauve_rt.hpp"
 
 namespace mauve::bindings {
@@ -16,16 +18,52 @@ namespace py = pybind11;
 void bind_errors(py::module_& module);
 /// Registers the snapshots: descriptions of ports, properties, components, resources.
 void bind_descriptions(py::module_& module);
+/// Registers PluginRegistry and PartFactory.
+void bind_registry(py::module_& module);
+/// Registers Architecture and Component.
+void bind_architecture(py::module_& module);
 /// Registers Deployer, its reports and the trace's drain.
 void bind_deployer(py::module_& module);
-/// Registers what a core written in Python sees of its component.
-void bind_python_core(py::module_& module);
+/// Registers Transaction and its reports.
+void bind_transaction(py::module_& module);
+/// Registers what parts written in Python see of their shell, and what they declare themselves with.
+void bind_python_shell(py::module_& module);
+void bind_python_fsm(py::module_& module);
+/// Registers Simulation; after the reports.
+void bind_simulation(py::module_& module);
 
-/// A core that runs a Python object's methods.
-std::unique_ptr<CoreBase> make_python_core(py::object factory);
+py::handle mauve_error_type();
+/// The code of a name; internal when it is none.
+ErrorCode error_code_of(std::string_view name) noexcept;
+
+class PythonObject;
+
+/// How to make a part written in Python, and what it is called.
+struct PartFactory {
+  std::string kind;  // shell, core, fsm or resource, so that none is taken for another
+  std::string name;  // package/Class
+  std::shared_ptr<PythonObject> make;
+};
+std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const PluginRegistry& registry);
+std::unique_ptr<CoreBase> make_python_core(const PartFactory& factory);
+std::unique_ptr<FsmBase> make_python_fsm(const PartFactory& factory);
+std::unique_ptr<Resource> make_python_resource(const PartFactory& factory);
+
+// A part as Python names it: a registered name, or a class. Under the interpreter's lock.
+
+std::unique_ptr<Shell> make_shell(const py::object& part, const PluginRegistry& registry);
+std::unique_ptr<CoreBase> make_core(const py::object& part, const PluginRegistry& registry);
+std::unique_ptr<FsmBase> make_fsm(const py::object& part, const PluginRegistry& registry);
+std::unique_ptr<Resource> make_resource(const py::object& part, const PluginRegistry& registry);
 
 /// A property's value as Python has it.
 py::object to_python(const PropertyValue& value);
+
+/// Makes another instance of an fsm; may be called, and ends, on any thread.
+Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry);
+TaskSettings task_settings(int priority, const std::vector<int>& cpus, time_ns_t offset_ns,
+                           time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
+                           std::size_t stack_bytes, std::size_t trace_records);
 
 struct PortDescription {
   std::string name;
@@ -46,8 +84,7 @@ struct PropertyDescription {
   std::optional<double> maximum;
 };
 std::vector<PropertyDescription> describe_properties(const Shell& shell);
-std::vector<PropertyDescription> describe_properties(const Shell& shell,
-                                                     const std::vector<PropertyValue>& values);
+PropertyDescription describe_property(const ShownProperty& property);
 
 struct ServiceDescription {
   std::string name;
@@ -70,9 +107,27 @@ struct ShellDescription {
 
 /// An architecture with the registry it makes its parts from.
 struct PyArchitecture {
-  explicit PyArchitecture(PluginRegistry& plugins) : registry(plugins), architecture(&plugins) {}
+  explicit PyArchitecture(PluginRegistry& plugins)
+      : registry(plugins), owned(std::make_unique<Architecture>(&plugins)), architecture(*owned) {}
+  ~PyArchitecture() {
+    const py::gil_scoped_release release;  // a component thread may need the interpreter to come to its end
+    owned.reset();
+  }
+  PyArchitecture(const PyArchitecture&) = delete;
+  PyArchitecture& operator=(const PyArchitecture&) = delete;
+
   PluginRegistry& registry;
-  Architecture architecture;
+  std::unique_ptr<Architecture> owned;
+  Architecture& architecture;
+  std::recursive_mutex
+      describing;  // cleanup takes away what a description reads; a core's hook may ask for one
+};
+
+/// How long an execution state took so far.
+struct ExecutionTimeDescription {
+  std::string state;
+  std::uint64_t count;
+  time_ns_t mean_ns, max_ns;
 };
 
 /// A component as it is at one moment.
@@ -86,9 +141,12 @@ struct ComponentDescription {
   bool reconfigurable;
   std::vector<PortDescription> ports;
   std::vector<PropertyDescription> properties;
-  std::string fault;
+  std::string fault, fallback;
+  bool fell_back;
   std::uint64_t releases, overruns, skipped;
   time_ns_t wakeup_p50_ns, wakeup_p99_ns, wakeup_max_ns;
+  std::uint64_t allocations, page_faults;
+  std::vector<ExecutionTimeDescription> execution_times;
 };
 ComponentDescription describe_component(Component& component);
 

@@ -1,9 +1,13 @@
 """A short-lived ROS node that asks an executor."""
 
 import os
+import signal
+import threading
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import rclpy
@@ -16,9 +20,11 @@ from mauve_rt.errors import ParameterError
 
 DISCOVERY_TIMEOUT_S = 10.0  # seen here: 0.1 to 2.8 s
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
+RESEND_S = 4.0
 LISTING_S = 3.5
 _LIST_SERVICE = "mauve_msgs/srv/ListComponents"
 _POLL_S = 0.05  # waiting in rclpy does not end at a Ctrl-C: short waits do
+_interrupted = threading.Event()
 
 
 class NoExecutorError(ParameterError):
@@ -37,6 +43,9 @@ class Client:
     ) -> Any:
         """The reply of a service, e.g. `/robot_1/executor/stop`.
 
+        A reply can be lost while the service does not know its new client yet: the request is sent again. An
+        executor knows it by its id, and gives the first outcome.
+
         Raises:
             NoExecutorError: no such service within `wait_s`, or no reply within 15 s.
         """
@@ -47,16 +56,19 @@ class Client:
             if time.monotonic() >= deadline:
                 seen = ", ".join(name for name in self.seen_executors() if name != asked) or "none"
                 raise NoExecutorError(f"no service {service} within {wait_s:g} s; executors seen: {seen}")
-            self._executor.spin_once(timeout_sec=_POLL_S)
-        future = client.call_async(request)
+            self._spin_once()
+        if getattr(request, "request_id", None) == "":
+            request.request_id = str(uuid.uuid4())
+        futures: list[Any] = []
         deadline = time.monotonic() + REPLY_TIMEOUT_S
-        while not future.done() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=_POLL_S)
-        if not future.done():
-            raise NoExecutorError(
-                f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?"
-            )
-        return future.result()
+        while (now := time.monotonic()) < deadline:
+            if now >= deadline - REPLY_TIMEOUT_S + len(futures) * RESEND_S:
+                futures.append(client.call_async(request))
+            self._spin_once()
+            for future in futures:
+                if future.done():
+                    return future.result()
+        raise NoExecutorError(f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?")
 
     def seen_executors(self) -> list[str]:
         """Executors discovered so far."""
@@ -68,14 +80,37 @@ class Client:
         """Executors, after discovery had the time it takes."""
         deadline = time.monotonic() + wait_s
         while time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=_POLL_S)
+            self._spin_once()
         return self.seen_executors()
 
     def listen(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
-        """Call `heard` with every message, until interrupted."""
+        """Call `heard` with every message, until KeyboardInterrupt."""
         self._node.create_subscription(message_type, topic, heard, QoSProfile(depth=100))
         while True:
-            self._executor.spin_once(timeout_sec=_POLL_S)
+            self._spin_once()
+
+    def _spin_once(self) -> None:
+        self._executor.spin_once(timeout_sec=_POLL_S)
+        if _interrupted.is_set():
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts_between_spins() -> Iterator[None]:
+    """Keep Ctrl-C until rclpy has returned: inside of it an exception can be lost, as in a destructor."""
+    _interrupted.clear()
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def note(_signal: int, _frame: FrameType | None) -> None:
+        _interrupted.set()
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
@@ -83,17 +118,18 @@ def connected() -> Iterator[Client]:
     """A client on a ROS context of its own; this machine only, unless the environment says otherwise."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
-    rclpy.init(context=context, args=[])
-    try:
-        node = Node(
-            f"mauve_{os.getpid()}", context=context, enable_rosout=False, start_parameter_services=False
-        )
-        executor = SingleThreadedExecutor(context=context)
-        executor.add_node(node)
+    with _interrupts_between_spins():
+        rclpy.init(context=context, args=[])
         try:
-            yield Client(node, executor)
+            node = Node(
+                f"mauve_{os.getpid()}", context=context, enable_rosout=False, start_parameter_services=False
+            )
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+            try:
+                yield Client(node, executor)
+            finally:
+                executor.shutdown(timeout_sec=0)
+                node.destroy_node()
         finally:
-            executor.shutdown(timeout_sec=0)
-            node.destroy_node()
-    finally:
-        context.try_shutdown()
+            context.try_shutdown()

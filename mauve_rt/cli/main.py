@@ -2,6 +2,7 @@
 
     mauve list /robot_1/executor
     mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration
+    mauve reconfigure /robot_1/executor steps.yaml --dry-run
 
 Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such
 executor.

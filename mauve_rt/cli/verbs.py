@@ -30,6 +30,10 @@ def _add_executor(parser: argparse.ArgumentParser) -> None:
 def _add_request(parser: argparse.ArgumentParser) -> None:
     _add_executor(parser)
     parser.add_argument("component", help="name of the component")
+    _add_record(parser)
+
+
+def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cause", default="", help="why, for the record")
     parser.add_argument("--request-id", default="", help="a repeated id returns the first outcome")
     parser.add_argument(
@@ -39,6 +43,10 @@ def _add_request(parser: argparse.ArgumentParser) -> None:
 
 def _add_timed_request(parser: argparse.ArgumentParser) -> None:
     _add_request(parser)
+    _add_timeout(parser)
+
+
+def _add_timeout(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timeout", type=float, default=0.0, metavar="S", help="seconds to wait for it (default 1)"
     )
@@ -47,6 +55,14 @@ def _add_timed_request(parser: argparse.ArgumentParser) -> None:
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     parser.add_argument("core", help="the new core, package/Class")
+
+
+def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
+    _add_executor(parser)
+    parser.add_argument("file", help="YAML list of steps {kind, target, name, value}; - for standard input")
+    parser.add_argument("--dry-run", action="store_true", help="check and prepare everything, change nothing")
+    _add_record(parser)
+    _add_timeout(parser)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -63,19 +79,49 @@ def _list(args: argparse.Namespace) -> int:
 def _stop(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Stop  # noqa: PLC0415
 
-    return _request(args, Stop, "stop", timeout_s=args.timeout)
+    return _request(args, Stop, "stop", component=args.component, timeout_s=args.timeout)
 
 
 def _start(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Start  # noqa: PLC0415
 
-    return _request(args, Start, "start")
+    return _request(args, Start, "start", component=args.component)
 
 
 def _replace_core(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import ReplaceCore  # noqa: PLC0415
 
-    return _request(args, ReplaceCore, "replace_core", core=args.core, commit_timeout_s=args.timeout)
+    return _request(
+        args,
+        ReplaceCore,
+        "replace_core",
+        component=args.component,
+        core=args.core,
+        commit_timeout_s=args.timeout,
+    )
+
+
+def _reconfigure(args: argparse.Namespace) -> int:
+    from mauve_msgs.msg import ReconfigurationStep  # noqa: PLC0415
+    from mauve_msgs.srv import Reconfigure  # noqa: PLC0415
+    from mauve_rt.model.steps import load_steps  # noqa: PLC0415
+
+    try:
+        if args.file == "-":
+            steps = load_steps("standard input", text=sys.stdin.read())
+        else:
+            steps = load_steps(args.file)
+    except ArchitectureFileError as error:
+        print("\n".join(error.lines()), file=sys.stderr)
+        return BAD_USAGE
+    return _request(
+        args,
+        Reconfigure,
+        "reconfigure",
+        steps=[ReconfigurationStep(**step.model_dump()) for step in steps],
+        dry_run=args.dry_run,
+        commit_timeout_s=args.timeout,
+    )
 
 
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
@@ -87,7 +133,6 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
         expected_epoch=max(args.expected_epoch, 0),
         requested_by="mauve",
         cause=args.cause,
-        component=args.component,
         **fields,
     )
     with connected() as client:
@@ -207,6 +252,7 @@ VERBS = (
     Verb(
         "replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core
     ),
+    Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
     Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
     Verb("nodes", "show the executors", _add_json, _nodes),
     Verb("check", "check an architecture file without starting anything", _add_file, _check),

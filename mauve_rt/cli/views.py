@@ -22,6 +22,8 @@ STATES = (
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _WIDE = 160
 
+_WORTH_TELLING_NS = 1_000  # some steps prepare nothing
+
 
 def as_plain(message: Any) -> Any:
     """A ROS message as values that JSON has."""
@@ -81,16 +83,19 @@ def print_components(reply: Any) -> None:
 
 
 def report_lines(report: Sequence[Any]) -> list[str]:
-    """What each step cost, in words."""
+    """What each step cost, in words: a line for each of several, for one when something was measured."""
     lines = []
     for step in report:
-        facts = []
+        facts = [f"prepared in {duration(step.prepare_ns)}"] if step.prepare_ns >= _WORTH_TELLING_NS else []
         if step.blackout_ns != type(step).NOT_MEASURED:
-            facts = [f"prepared in {duration(step.prepare_ns)}", f"blackout {duration(step.blackout_ns)}"]
+            facts.append(f"blackout {duration(step.blackout_ns)}")
             facts.append(f"missed releases {step.missed_releases}")
         if step.phase_actual_ns != type(step).NOT_MEASURED:
             facts.append(f"next release woken {duration(step.phase_actual_ns)} after its instant")
-        if facts:
+        if len(report) > 1:
+            subject = f"{step.component}: " if step.component else ""
+            lines.append(f"{subject}{step.step}" + (f": {', '.join(facts)}" if facts else ""))
+        elif facts:
             lines.append(f"{step.step}: {', '.join(facts)}")
     return lines
 

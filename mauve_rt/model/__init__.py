@@ -1,7 +1,7 @@
 """The architecture file: schema, loading, checks, and building the kernel's architecture from it."""
 
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection, Overrides, load_architecture
-from mauve_rt.model.build import allowed_cores, build, configure
+from mauve_rt.model.build import allowed_parts, build, configure
 from mauve_rt.model.message_types import message_class
 from mauve_rt.model.plugins import Plugin, PluginIndex, PluginLoader
 
@@ -12,7 +12,7 @@ __all__ = [
     "Plugin",
     "PluginIndex",
     "PluginLoader",
-    "allowed_cores",
+    "allowed_parts",
     "build",
     "configure",
     "load_architecture",

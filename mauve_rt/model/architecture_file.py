@@ -125,9 +125,9 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
     model = ArchitectureModel(file, content, overrides or Overrides())
     problems = [
         *_override_problems(model, overrides or Overrides()),
-        *_component_problems(model),
-        *_resource_problems(model),
+        *element_problems(model),
         *_connection_problems(model),
+        *_latest_value_problems(model),
     ]
     if problems:
         raise ArchitectureFileError(file.path, problems)
@@ -142,6 +142,12 @@ def online_cpus() -> frozenset[int]:
         return frozenset(cpu for low, _, high in ranges for cpu in range(int(low), int(high or low) + 1))
     except (OSError, ValueError):
         return frozenset(range(os.cpu_count() or 1))
+
+
+def element_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    """What is wrong with components and resources, each taken by itself."""
+    yield from _component_problems(model)
+    yield from _resource_problems(model)
 
 
 def _override_problems(model: ArchitectureModel, overrides: Overrides) -> Iterator[Problem]:
@@ -176,14 +182,21 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
         if resource.kind == "ring_buffer" and resource.capacity is None:
             what = f"resource '{name}' has no capacity"
             yield model.problem(location, what, expected="capacity: how many elements the ring_buffer holds")
-        if resource.kind in GIVEN_RESOURCES and not resource.type:
+        if resource.kind == "event" and resource.type:
+            what, remedy = f"resource '{name}' of kind event has no type", "leave it out"
+            yield model.key_problem((*location, "type"), what, remedy=remedy)
+        if resource.kind in GIVEN_RESOURCES and resource.kind != "event" and not resource.type:
             yield model.problem(
                 location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point"
             )
-        for key in ("capacity", "overwrite"):
-            if resource.kind != "ring_buffer" and key in resource.model_fields_set:
+        for key, kind in (
+            ("capacity", "ring_buffer"),
+            ("overwrite", "ring_buffer"),
+            ("max_readers", "latest_value"),
+        ):
+            if resource.kind != kind and key in resource.model_fields_set:
                 what = f"resource '{name}' of kind {resource.kind} has no {key}"
-                yield model.key_problem((*location, key), what, remedy="only a ring_buffer has one")
+                yield model.key_problem((*location, key), what, remedy=f"only a {kind} has one")
 
 
 def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
@@ -205,3 +218,31 @@ def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
             remedy = f"a port connects to one service; see line {first[port]}"
             yield model.problem(at_port, what, remedy=remedy, code="duplicate_name")
         first.setdefault(port, line)
+
+
+def _latest_value_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    """A latest_value has one writer, a port or an incoming topic, and as many readers as it says."""
+    for name, resource in model.resources.items():
+        if resource.kind != "latest_value":
+            continue
+        linked = [connection for connection in model.connections if connection.resource == name]
+        writes = [connection.location for connection in linked if connection.service == "write"]
+        if resource.topic is not None and resource.topic.direction == "subscribe":
+            writes.insert(0, ("resources", name, "topic"))
+        for location in writes[1:]:
+            yield model.problem(
+                (*location, 1),
+                f"a second writer of resource '{name}' of kind latest_value",
+                remedy=f"it has one; see line {model.file.position(writes[0])[0]}, or use shared_data",
+                code="invalid_argument",
+            )
+        reads = [connection.location for connection in linked if connection.service == "read"]
+        for location in reads[resource.max_readers :]:
+            yield model.problem(
+                (*location, 1),
+                f"too many readers of resource '{name}' of kind latest_value",
+                expected=f"at most {resource.max_readers}",
+                found=str(len(reads)),
+                remedy="raise its max_readers",
+                code="invalid_argument",
+            )

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
-from mauve_rt._kernel import Architecture, PluginRegistry
+from mauve_rt._kernel import Architecture, PluginRegistry, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.checks import Checks
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
+from mauve_rt.model.schema import ComponentModel, ResourceModel
 from mauve_rt.model.yaml_file import Location
 
 
@@ -28,15 +30,11 @@ def build(
             _add_component(architecture, model, name=name, loader=loader)
     for name, resource in model.resources.items():
         with _errors_at(model, ("resources", name)):
-            architecture.add_resource(
-                name,
-                kind=resource.kind,
-                type=resource.type,
-                capacity=resource.capacity or 0,
-                overwrite=resource.overwrite,
-            )
+            architecture.add_resource(name, **_kind_of(resource))
             if resource.topic is not None and resource.topic.direction == "publish":
                 architecture.publish(name)
+            elif resource.topic is not None:
+                architecture.subscribe(name)
     for connection in model.connections:
         with _errors_at(model, connection.location):
             architecture.connect(
@@ -55,39 +53,90 @@ def configure(model: ArchitectureModel, architecture: Architecture) -> None:
         architecture.configure()
 
 
-def allowed_cores(model: ArchitectureModel, component: str, index: PluginIndex) -> list[str]:
-    """The cores a component takes beside the one the file gives it."""
-    description = model.components[component]
-    if isinstance(description.alternatives, list):
-        return list(dict.fromkeys(description.alternatives))
-    return [core for core in index.cores_of(description.shell) if core != description.core]
+def allowed_parts(component: ComponentModel, kind: str, loader: PluginLoader) -> list[str]:
+    """The cores, fsms or shells (`kind`) that a component takes: its own first, then its alternatives."""
+    own = {"core": component.core, "fsm": component.fsm, "shell": component.shell}[kind]
+    if isinstance(component.alternatives, list):
+        others = [name for name in component.alternatives if kind in loader.part_kinds(name)]
+    else:
+        others = loader.index.names(kind)
+    return list(dict.fromkeys([own, *others]))
+
+
+def add_component_step(
+    transaction: Transaction, model: ArchitectureModel, name: str, loader: PluginLoader
+) -> None:
+    """Let a transaction add a component that `model` describes; it was checked against its plug-ins.
+
+    Raises:
+        MauveError: an alternative cannot be loaded.
+    """
+    component = model.components[name]
+    transaction.add_component(
+        name,
+        component.shell,
+        component.core,
+        component.fsm,
+        **_settings(component, loader),
+        properties=model.properties(name),
+        fallback=component.fallback or "",
+    )
+
+
+def add_resource_step(transaction: Transaction, model: ArchitectureModel, name: str) -> None:
+    """Let a transaction add a resource that `model` describes."""
+    transaction.add_resource(name, **_kind_of(model.resources[name]))
 
 
 def _add_component(
     architecture: Architecture, model: ArchitectureModel, *, name: str, loader: PluginLoader
 ) -> None:
     component = model.components[name]
-    alternatives = allowed_cores(model, name, loader.index)
-    for core in alternatives:
-        loader.require("core", core)
     architecture.add_component(
         name,
-        shell=component.shell,
-        core=component.core,
-        fsm=component.fsm,
-        priority=component.priority,
-        cpus=list(component.cpus or ()),
-        offset_ns=component.offset_ns,
-        period_ns=component.period_ns,
-        overrun=component.overrun,
-        max_backlog=component.max_backlog,
-        stack_bytes=component.stack_bytes,
-        alternatives=alternatives,
-        reconfigurable=component.reconfigurable,
+        component.shell,
+        component.core,
+        component.fsm,
+        **_settings(component, loader),
+        fallback=component.fallback,
     )
     for key, value in model.properties(name).items():
         with _errors_at(model, model.property_place(name, key)):
             architecture.set_property(name, key, value)
+
+
+def _kind_of(resource: ResourceModel) -> dict[str, Any]:
+    """What adding a resource by file and by transaction have in common."""
+    return {
+        "kind": resource.kind,
+        "type": resource.type,
+        "capacity": resource.capacity or 0,
+        "overwrite": resource.overwrite,
+        "max_readers": resource.max_readers,
+    }
+
+
+def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]:
+    """What adding a component by file and by transaction have in common; loads the alternatives."""
+    installed = not isinstance(component.alternatives, list)
+    for kind in ("core", "fsm", "shell"):
+        for name in allowed_parts(component, kind, loader):
+            plugin = loader.index.find(kind, name)
+            # Of all that is installed only the cores that fit now; others when somebody asks for them.
+            if not installed or (plugin is not None and kind == "core" and plugin.shell == component.shell):
+                loader.require(kind, name)
+    return {
+        "priority": component.priority,
+        "cpus": list(component.cpus or ()),
+        "offset_ns": component.offset_ns,
+        "period_ns": component.period_ns,
+        "overrun": component.overrun,
+        "max_backlog": component.max_backlog,
+        "stack_bytes": component.stack_bytes,
+        "trace_records": component.trace_records,
+        "alternatives": [core for core in allowed_parts(component, "core", loader) if core != component.core],
+        "reconfigurable": component.reconfigurable,
+    }
 
 
 @contextmanager

@@ -49,13 +49,30 @@ class Checks:
             yield from missing
             if not missing:
                 yield from self._same_shell(name, plugin, written_for(plugin), (*place, kind))
-        alternatives = component.alternatives if isinstance(component.alternatives, list) else []
-        for index, core in enumerate(alternatives):
-            at = (*place, "alternatives", index)
-            missing = [*self._plugin("core", core, at)]
+        if component.fallback is not None:
+            missing = [*self._plugin("core", component.fallback, (*place, "fallback"))]
             yield from missing
             if not missing:
-                yield from self._same_shell(name, core, registry.core_shell(core), at)
+                written_for_shell = registry.core_shell(component.fallback)
+                yield from self._same_shell(name, component.fallback, written_for_shell, (*place, "fallback"))
+        yield from self._alternatives(name, place)
+
+    def _alternatives(self, name: str, place: Location) -> Iterator[Problem]:
+        """Cores and fsms may be for another shell where that is an alternative too."""
+        component = self._model.components[name]
+        registry = self._loader.registry
+        names = component.alternatives if isinstance(component.alternatives, list) else []
+        shells = [other for other in names if "shell" in self._loader.part_kinds(other)]
+        for index, part in enumerate(names):
+            at = (*place, "alternatives", index)
+            for kind in self._loader.part_kinds(part) or ["core"]:
+                missing = [*self._plugin(kind, part, at)]
+                yield from missing
+                if missing or kind == "shell":
+                    continue
+                shell = registry.core_shell(part) if kind == "core" else registry.fsm_shell(part)
+                if shell not in shells:
+                    yield from self._same_shell(name, part, shell, at)
 
     def _plugin(self, kind: str, name: str, place: Location) -> Iterator[Problem]:
         try:

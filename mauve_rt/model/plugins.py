@@ -7,7 +7,8 @@ A package lists its classes in the ament index resource `mauve_rt_plugins/<packa
     core; mauve_examples/Guidance; mauve_examples/GuidanceShell; mauve_examples
     core; my_package/PyGuidance; mauve_examples/GuidanceShell; my_package.cores:PyGuidance
 
-Only what an architecture file names is ever loaded: no request from outside makes a process import anything.
+Only what is listed is ever loaded, and only when an architecture file or a request names it: no request makes
+a process import anything else.
 """
 
 import importlib
@@ -106,10 +107,6 @@ class PluginIndex:
         """Names of one kind, sorted."""
         return sorted(name for of_kind, name in self._plugins if of_kind == kind)
 
-    def cores_of(self, shell: str) -> list[str]:
-        """Names of the cores written for a shell, sorted."""
-        return sorted(plugin.name for plugin in self if plugin.kind == "core" and plugin.shell == shell)
-
     def __iter__(self) -> Iterator[Plugin]:
         return iter(self._plugins.values())
 
@@ -125,6 +122,19 @@ class PluginLoader:
     def names(self, kind: str) -> list[str]:
         """What is installed or built in."""
         return sorted({*self.index.names(kind), *self.registry.names(kind)})
+
+    def part_kinds(self, name: str) -> list[str]:
+        """Which parts of a component have that name: of "core", "fsm" and "shell", none or more."""
+        return [
+            kind
+            for kind in ("core", "fsm", "shell")
+            if self.index.find(kind, name) or name in self.registry.names(kind)
+        ]
+
+    def shell_of(self, core: str) -> str:
+        """The shell that a core was written for; nothing is loaded."""
+        plugin = self.index.find("core", core)
+        return plugin.shell if plugin is not None else self.registry.core_shell(core)
 
     def require(self, kind: str, name: str) -> None:
         """Make sure that the registry knows a plug-in, loading its library or module if it does not.
@@ -166,7 +176,7 @@ class PluginLoader:
 
 
 def _factory(plugin: Plugin) -> Callable[[Any], object]:
-    from mauve_rt.cores import Shell  # noqa: PLC0415 - needs ROS, which the architecture file does not
+    from mauve_rt.cores import core_factory  # noqa: PLC0415 - needs ROS, which the architecture file does not
 
     module_name, _, class_name = plugin.target.partition(":")
     try:
@@ -174,4 +184,4 @@ def _factory(plugin: Plugin) -> Callable[[Any], object]:
     except Exception as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
         text = f"core '{plugin.name}': cannot load {plugin.target}: {type(error).__name__}: {error}"
         raise PluginError(one_line(text), element=plugin.name) from None
-    return lambda view: core_class(Shell(view))
+    return core_factory(core_class)

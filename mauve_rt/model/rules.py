@@ -14,57 +14,21 @@ Names of topics and of the executor are resolved against the supervisor's namesp
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.schema import Identifier, RosName
-from mauve_rt.model.words import shown
+from mauve_rt.model.steps import Step, form_problem
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 MessageType = Annotated[str, Field(pattern=r"^[a-z]\w*/msg/[A-Z]\w*$")]
-StepKind = Literal[
-    "replace_core",
-    "replace_fsm",
-    "replace_shell",
-    "set_property",
-    "connect",
-    "disconnect",
-    "add_component",
-    "remove_component",
-    "add_resource",
-    "remove_resource",
-    "start",
-    "stop",
-]
 
 
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Step(_Model):
-    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
-
-    kind: StepKind
-    target: Identifier
-    name: str = ""
-    value: str = ""  # YAML text
-
-    @field_validator("value", mode="before")
-    @classmethod
-    def _text_of_a_scalar(cls, value: object) -> object:
-        if isinstance(value, bool):
-            return str(value).lower()
-        return str(value) if isinstance(value, int | float) else value
-
-    @model_validator(mode="after")
-    def _names_what_it_needs(self) -> "Step":
-        if not self.name and self.kind not in ("start", "stop", "remove_component", "remove_resource"):
-            raise ValueError(f"a step of kind '{self.kind}' needs a name")
-        return self
 
 
 class Silence(_Model):
@@ -126,7 +90,7 @@ class RulesFile:
         try:
             self.rules = Rules.model_validate(self._file.data)
         except ValidationError as error:
-            problems = [self._problem_of(item) for item in error.errors(include_url=False)]
+            problems = [form_problem(self._file, item) for item in error.errors(include_url=False)]
             raise ArchitectureFileError(self._file.path, problems) from None
         seen: set[str] = set()
         for index, rule in enumerate(self.rules.rules):
@@ -142,26 +106,3 @@ class RulesFile:
     def error(self, location: Location, what: str, *, remedy: str = "") -> ArchitectureFileError:
         """An error about one element, e.g. ("rules", 0, "when", "silence", "type")."""
         return ArchitectureFileError(self.path, [self._file.problem(location, what, remedy=remedy)])
-
-    def _problem_of(self, item: Any) -> Problem:
-        """What pydantic found wrong, in words for who wrote the file."""
-        kind, location = item["type"], tuple(item["loc"])
-        element = dotted(location)
-        if kind == "missing" and location[-1] == "silence":
-            return self._file.problem(location, f"{element[:-8]} has no known condition", expected="silence")
-        if kind == "missing":
-            return self._file.problem(location, f"{element} is missing")
-        if kind == "extra_forbidden":
-            return self._file.key_problem(location, f"{element} is no known key")
-        if kind == "expected":
-            text, found = item["ctx"]["text"], shown(item["input"])
-            return self._file.problem(location, f"bad {element}", expected=text, found=found)
-        message = item["msg"].removeprefix("Value error, ")
-        text = message[:1].lower() + message[1:]
-        return self._file.problem(location, f"{element or 'the file'}: {text}", found=shown(item["input"]))
-
-
-def dotted(location: Location) -> str:
-    """`rules[0].when.silence`."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
-    return text.removeprefix(".")

@@ -5,11 +5,16 @@
     components:
       exploration: {shell: mauve_examples/ExplorationShell, core: mauve_examples/Exploration,
                     fsm: mauve_examples/ExplorationFsm, alternatives: [mauve_examples/LocalExploration],
+                    fallback: mauve_examples/LocalExploration, trace_records: 4096,
                     priority: 40, cpus: [1], offset_ms: 0, overrun: skip, properties: {range: 5.0}}
     resources:
       target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
     connections:
       - [exploration.goal, goal.write]
+
+`alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
+`installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
+`trace_records` is the room for its trace until it is drained; what does not fit is counted as lost.
 
 Nothing here looks at plug-ins, so a file can be read where none is installed.
 """
@@ -22,10 +27,14 @@ from pydantic_core import PydanticCustomError
 
 PropertyValue = bool | int | float | str
 
-GIVEN_RESOURCES = ("shared_data", "ring_buffer")
+GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event")
+EVENT_TYPE = "std_msgs/msg/UInt64"  # what an event's topic carries: how often it was raised
 MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
 MIN_STACK_BYTES = 16_384
 MAX_CAPACITY = 1_000_000
+DEFAULT_READERS = 14
+MAX_READERS = 1000
+MAX_TRACE_RECORDS = 1_048_576
 
 
 def _plugin_name(value: str) -> str:
@@ -75,7 +84,9 @@ def _resource_kind(value: str) -> str:
 def _plugin_names_or_installed(value: Any) -> Any:
     if value == "installed" or isinstance(value, list):
         return value
-    raise PydanticCustomError("expected", "{text}", {"text": "a list of cores, or the word installed"})
+    raise PydanticCustomError(
+        "expected", "{text}", {"text": "a list of cores, fsms and shells, or the word installed"}
+    )
 
 
 PluginName = Annotated[str, AfterValidator(_plugin_name)]
@@ -114,6 +125,12 @@ class ResourceModel(_Section):
     capacity: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None  # elements; ring_buffer only
     overwrite: bool = False  # a full ring_buffer drops its oldest element rather than the new one
     topic: TopicModel | None = None
+    max_readers: Annotated[int, Field(ge=1, le=MAX_READERS)] = DEFAULT_READERS  # ports; latest_value only
+
+    @property
+    def topic_type(self) -> str:
+        """The message type of its topic."""
+        return EVENT_TYPE if self.kind == "event" else self.type
 
 
 class ComponentModel(_Section):
@@ -125,6 +142,7 @@ class ComponentModel(_Section):
     alternatives: Annotated[
         list[PluginName] | Literal["installed"], BeforeValidator(_plugin_names_or_installed)
     ] = []
+    fallback: PluginName | None = None
     priority: Annotated[int, Field(ge=1, le=MAX_PRIORITY)] = 50
     cpus: Annotated[list[Cpu], Field(min_length=1)] | None = None  # absent: any
     offset_ms: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] = 0.0
@@ -132,6 +150,7 @@ class ComponentModel(_Section):
     overrun: Literal["skip", "catch_up", "fault"] = "skip"
     max_backlog: Annotated[int, Field(ge=1, le=1_000_000)] = 10
     stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 524_288
+    trace_records: Annotated[int, Field(ge=2, le=MAX_TRACE_RECORDS)] = 2048
     reconfigurable: bool = True
     properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
 
@@ -149,3 +168,9 @@ class FileModel(_Section):
     components: Annotated[dict[Identifier, ComponentModel], Field(min_length=1)]
     resources: dict[Identifier, ResourceModel] = {}
     connections: list[Annotated[list[Endpoint], Field(min_length=2, max_length=2)]] = []
+
+
+class FragmentModel(FileModel):
+    """A part of an architecture file: what one step of a transaction adds."""
+
+    components: dict[Identifier, ComponentModel] = {}

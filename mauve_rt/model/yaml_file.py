@@ -19,14 +19,14 @@ MAX_BYTES = 1_000_000
 class YamlFile:
     """A parsed file: `data` in plain Python values, and `position()` of any element of it."""
 
-    def __init__(self, path: str | Path) -> None:
-        """Read and parse a file.
+    def __init__(self, path: str | Path, *, text: str | None = None) -> None:
+        """Read and parse a file, or parse `text` in its place.
 
         Raises:
             ArchitectureFileError: no such file, too large, not UTF-8, not YAML, or a key given twice.
         """
         self.path = Path(path)
-        self._document = self._parse(self._read())
+        self._document = self._parse(self._read() if text is None else text)
         try:
             self.data = _Plain().value(self._document)
         except (RecursionError, OverflowError):

@@ -1,36 +1,27 @@
 """Requests carried out or refused. Knows nothing of ROS: `executor_services` is its ROS face."""
 
 import threading
-from collections.abc import Mapping
 from dataclasses import replace
 
-from mauve_rt._kernel import StepReport, monotonic_ns
+from mauve_rt._kernel import StepReport, TransactionReport, monotonic_ns
 from mauve_rt.errors import MauveError, error_code, one_line
-from mauve_rt.model.schema import PropertyValue
-from mauve_rt.model.words import shown
-from mauve_rt.node.executor_checks import RefusalError, checked, target_of, well_formed
-from mauve_rt.node.executor_requests import Code, Outcome, Report, Request, RequestLog, Step
+from mauve_rt.node.executor_checks import check_form, check_state, check_time
+from mauve_rt.node.executor_requests import (
+    NOT_MEASURED,
+    Code,
+    Outcome,
+    RefusalError,
+    Report,
+    Request,
+    RequestLog,
+    Step,
+    code_of,
+)
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_steps import Plan
 
 DEFAULT_TIMEOUT_S = 1.0
 _STOP_SLICE_NS = 100_000_000
-
-_CODES: Mapping[str, Code] = {
-    "unknown_component": Code.UNKNOWN_COMPONENT,
-    "unknown_core": Code.UNKNOWN_CORE,
-    "undeclared_core": Code.UNDECLARED_CORE,
-    "not_running": Code.NOT_RUNNING,
-    "already_running": Code.ALREADY_RUNNING,
-    "faulted": Code.FAULTED,
-    "not_reconfigurable": Code.NOT_RECONFIGURABLE,
-    "adopt_refused": Code.ADOPT_REFUSED,
-    "timeout": Code.TIMEOUT,
-    "not_configured": Code.NOT_ACTIVE,
-    "invalid_argument": Code.INVALID,
-    "type_mismatch": Code.INVALID,
-    "out_of_range": Code.INVALID,
-    "unknown_property": Code.INVALID,
-}  # of the kernel's errors; any other one comes from preparing
 
 
 class Control:
@@ -56,57 +47,76 @@ class Control:
             return outcome
 
     def _outcome(self, request: Request) -> Outcome:
-        from_core = to_core = ""
+        from_core, to_core = self._replaced_core(request)
         try:
-            step = well_formed(request)
-            component = target_of(step, self._runtime, expected_epoch=request.expected_epoch)
-            if step.kind == "replace_core":
-                from_core, to_core = component.core, step.name
-            value = checked(step, component, self._runtime)
-            if request.dry_run:
-                outcome = Outcome(code=Code.OK, message=f"dry run: '{step}' would be accepted")
-            else:
-                outcome = self._commit(step, value, request)
+            check_form(request)
+            outcome = self._carry_out(request)
         except RefusalError as refusal:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
-            code = _CODES.get(error_code(error), Code.PREPARE_FAILED)
-            outcome = Outcome(code=code, message=one_line(str(error)))
+            outcome = Outcome(code=code_of(error), message=one_line(str(error)))
         except Exception as error:  # noqa: BLE001 - an error of ours must not cost the requester the answer
             text = one_line(f"internal error: {type(error).__name__}: {error}")
             outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
         self._runtime.observe()
         return replace(outcome, epoch=self._runtime.epoch, from_core=from_core, to_core=to_core)
 
-    def _commit(self, step: Step, value: PropertyValue | None, request: Request) -> Outcome:
-        deployer = self._runtime.deployer
-        timeout_ns = round((request.timeout_s or DEFAULT_TIMEOUT_S) * 1e9)
-        report = Report(step=str(step.kind), component=step.target)
-        match step.kind:
-            case "stop":
-                self._stop(step.target, timeout_ns)
-                message = f"component '{step.target}' is stopped"
-            case "start":
-                deployer.start(step.target, request.clock_ns or None)
-                message = f"component '{step.target}' is started"
-            case "replace_core":
-                measured = deployer.replace_core(
-                    step.target,
-                    step.name,
-                    commit_timeout_ns=timeout_ns,
-                    phase_timeout_ns=self._phase_timeout_ns,
-                )
-                report = _report(f"{step.kind} {step.name}", measured)
-                message = f"component '{step.target}' runs {measured.to_core}, before {measured.from_core}"
-                if measured.from_core == measured.to_core:
-                    self._runtime.touch()
-            case _:
-                assert value is not None  # noqa: S101 - checked() gives set_property its value
-                measured = deployer.set_property(step.target, step.name, value, commit_timeout_ns=timeout_ns)
-                report = _report(f"{step.kind} {step.name}", measured)
-                message = f"property '{step.name}' of component '{step.target}' is {shown(value)}"
-                self._runtime.touch()
-        return Outcome(code=Code.OK, message=message, report=(report,))
+    def _replaced_core(self, request: Request) -> tuple[str, str]:
+        """Which core the request's one replace_core step puts in the place of which."""
+        replacing = [step for step in request.steps if step.kind == "replace_core"]
+        if len(replacing) != 1:
+            return "", ""
+        step = replacing[0]
+        present = [part.core for part in self._runtime.components() if part.name == step.target]
+        return (present[0], step.name) if present else ("", "")
+
+    def _carry_out(self, request: Request) -> Outcome:
+        # The kernel's count is taken first: what changes from here on, the commit finds.
+        kernel_epoch = self._runtime.kernel_epoch() if request.expected_epoch else 0
+        self._runtime.observe()
+        check_time(request, self._runtime)
+        epoch = self._runtime.epoch
+        plan = Plan(request.steps, self._runtime)
+        if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):
+            step = request.steps[0]
+            check_state(step, next(part for part in self._runtime.components() if part.name == step.target))
+            if not request.dry_run:
+                return self._start_or_stop(step, request)
+        measured = self._runtime.deployer.commit(
+            plan.transaction,
+            dry_run=request.dry_run,
+            expected_epoch=kernel_epoch,
+            commit_timeout_ns=_timeout_ns(request),
+            phase_timeout_ns=self._phase_timeout_of(request),
+        )
+        reports = _reports(request.steps, measured)
+        if request.dry_run:
+            words = "; ".join(str(step) for step in request.steps)
+            return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
+        self._runtime.declare(added=plan.added, removed=plan.removed)
+        self._count_change(epoch)
+        return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
+
+    def _count_change(self, before: int) -> None:
+        """A core replaced by another one of its kind, or a restart, shows nowhere: it counts all the same."""
+        self._runtime.observe()
+        if self._runtime.epoch == before:
+            self._runtime.touch()
+
+    def _phase_timeout_of(self, request: Request) -> int:
+        """Of a property alone nobody wants to know the phase."""
+        only_properties = all(step.kind == "set_property" for step in request.steps)
+        return 0 if only_properties or request.dry_run else self._phase_timeout_ns
+
+    def _start_or_stop(self, step: Step, request: Request) -> Outcome:
+        """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
+        if step.kind == "stop":
+            self._stop(step.target, _timeout_ns(request))
+            message = f"component '{step.target}' is stopped"
+        else:
+            self._runtime.deployer.start(step.target, request.clock_ns or None)
+            message = f"component '{step.target}' is started"
+        return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 
     def _stop(self, component: str, timeout_ns: int) -> None:
         """Stop in short waits, between which the kernel is free for others, for the end of all above all."""
@@ -122,13 +132,46 @@ class Control:
             return
 
 
-def _report(step: str, measured: StepReport) -> Report:
+def _timeout_ns(request: Request) -> int:
+    return round((request.timeout_s or DEFAULT_TIMEOUT_S) * 1e9)
+
+
+def _message(steps: tuple[Step, ...], measured: TransactionReport) -> str:
+    if len(steps) > 1:
+        figures = f"prepared in {measured.prepare_ns / 1e6:.3g} ms"
+        if measured.blackout_ns > 0:
+            figures += f", longest blackout {measured.blackout_ns / 1e6:.3g} ms"
+        return f"{len(steps)} steps are in force; {figures}"
+    step, report = steps[0], measured.steps[0]
+    match step.kind:
+        case "replace_core":
+            return f"component '{step.target}' runs {report.to_core}, before {report.from_core}"
+        case "set_property":
+            return f"property '{step.name}' of component '{step.target}' is {step.value}"
+        case _:
+            return f"done: {step}"
+
+
+def _reports(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Report, ...]:
+    if len(steps) == 1:  # then all of it was for this one
+        return (_report(steps[0], measured.steps[0], prepare_ns=measured.prepare_ns),)
+    pairs = zip(steps, measured.steps, strict=True)
+    return tuple(_report(step, report, prepare_ns=report.prepare_ns) for step, report in pairs)
+
+
+def _report(step: Step, measured: StepReport, *, prepare_ns: int) -> Report:
+    is_long = step.kind in ("add_component", "add_resource")
+    on_resource = step.kind in ("add_resource", "remove_resource")
+    words = [step.kind, step.target if on_resource else step.name]
+    if not is_long and step.kind != "replace_core":
+        words.append(step.value)
+    held = measured.blackout_ns != 0
     return Report(
-        step=step,
+        step=" ".join(word for word in words if word),
         component=measured.component,
-        prepare_ns=measured.prepare_ns,
-        blackout_ns=measured.blackout_ns,
+        prepare_ns=prepare_ns,
+        blackout_ns=measured.blackout_ns if held else NOT_MEASURED,
         missed_releases=measured.missed_releases,
-        phase_nominal_ns=measured.phase_nominal_ns,
+        phase_nominal_ns=measured.phase_nominal_ns if held else NOT_MEASURED,
         phase_actual_ns=measured.phase_actual_ns,
     )

@@ -48,12 +48,7 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
 
 def component_infos(runtime: Runtime) -> list[Any]:
     """ComponentInfo of every component."""
-    infos = []
-    for component in runtime.components():
-        takes = [runtime.model.components[component.name].core, *runtime.alternatives(component.name)]
-        others = [core for core in dict.fromkeys(takes) if core != component.core]
-        infos.append(component_info(component, alternatives=others))
-    return infos
+    return [component_info(part, alternatives=runtime.cores_of(part)) for part in runtime.components()]
 
 
 def realtime_status(runtime: Runtime) -> Any:

@@ -10,10 +10,11 @@ from rclpy.parameter import Parameter
 
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_diagnostics import Diagnostics
 from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
-from mauve_rt.node.executor_state import Diagnostics, StatePublisher
+from mauve_rt.node.executor_state import StatePublisher
 from mauve_rt.node.executor_topics import TopicBridge
 from mauve_rt.trace import TraceError
 

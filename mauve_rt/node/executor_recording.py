@@ -6,13 +6,12 @@ from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 from mauve_rt._kernel import Deployer, monotonic_ns
 from mauve_rt.errors import ParameterError
 from mauve_rt.model import message_class
-from mauve_rt.node.qos import QOS_NAMES, qos_profile
-from mauve_rt.trace.bag import TopicQos
+from mauve_rt.node.qos import QOS_NAMES, qos_profile, recorded_qos
 from mauve_rt.trace.recorder import Recorder
 
 _DEPTH = 100  # of the topics recorded beside the executor's own
@@ -66,7 +65,7 @@ class Recording:
         """Record a serialized message that was sent or received now. From any thread."""
         recorder = self._recorder
         if recorder is not None:
-            offered = None if qos is None else _topic_qos(qos)
+            offered = None if qos is None else recorded_qos(qos)
             recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
 
     def stop(self, node: LifecycleNode) -> None:
@@ -80,11 +79,3 @@ class Recording:
 
     def _callback(self, topic: str, type_name: str, qos: QoSProfile) -> Callable[[bytes], None]:
         return lambda data: self.record(topic, type_name, data, qos=qos)
-
-
-def _topic_qos(qos: QoSProfile) -> TopicQos:
-    return TopicQos(
-        depth=qos.depth,
-        reliable=qos.reliability == ReliabilityPolicy.RELIABLE,
-        transient_local=qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-    )

@@ -5,10 +5,22 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from mauve_rt._kernel import NOT_MEASURED
+from mauve_rt.errors import error_code
 
-__all__ = ["NOT_MEASURED", "Code", "Outcome", "Report", "Request", "RequestLog", "Step"]
+__all__ = [
+    "NOT_MEASURED",
+    "Code",
+    "Outcome",
+    "RefusalError",
+    "Report",
+    "Request",
+    "RequestLog",
+    "Step",
+    "code_of",
+]
 
 KEPT_REQUESTS = 1024
+_SHOWN_VALUE = 60
 
 
 class Code(IntEnum):
@@ -32,6 +44,49 @@ class Code(IntEnum):
     UNSUPPORTED = 15
 
 
+_INVALID = (
+    "invalid_argument",
+    "type_mismatch",
+    "out_of_range",
+    "duplicate_name",
+    "unknown_property",
+    "unknown_port",
+    "unknown_service",
+    "unknown_resource",
+    "unknown_type",
+    "bad_period",
+)
+_CODES = {
+    "unknown_component": Code.UNKNOWN_COMPONENT,
+    "unknown_core": Code.UNKNOWN_CORE,
+    "unknown_fsm": Code.UNKNOWN_CORE,
+    "unknown_shell": Code.UNKNOWN_CORE,
+    "undeclared_core": Code.UNDECLARED_CORE,
+    "not_running": Code.NOT_RUNNING,
+    "already_running": Code.ALREADY_RUNNING,
+    "faulted": Code.FAULTED,
+    "not_reconfigurable": Code.NOT_RECONFIGURABLE,
+    "wrong_epoch": Code.WRONG_EPOCH,
+    "adopt_refused": Code.ADOPT_REFUSED,
+    "timeout": Code.TIMEOUT,
+    "not_configured": Code.NOT_ACTIVE,
+    **dict.fromkeys(_INVALID, Code.INVALID),
+}
+
+
+def code_of(error: BaseException) -> Code:
+    """The code of an error of the kernel; any that is not known otherwise comes from preparing."""
+    return _CODES.get(error_code(error), Code.PREPARE_FAILED)
+
+
+class RefusalError(Exception):
+    """A request that is not carried out, and why."""
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
 @dataclass(frozen=True)
 class Step:
     """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
@@ -42,7 +97,9 @@ class Step:
     value: str = ""
 
     def __str__(self) -> str:
-        return " ".join(word for word in (self.kind, self.target, self.name, self.value) if word)
+        value = " ".join(self.value.split())
+        short = value if len(value) <= _SHOWN_VALUE else f"{value[: _SHOWN_VALUE - 3]}..."
+        return " ".join(word for word in (self.kind, self.target, self.name, short) if word)
 
 
 @dataclass(frozen=True, kw_only=True)

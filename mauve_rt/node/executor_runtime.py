@@ -2,11 +2,14 @@
 
 import threading
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from mauve_rt._kernel import Architecture, ComponentDescription, Deployer, PluginRegistry, RealtimeStatus
 from mauve_rt.errors import MauveError
-from mauve_rt.model import ArchitectureModel, PluginIndex, allowed_cores, build, configure
+from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
+from mauve_rt.model.schema import ComponentModel
 
 
 class StillRunningError(MauveError):
@@ -22,19 +25,30 @@ class StillRunningError(MauveError):
         self.element, self.expected, self.found, self.remedy = components[0].current_state, "", "", ""
 
 
+@dataclass(frozen=True)
+class _Declared:
+    """A component as the file or a request declared it; the cores that it takes, with their shells."""
+
+    model: ComponentModel
+    cores: Mapping[str, str]
+
+
 class Runtime:
     """One architecture from configure() to cleanup().
 
-    `epoch` grows with every change: of a component's state or core, whoever made it (a fault too), and of a
-    property.
+    `epoch` grows with every change: of a component's state, parts, properties or connections and of the lists
+    of components and resources, whoever made it (a fault too).
 
-    | member        | written by                                 | guarded by |
-    | ------------- | ------------------------------------------ | ---------- |
-    | `_epoch` ...  | observe(), touch(): any thread             | `_lock`    |
-    | the others    | configure() ... cleanup(): one at a time   |            |
+    | member        | written by                                 | guarded by      |
+    | ------------- | ------------------------------------------ | --------------- |
+    | `_epoch` ...  | observe(), touch(): any thread             | `_lock`         |
+    | `_declared`   | configure(), declare(): one at a time      | exchanged whole |
+    | `registry`    | who is in loading()                        | `_loading`      |
+    | the others    | configure() ... cleanup(): one at a time   |                 |
     """
 
     registry = PluginRegistry()  # one for the process: libraries are never closed
+    _loading = threading.Lock()
 
     def __init__(
         self, load: Callable[[], ArchitectureModel], *, require_realtime: bool = False, trace: bool = True
@@ -46,6 +60,7 @@ class Runtime:
         self.active = False
         self._require_realtime = require_realtime
         self._trace = trace
+        self._declared: Mapping[str, _Declared] = {}
         self._architecture: Architecture | None = None
         self._deployer: Deployer | None = None
         self._lock = threading.Lock()
@@ -77,17 +92,22 @@ class Runtime:
             return
         model = self.model
         self.index = PluginIndex.installed()
-        architecture = build(model, self.registry, index=self.index)
+        with self._loading:
+            architecture = build(model, self.registry, index=self.index)
         configure(model, architecture)
         require_realtime = self._require_realtime or model.require_realtime
-        deployer = Deployer(architecture, require_realtime=require_realtime, trace=self._trace)
+        deployer = self._make_deployer(architecture, require_realtime=require_realtime)
         try:
             deployer.prepare_process()
         except BaseException:
             architecture.cleanup()
             raise
+        self._declared = self._with_cores(model.components)
         self._architecture, self._deployer = architecture, deployer
         self.observe()
+
+    def _make_deployer(self, architecture: Architecture, *, require_realtime: bool) -> Deployer:
+        return Deployer(architecture, require_realtime=require_realtime, trace=self._trace)
 
     def activate(self) -> None:
         """Deploy: every component starts on the grid."""
@@ -151,9 +171,45 @@ class Runtime:
         deployer = self._deployer
         return deployer.epoch_ns if deployer is not None and self.active else 0
 
-    def alternatives(self, component: str) -> list[str]:
-        """Cores that the component takes beside the one its file gives it."""
-        return allowed_cores(self.model, component, self.index)
+    def resources(self) -> list[str]:
+        """Names of the resources there are now; none while unconfigured. From any thread."""
+        architecture = self._architecture
+        return [resource.name for resource in architecture.resources()] if architecture is not None else []
+
+    def kernel_epoch(self) -> int:
+        """The kernel's own count of changes, by which a commit tells whether there was one meanwhile."""
+        architecture = self._architecture
+        return architecture.epoch() if architecture is not None else 0
+
+    @contextmanager
+    def loading(self) -> Iterator[PluginLoader]:
+        """The installed plug-ins, for one at a time: loading changes the registry."""
+        with self._loading:
+            yield PluginLoader(self.registry, self.index)
+
+    def declared(self, component: str) -> ComponentModel:
+        """What the file, or the request that added it, says of a component."""
+        return self._declared[component].model
+
+    def declare(self, *, added: Mapping[str, ComponentModel], removed: Iterable[str]) -> None:
+        """Note what a transaction added and removed."""
+        gone = set(removed)
+        kept = {name: declared for name, declared in self._declared.items() if name not in gone}
+        self._declared = {**kept, **self._with_cores(added)}
+
+    def cores_of(self, part: ComponentDescription) -> list[str]:
+        """Cores that replace_core accepts for a component, beside the one it has."""
+        declared = self._declared.get(part.name)
+        cores = declared.cores if declared is not None else {}  # none: being added at this moment
+        return [core for core, shell in cores.items() if shell == part.shell and core != part.core]
+
+    def _with_cores(self, models: Mapping[str, ComponentModel]) -> dict[str, "_Declared"]:
+        declared = {}
+        with self.loading() as loader:
+            for name, model in models.items():
+                cores = {core: loader.shell_of(core) for core in allowed_parts(model, "core", loader)}
+                declared[name] = _Declared(model, cores)
+        return declared
 
     @property
     def epoch(self) -> int:
@@ -166,8 +222,8 @@ class Runtime:
         # A component held for a commit, or on its way to a stop, is on its way to something else that counts.
         states = {"HELD": "RUNNING", "STOPPING": "RUNNING"}
         with self._lock:
-            parts = [(part.name, states.get(part.state, part.state), part.core) for part in self.components()]
-            seen = (self.active, self._revision, parts)
+            parts = [_facts(part, states.get(part.state, part.state)) for part in self.components()]
+            seen = (self.active, self._revision, parts, self.resources())
             if seen == self._seen:
                 return False
             self._seen = seen
@@ -175,6 +231,13 @@ class Runtime:
             return True
 
     def touch(self) -> None:
-        """Count a change that components() does not show, such as that of a property."""
+        """Count a change that nothing shows, such as a core replaced by another one of its kind."""
         with self._lock:
             self._revision += 1
+
+
+def _facts(part: ComponentDescription, state: str) -> tuple[object, ...]:
+    """What is a change when it changes."""
+    wiring = [(port.name, port.resource, port.service) for port in part.ports]
+    properties = [(item.name, item.value) for item in part.properties]
+    return (part.name, state, part.shell, part.core, part.fsm, part.fault, wiring, properties)

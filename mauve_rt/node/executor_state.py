@@ -1,16 +1,15 @@
-"""What the executor tells by itself: ~/state on changes, ~/events on requests, /diagnostics at 1 Hz."""
+"""What the executor tells by itself: ~/state on changes, ~/events on requests and on cores that took over."""
 
-import resource
 import threading
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent
-from mauve_rt._kernel import ComponentDescription, Deployer
+from mauve_rt._kernel import Deployer
+from mauve_rt.node.executor_faults import FaultWatch
 from mauve_rt.node.executor_messages import architecture_state, reconfiguration_event
 from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_requests import Outcome, Request
@@ -65,78 +64,17 @@ class StatePublisher:
             self._thread = None
 
     def _watch(self, deployer: Deployer) -> None:
-        told: dict[str, str] = {}
+        watch = FaultWatch()
         while not self._ending.is_set():
             if not deployer.wait_change(_WAIT_NS):
                 continue
             self.refresh()
-            faults = {part.name: part.fault for part in self._runtime.components() if part.state == "FAULTED"}
-            for name, fault in faults.items():
-                if told.get(name) != fault:
-                    self._node.get_logger().error(f"component '{name}' is faulted: {fault}")
-            told = faults
+            for fault in watch.look(self._runtime.components()):
+                self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
+                if fault.part.fell_back:
+                    self.event(*fault.event(self._runtime.epoch))
 
     def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
         data = serialize_message(message)
         publisher.publish(data)
         self._recording.record(publisher.topic_name, type_name, data, qos=qos)
-
-
-class Diagnostics:
-    """/diagnostics, one status per component and one for the process. On the node's timer only."""
-
-    def __init__(self, node: LifecycleNode, runtime: Runtime) -> None:
-        self._node = node
-        self._runtime = runtime
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
-        self._overruns: dict[str, int] = {}
-
-    def publish(self) -> None:
-        """Publish once."""
-        array = DiagnosticArray(status=[self._component(part) for part in self._runtime.components()])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        array.status.append(self._process())
-        self._publisher.publish(array)
-
-    def _component(self, part: ComponentDescription) -> Any:
-        more_overruns = part.overruns - self._overruns.get(part.name, 0)
-        self._overruns[part.name] = part.overruns
-        level, message = DiagnosticStatus.OK, part.state.lower()
-        if part.state == "FAULTED":
-            level, message = DiagnosticStatus.ERROR, part.fault
-        elif more_overruns > 0:
-            level, message = DiagnosticStatus.WARN, f"{more_overruns} overruns since the last status"
-        values = {
-            "core": part.core,
-            "state": part.current_state,
-            "releases": part.releases,
-            "overruns": part.overruns,
-            "skipped": part.skipped,
-            "wakeup_p50_ns": part.wakeup_p50_ns,
-            "wakeup_p99_ns": part.wakeup_p99_ns,
-            "wakeup_max_ns": part.wakeup_max_ns,
-        }
-        return self._status(part.name, level, message, values)
-
-    def _process(self) -> Any:
-        status = self._runtime.realtime_status()
-        missing = list(status.missing) if status is not None else []
-        usage = resource.getrusage(resource.RUSAGE_SELF)
-        level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
-        message = "without real-time rights" if missing else "real-time rights granted"
-        values = {
-            "epoch": self._runtime.epoch,
-            "missing": "; ".join(missing),
-            "page_faults_major": usage.ru_majflt,
-            "page_faults_minor": usage.ru_minflt,
-        }
-        return self._status("process", level, message, values)
-
-    def _status(self, name: str, level: bytes, message: str, values: dict[str, object]) -> Any:
-        return DiagnosticStatus(
-            level=level,
-            name=f"{self._node.get_fully_qualified_name()}: {name}",
-            message=message,
-            hardware_id=self._node.get_namespace(),
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )

@@ -54,14 +54,14 @@ class TopicBridge:
 
     def _open_one(self, name: str, resource: ResourceModel, group: CallbackGroup) -> None:
         assert resource.topic is not None  # noqa: S101 - open() asks
-        found = message_class(resource.type)
+        found = message_class(resource.topic_type)
         qos = qos_profile(resource.topic.qos, capacity=resource.capacity or 0)
         topic = self._node.resolve_topic_name(resource.topic.name)
         if resource.topic.direction == "publish":
             publisher = self._node.create_publisher(found, topic, qos)
-            self._outgoing[name] = _Outgoing(publisher, topic, resource.type, qos)
+            self._outgoing[name] = _Outgoing(publisher, topic, resource.topic_type, qos)
         else:
-            receive = self._receiver(name, topic, resource.type, qos)
+            receive = self._receiver(name, topic, resource.topic_type, qos)
             subscription = self._node.create_subscription(
                 found, topic, receive, qos, raw=True, callback_group=group
             )

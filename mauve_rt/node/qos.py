@@ -2,6 +2,8 @@
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from mauve_rt.trace.bag import TopicQos
+
 QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
 
 
@@ -18,3 +20,12 @@ def qos_profile(name: str, *, capacity: int = 0) -> QoSProfile:
             return QoSProfile(depth=max(1, capacity), reliability=reliable, durability=latched)
         case _:
             return QoSProfile(depth=max(10, capacity), reliability=reliable)
+
+
+def recorded_qos(qos: QoSProfile) -> TopicQos:
+    """A profile as a bag keeps it."""
+    return TopicQos(
+        depth=qos.depth,
+        reliable=qos.reliability == ReliabilityPolicy.RELIABLE,
+        transient_local=qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+    )

@@ -7,7 +7,8 @@ request in flight, all from one thread. What the engine decides goes to two call
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from mauve_rt.model.rules import Rule, Step
+from mauve_rt.model.rules import Rule
+from mauve_rt.model.steps import Step
 from mauve_rt.node.supervisor_conditions import Condition
 from mauve_rt.node.supervisor_rule import PRESENT, ArchitectureView, Kind, RuleLife
 

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from mauve_rt.model.rules import Rule, Step
+from mauve_rt.model.rules import Rule
+from mauve_rt.model.steps import Step
 from mauve_rt.node.supervisor_conditions import Condition, Look
 
 FIRST_RETRY_S = 0.5

@@ -2,67 +2,24 @@
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, Protocol
 
-from mauve_rt.trace.bag import BagWriter, TopicQos
-from mauve_rt.trace.cdr import Batch, encode_batch, encode_names
-from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.bag import TopicQos
+from mauve_rt.trace.trace_bag import (
+    BATCHES,
+    DROPPED_MESSAGES,
+    NAMES,
+    Drain,
+    SentMessage,
+    TraceBag,
+    TraceSource,
+)
 
-BATCHES = "trace/batches"
-NAMES = "trace/names"
-DROPPED_MESSAGES = "mauve_dropped_messages"
-"""Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
-_BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
-_NAMES_TYPE = "mauve_msgs/msg/TraceNames"
-_NAMES_QOS = TopicQos(depth=1, transient_local=True)
+__all__ = ["BATCHES", "DROPPED_MESSAGES", "NAMES", "Drain", "Recorder", "TraceSource"]
+
+
 _JOIN_TIMEOUT_S = 2.0
-
-
-class Drain(Protocol):
-    """What one drain of the kernel's rings yields (`mauve_rt._kernel.TraceDrain`)."""
-
-    @property
-    def records(self) -> bytes:
-        """Records, 48 bytes each."""
-
-    @property
-    def written(self) -> list[int]:
-        """Per component: records ever offered."""
-
-    @property
-    def dropped(self) -> list[int]:
-        """Per component: of these, lost because the ring was full."""
-
-    @property
-    def monotonic_ns(self) -> int:
-        """Time of the drain, CLOCK_MONOTONIC."""
-
-    @property
-    def realtime_ns(self) -> int:
-        """The same instant, CLOCK_REALTIME."""
-
-
-class TraceSource(Protocol):
-    """The part of `mauve_rt._kernel.Deployer` that the recorder uses."""
-
-    def drain_trace(self) -> Drain:
-        """Take everything out of the rings."""
-
-    def trace_components(self) -> list[str]:
-        """Words that `component` of a record refers to."""
-
-    def trace_names(self) -> list[str]:
-        """Words that `name` of a record refers to."""
-
-
-class _Waiting(NamedTuple):
-    topic: str
-    type_name: str
-    data: bytes
-    monotonic_ns: int
-    qos: TopicQos | None
 
 
 class Recorder:
@@ -106,24 +63,13 @@ class Recorder:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
-        self._source = source
-        self._node_name = node_name.rstrip("/")
         self._flush_period_s = flush_period_s
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
-        self._bag = BagWriter(directory)
-        try:
-            self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_NAMES_QOS)
-            self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
-            self._bag.flush()
-        except TraceError:
-            self._bag.abort()
-            raise
-        self._names_written: tuple[Sequence[str], Sequence[str]] | None = None
-        self._refused_types: set[tuple[str, str]] = set()
+        self._bag = TraceBag(source, directory, node_name=node_name, on_error=self._report)
         self._lock = threading.Lock()
-        self._waiting: list[_Waiting] = []
+        self._waiting: list[SentMessage] = []
         self._waiting_bytes = 0
         self._dropped = 0
         self._recording = False
@@ -173,7 +119,7 @@ class Recorder:
             if not self._recording or self._waiting_bytes + len(data) > self._queue_bytes:
                 self._dropped += 1
                 return False
-            self._waiting.append(_Waiting(topic, type_name, data, monotonic_ns, qos))
+            self._waiting.append(SentMessage(topic, type_name, data, monotonic_ns, qos))
             self._waiting_bytes += len(data)
             return True
 
@@ -206,42 +152,14 @@ class Recorder:
             self._report(f"recording stopped: {error}")
 
     def _drain(self, *, whole: bool) -> None:
-        """Move everything into the bag's buffer; a batch without records (it tells of losses) if `whole`."""
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
-        drain = self._source.drain_trace()
-        self._write_names(drain.realtime_ns)
-        if drain.records or waiting or whole:
-            batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, drain.records)
-            self._bag.write(self._topic(BATCHES), drain.realtime_ns, encode_batch(batch))
-        offset_ns = drain.realtime_ns - drain.monotonic_ns
-        for message in waiting:
-            self._write_message(message, message.monotonic_ns + offset_ns)
-        self._bag.set_custom_data(DROPPED_MESSAGES, str(self.dropped_messages))
-
-    def _write_names(self, log_time_ns: int) -> None:
-        """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
-        words = (self._source.trace_components(), self._source.trace_names())
-        if words != self._names_written:
-            self._names_written = words
-            self._bag.write(self._topic(NAMES), log_time_ns, encode_names(*words))
-
-    def _write_message(self, message: _Waiting, log_time_ns: int) -> None:
-        try:
-            self._bag.add_topic(message.topic, message.type_name, qos=message.qos)
-        except TraceError as error:
-            with self._lock:
-                self._dropped += 1
-            refused = (message.topic, message.type_name)
-            if refused not in self._refused_types:
-                self._refused_types.add(refused)
-                self._report(f"topic {message.topic} is not recorded: {error}")
-            return
-        self._bag.write(message.topic, log_time_ns, message.data)
+        refused = self._bag.write(waiting, whole=whole)
+        with self._lock:
+            self._dropped += refused
+            dropped = self._dropped
+        self._bag.tell_dropped(dropped)
 
     def _report(self, text: str) -> None:
         if self._on_error is not None:
             self._on_error(text)
-
-    def _topic(self, name: str) -> str:
-        return f"{self._node_name}/{name}"

@@ -92,9 +92,27 @@ inline std::vector<TraceRecord> records_of(const TraceDrain& drain, TraceKind ki
   return found;
 }
 
+/// Declared after variables of a test that its components use: ends the components before those go.
+struct ComponentsEndFirst {
+  explicit ComponentsEndFirst(Deployer& whose) : deployer(whose) {}
+  ~ComponentsEndFirst() { deployer.shutdown(); }
+  ComponentsEndFirst(const ComponentsEndFirst&) = delete;
+  ComponentsEndFirst& operator=(const ComponentsEndFirst&) = delete;
+  Deployer& deployer;
+};
+
+/// Lets components run on for some periods when a test is over: AddressSanitizer then finds what they use of the test's
+/// own variables, which are gone by now.
+inline void run_on_where_sanitized() {
+#ifdef __SANITIZE_ADDRESS__
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+#endif
+}
+
 /// An architecture of test components, deployed and shut down with the fixture.
 class Deployed : public ::testing::Test {
  protected:
+  ~Deployed() override { run_on_where_sanitized(); }
   Component& add(const std::string& name, std::int64_t period_ms = 1, TaskSettings settings = {}) {
     if (settings.cpus.empty()) settings.cpus = {0};
     Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name, settings);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Ports, resources, serialization.
+// Serialization, names in errors, trace rings, histograms.
 #include "fixtures.hpp"
 
 namespace mauve::testing {
@@ -66,73 +66,6 @@ TEST(Cdr, RefusesWhatIsShortOrTooLong) {
   writer.put(std::uint32_t{1'000'000});
   BoundedVector<std::uint32_t, 9> items;
   EXPECT_FALSE(CdrReader(excessive).get(items));
-}
-
-struct PortsFixture : ::testing::Test {
-  TestShell shell;
-  SharedData<Number> shared;
-  RingBuffer<Number> ring{2};
-};
-
-TEST_F(PortsFixture, AnUnconnectedReadPortYieldsItsDefault) {
-  const Sample<Number> sample = shell.input.read();
-  EXPECT_EQ(7.0, sample.value.value);
-  EXPECT_EQ(DataStatus::none, sample.status);
-}
-
-TEST_F(PortsFixture, StatusIsPerPort) {
-  TestShell second;
-  shell.input.connect(shared.read, "shared");
-  second.input.connect(shared.read, "shared");
-  EXPECT_EQ(DataStatus::none, shell.input.read().status);
-  shell.output.connect(shared.write, "shared");
-  shell.output.write({1.0});
-  EXPECT_EQ(DataStatus::new_data, shell.input.read().status);
-  EXPECT_EQ(DataStatus::old_data, shell.input.read().status);
-  EXPECT_EQ(DataStatus::new_data, second.input.read().status);
-}
-
-TEST_F(PortsFixture, WritersTimeIsTheLogicalClockOrTheRealOne) {
-  shell.input.connect(shared.read, "shared");
-  shell.output.connect(shared.write, "shared");
-  const time_ns_t before = monotonic_now_ns();
-  shell.output.write({1.0});
-  EXPECT_GE(shell.input.read().time_ns, before);
-  Context context;
-  context.clock_ns = 1234;
-  shell.set_context(&context);
-  shell.output.write({1.0});
-  EXPECT_EQ(1234, shell.input.read().time_ns);
-}
-
-TEST_F(PortsFixture, ARingGivesEachElementToOneReaderAndRefusesWhenFull) {
-  TestShell second;
-  shell.output.connect(ring.write, "ring");
-  shell.input.connect(ring.read, "ring");
-  second.input.connect(ring.read, "ring");
-  EXPECT_TRUE(shell.output.write({1.0}));
-  EXPECT_TRUE(shell.output.write({2.0}));
-  EXPECT_FALSE(shell.output.write({3.0}));
-  EXPECT_EQ(1U, ring.lost());
-  EXPECT_EQ(1.0, shell.input.read().value.value);
-  EXPECT_EQ(2.0, second.input.read().value.value);
-  EXPECT_EQ(DataStatus::old_data, shell.input.read().status);
-}
-
-TEST_F(PortsFixture, AnOverwritingRingKeepsTheNewest) {
-  RingBuffer<Number> overwriting(2, WhenFull::overwrite);
-  shell.output.connect(overwriting.write, "ring");
-  shell.input.connect(overwriting.read, "ring");
-  for (const double value : {1.0, 2.0, 3.0}) EXPECT_TRUE(shell.output.write({value}));
-  EXPECT_EQ(2.0, shell.input.read().value.value);
-  EXPECT_EQ(3.0, shell.input.read().value.value);
-}
-
-TEST_F(PortsFixture, ConnectingUnequalTypesOrKindsIsRefused) {
-  SharedData<Inner> other;
-  EXPECT_THROW(shell.input.connect(other.read, "other"), Error);
-  EXPECT_THROW(shell.input.connect(shared.write, "shared"), Error);
-  EXPECT_FALSE(shell.input.is_connected());
 }
 
 TEST(ArchitectureErrors, NameWhatIsThere) {

@@ -35,10 +35,10 @@ TEST_F(Rule11Faults, AnExceptionParksItsComponentAndWritesItsOutputs) {
 
   Number value;
   time_ns_t time = 0;
-  std::uint64_t seen = 0;
+  ReaderState seen;
   out.read.read(value, time, seen);
   EXPECT_EQ(0.0, value.value) << "on_stop: the type's zero";
-  seen = 0;
+  seen = {};
   kept.read.read(value, time, seen);
   EXPECT_EQ(5.0, value.value) << "on_stop: hold";
 
@@ -67,6 +67,7 @@ TEST_F(Rule11Faults, AFaultedComponentStartsOnlyAfterCleanupAndConfigure) {
   deployer.start("c");
   wait_runs(component, 3);
   EXPECT_EQ(ComponentState::running, component.task().state());
+  deployer.shutdown();  // before `fail` goes
 }
 
 TEST_F(Rule11Faults, ALockHeldAtAStatesEndIsAFault) {
@@ -128,7 +129,7 @@ TEST_F(Rule11Faults, AStateOverItsDeclaredTimeIsCaughtByTheWatchdog) {
   wait_fault(component);
   Number value{9.0};
   time_ns_t time = 0;
-  std::uint64_t seen = 0;
+  ReaderState seen;
   out.read.read(value, time, seen);
   EXPECT_EQ(0.0, value.value) << "what it wrote after it was condemned does not count";
 }

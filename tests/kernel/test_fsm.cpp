@@ -1,42 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Rules 1 and 3: loops, periods.
-#include "fixtures.hpp"
+#include "free_fsm.hpp"
 
 namespace mauve::testing {
 namespace {
-
-using Define = std::function<void(class FreeFsm&)>;
-
-/// A machine whose definition the test gives.
-class FreeFsm : public Fsm<TestShell, TestCore> {
- public:
-  explicit FreeFsm(Define how) : how_(std::move(how)) {}
-  void define() override { how_(*this); }
-  State& run(const std::string& name) { return execution(name, "act", &TestCore::act); }
-  void when_set(State& from, State& to) { transition(from, "is_set", &TestCore::is_set, to); }
-  using FsmBase::next;
-  using FsmBase::set_initial;
-  using FsmBase::wait;
-
- private:
-  Define how_;
-};
-
-time_ns_t period_of(Define how) {
-  FreeFsm fsm(std::move(how));
-  fsm.configure();
-  return fsm.period_ns();
-}
-
-ErrorCode error_of(Define how, std::string* text = nullptr) {
-  try {
-    period_of(std::move(how));
-  } catch (const Error& error) {
-    if (text != nullptr) *text = error.what();
-    return error.code();
-  }
-  return ErrorCode::internal;
-}
 
 TEST(Rule3Period, GuidanceHasOneUnit) {
   constexpr time_ns_t kUnit = ms_to_ns(100);

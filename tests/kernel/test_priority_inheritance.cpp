@@ -88,6 +88,7 @@ TEST_F(Contention, IsTracedWithItsHolder) {
   mutex.set_trace_id(TraceNames::intern("contended_mutex"));
   Component& component = add("c", 1);
   std::atomic<bool> ask{false};
+  const ComponentsEndFirst guard(deployer);
   core(component).work = [&] {
     if (!ask.exchange(false)) return;
     mutex.lock();

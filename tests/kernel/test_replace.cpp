@@ -184,7 +184,7 @@ TEST_F(Rule7Hold, APropertyIsSetInsideTheWaitAndKeepsTheInstant) {
   const StepReport report = deployer.set_property("c", "gain", 2.5);
   EXPECT_EQ(0, report.missed_releases);
   EXPECT_EQ(0, report.phase_nominal_ns);
-  EXPECT_EQ(PropertyValue(2.5), component.property_values()[0]);
+  EXPECT_EQ(PropertyValue(2.5), component.shown().properties[0].value);
   const auto armed = records_of(deployer.drain_trace(), TraceKind::armed);
   ASSERT_EQ(1U, armed.size());
   EXPECT_LT(armed[0].time_ns, armed[0].a) << "released before the pending instant";

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A small package of plug-ins for the executor's tests: a component that counts, in every temper.
+#include <chrono>
+#include <memory>
 #include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "mauve_rt/mauve_rt.hpp"
 
@@ -21,11 +26,23 @@ struct Private {
   double value{};
 };
 
+/// One that cannot be copied as bytes.
+struct Owning {
+  Owning() = default;
+  Owning(const Owning& other) : value(other.value) {}
+  Owning& operator=(const Owning& other) {
+    value = other.value;
+    return *this;
+  }
+  double value{};
+};
+
 }  // namespace executor_tests
 
 MAUVE_TYPE(executor_tests::Number, "std_msgs/msg/Float64", data)
 MAUVE_TYPE(executor_tests::Point, "geometry_msgs/msg/Point", x, y, z)
 MAUVE_TYPE(executor_tests::Private, "executor_tests/Private", value)
+MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
 
 namespace executor_tests {
 
@@ -75,11 +92,38 @@ struct Unready : Counter {
   bool configure_hook() override { throw std::runtime_error("the core is not ready, and never will be"); }
 };
 
-/// Executes for two seconds at a time.
+/// Allocates four times an activation, as careless code does.
+struct Wasteful : Counter {
+  std::unique_ptr<double> number;
+  std::vector<double> row;
+  std::string text;
+  std::unique_ptr<double[]> rows;
+
+  void act() override {
+    number = std::make_unique<double>(count);
+    row = std::vector<double>(100, count);
+    text = std::string(100, 'x');
+    rows = std::make_unique<double[]>(100);
+    Counter::act();
+  }
+};
+
+/// Executes for a second at a time.
 struct Slow : Counter {
   void act() override {
-    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(2);
+    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(1);
     while (mauve::monotonic_now_ns() < until) {
+    }
+  }
+};
+
+/// Executes until it is told a number; says by counting -1 that it does. Tells of a lost message in half a minute.
+struct Held : Counter {
+  void act() override {
+    shell().count.write({-1.0});
+    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(30);
+    while (!shell().set.read().is_new() && mauve::monotonic_now_ns() < until) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
 };
@@ -91,6 +135,28 @@ struct CounterFsm : mauve::Fsm<CounterShell, Counter> {
     set_initial(run);
     next(run, pause);
     next(pause, run);
+  }
+};
+
+/// Waits three times as long.
+struct CalmFsm : mauve::Fsm<CounterShell, Counter> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Counter::act);
+    mauve::State& rest = wait("Rest", 3 * mauve::ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, rest);
+    next(rest, run);
+  }
+};
+
+/// Waits for somebody to set the count.
+struct EventFsm : mauve::Fsm<CounterShell, Counter> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Counter::act);
+    mauve::State& heard = wait_event("Heard", shell().set, mauve::s_to_ns(1), mauve::ms_to_ns(1));
+    set_initial(run);
+    next(run, heard);
+    next(heard, run);
   }
 };
 
@@ -107,6 +173,31 @@ struct LoopFsm : mauve::Fsm<CounterShell, Counter> {
 
 struct OtherShell : mauve::Shell {};
 
+/// A counter's shell by another author: a port less, a property more.
+struct TwinShell : mauve::Shell {
+  mauve::Property<double>& step = property("step", 1.0, {.unit = "1", .minimum = 0.0, .maximum = 10.0});
+  mauve::Property<double>& factor = property("factor", 2.0);
+  mauve::WritePort<Number>& count = write_port<Number>("count");
+};
+
+struct Twin : mauve::Core<TwinShell> {
+  double count = 0.0;
+  void act() {
+    count += shell().step.value() * shell().factor.value();
+    shell().count.write({count});
+  }
+};
+
+struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Twin::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 }  // namespace executor_tests
 
 MAUVE_PLUGINS(registry) {
@@ -115,6 +206,7 @@ MAUVE_PLUGINS(registry) {
   registry.type<Number>();
   registry.type<Point>();
   registry.type<Private>();
+  registry.type<Owning>();
   registry.shell<CounterShell>(shell);
   registry.shell<OtherShell>("executor_tests/OtherShell");
   registry.core<Counter>("executor_tests/Counter", shell);
@@ -122,7 +214,15 @@ MAUVE_PLUGINS(registry) {
   registry.core<Undeclared>("executor_tests/Undeclared", shell);
   registry.core<Reluctant>("executor_tests/Reluctant", shell);
   registry.core<Unready>("executor_tests/Unready", shell);
+  registry.core<Wasteful>("executor_tests/Wasteful", shell);
+  registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);
   registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);
+  registry.fsm<CalmFsm>("executor_tests/CalmFsm", shell);
+  registry.fsm<EventFsm>("executor_tests/EventFsm", shell);
+  const std::string twin = "executor_tests/TwinShell";
+  registry.shell<TwinShell>(twin);
+  registry.core<Twin>("executor_tests/Twin", twin);
+  registry.fsm<TwinFsm>("executor_tests/TwinFsm", twin);
 }

@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # at the end: it
 import machine
 import native
 from ratios import Interval, median_interval, percentile, ratio_interval, verdict
-from rows import compared, exactly_zero, markdown, not_available
+from rows import alone, compared, exactly_zero, markdown, never_over, not_available
 
 
 def test_the_interval_of_equal_values_is_that_value():
@@ -87,6 +87,19 @@ def test_what_must_not_happen_is_judged_by_the_worst_round():
     assert exactly_zero("missed", [0, 0, 0]).verdict == "met"
     row = exactly_zero("missed", [0, 2, 0])
     assert (row.verdict, row.measured) == ("missed", 2)
+
+
+def test_a_bound_is_kept_when_the_worst_round_keeps_it():
+    assert never_over("growth", [3, 5], limit=5, unit="KiB").verdict == "met"
+    row = never_over("growth", [3, 6], limit=5, unit="KiB")
+    assert (row.verdict, row.measured, row.target) == ("missed", 6, "<= 5 KiB")
+
+
+def test_a_row_beside_nothing_is_judged_by_its_interval():
+    assert alone("a", [250.0] * 10, unit="ns", limit=300).verdict == "met"
+    assert alone("a", [250.0] * 9, unit="ns", limit=300).verdict == "undecided"
+    row = alone("a", [350.0] * 10, unit="ns")
+    assert (row.verdict, row.measured, row.reference, row.ratio) == ("reported", 350.0, None, None)
 
 
 def test_a_row_for_machines_has_the_numbers_and_every_round():

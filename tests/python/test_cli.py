@@ -14,6 +14,7 @@ from mauve_msgs.msg import ComponentInfo, ReconfigurationEvent, StepReport
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
+from mauve_rt.model.steps import load_steps
 
 GOOD = """\
 mauve: 1
@@ -31,6 +32,44 @@ def test_arguments_of_the_verbs() -> None:
     assert (args.timeout, args.expected_epoch, args.cause, args.json) == (0.5, 0, "", False)
     for words in (["list", "/e"], ["stop", "/e", "c"], ["start", "/e", "c"], ["events", "/e"], ["nodes"]):
         assert callable(parser.parse_args(words).run)
+
+
+def test_a_transaction_s_steps_are_read_from_yaml() -> None:
+    text = """
+    - {kind: add_resource, target: goal, value: {kind: shared_data, type: geometry_msgs/msg/Point}}
+    - {kind: connect, target: guidance, name: goal, value: goal.read}
+    - {kind: set_property, target: guidance, name: path_step, value: 0.5}
+    - {kind: start, target: guidance}
+    """
+    steps = load_steps("steps.yaml", text=text)
+    assert [step.value for step in steps] == [
+        '{"kind": "shared_data", "type": "geometry_msgs/msg/Point"}',
+        "goal.read",
+        "0.5",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("- {kind: stopp, target: a}", ":1:10: [0].kind: input should be"),
+        ("- {kind: stop}", "[0].target is missing"),
+        ("- {kind: connect, target: a, value: b.c}", "a step of kind 'connect' needs a name"),
+        ("- {kind: add_component, target: a}", "a step of kind 'add_component' needs a value"),
+        ("- {kind: stop, target: a, nmae: b}", "[0].nmae is no known key"),
+        ("kind: stop", "the file: input should be a valid list"),
+        ("[]", "at least 1 item"),
+        ("- {", "not YAML"),
+    ],
+)
+def test_bad_steps_are_refused_before_anybody_is_asked(
+    text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "steps.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert main(["reconfigure", "/e", str(file)]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -92,7 +131,10 @@ def test_reports_and_events_in_words() -> None:
     stop = StepReport(step="stop", blackout_ns=none, phase_actual_ns=none)
     line = "replace_core p/B: prepared in 2 ms, blackout 35 us, missed releases 0, next release "
     line += "woken -1.5 us after its instant"
-    assert views.report_lines([stop, measured]) == [line]
+    assert views.report_lines([measured]) == [line]
+    assert views.report_lines([stop]) == []
+    two = [StepReport(step="stop", component="guidance", blackout_ns=none, phase_actual_ns=none), measured]
+    assert views.report_lines(two) == ["guidance: stop", line]
     event = ReconfigurationEvent(request="stop guidance", requested_by="me", code=4, message="is stopped")
     event.stamp.sec = 12
     assert views.event_line(event) == "12.000 stop guidance by me: refused (4): is stopped"

@@ -211,7 +211,7 @@ def test_stop_writes_the_output_and_start_returns_to_the_grid(deployer: Deployer
 def test_a_core_is_replaced_in_flight_and_goes_on_counting(deployer: Deployer, architecture: Architecture):
     heard = beats(deployer, 3)
     report = deployer.replace_core("metronome", ACCELERANDO)
-    assert (report.step, report.component) == (f"replace_core {ACCELERANDO}", "metronome")
+    assert (report.step, report.component) == (f"replace_core metronome {ACCELERANDO}", "metronome")
     assert (report.from_core, report.to_core) == (METRONOME, ACCELERANDO)
     assert report.blackout_ns > 0
     assert report.phase_nominal_ns == 0
@@ -231,7 +231,7 @@ def test_a_core_that_may_not_be_put_in_is_refused(deployer: Deployer, architectu
 def test_a_property_set_in_flight_is_in_force_and_shown(deployer: Deployer, architecture: Architecture):
     beats(deployer, 1)
     report = deployer.set_property("metronome", "ticks_per_beat", 50)
-    assert report.step.startswith("set_property ticks_per_beat")
+    assert report.step.startswith("set_property metronome.ticks_per_beat")
     assert [item.value for item in describe(architecture).properties] == [1000, 50]
     assert refusal(lambda: deployer.set_property("metronome", "ticks_per_beat", 0)).code == "out_of_range"
     deployer.wait_published(0)

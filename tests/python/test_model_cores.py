@@ -1,4 +1,4 @@
-"""What a core written in Python sees of its shell."""
+"""What a core written in Python sees of a shell in C++."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +8,8 @@ from geometry_msgs.msg import Point
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
-from mauve_rt.cores import Core, Shell
+from mauve_rt.cores import Core
+from mauve_rt.shells import NativeShell
 
 
 class View:
@@ -37,7 +38,7 @@ class View:
         ]
 
     def properties(self) -> list[Any]:
-        return [SimpleNamespace(name="gain")]
+        return [SimpleNamespace(name="gain", value=3.0)]
 
     def clock(self) -> int:
         return 5_000
@@ -48,7 +49,7 @@ class View:
 
 def test_read_gives_value_status_and_age() -> None:
     view = View()
-    shell = Shell(view)
+    shell = NativeShell(view)
     sample = shell.input.read()
     assert (sample.status, sample.is_new, sample.age_ns(9999)) == ("none", False, 0)
     view.status = 2
@@ -61,7 +62,7 @@ def test_read_gives_value_status_and_age() -> None:
 
 def test_write_takes_only_the_port_s_type() -> None:
     view = View()
-    shell = Shell(view)
+    shell = NativeShell(view)
     assert shell.output.write(Point(x=1.5))
     assert deserialize_message(view.written["output"], Point).x == 1.5
     with pytest.raises(TypeError, match="port 'output' takes geometry_msgs/msg/Point, not Float64"):
@@ -69,12 +70,12 @@ def test_write_takes_only_the_port_s_type() -> None:
 
 
 def test_properties_clock_and_period() -> None:
-    shell = Shell(View())
+    shell = NativeShell(View())
     assert (shell.gain.value, shell.clock_ns, shell.period_ns) == (3.0, 5_000, 100)
 
 
 def test_what_the_shell_has_not() -> None:
-    shell = Shell(View())
+    shell = NativeShell(View())
     with pytest.raises(AttributeError, match="no port or property 'inptu'; it has gain, input, output"):
         _ = shell.inptu
     with pytest.raises(
@@ -84,7 +85,7 @@ def test_what_the_shell_has_not() -> None:
 
 
 def test_core_keeps_its_shell() -> None:
-    shell = Shell(View())
+    shell = NativeShell(View())
     core = Core(shell)
     assert core.shell is shell
     assert core.configure() is None

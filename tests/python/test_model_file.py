@@ -29,6 +29,7 @@ connections:
   - [source.count, count.write]
   - [sink.set, count.read]
 """
+TOPIC = "type: std_msgs/msg/Float64,\n          topic: {name: count, direction"
 REGISTRY = PluginRegistry()
 
 # what is replaced, by what; then what stands at the place that the message names, and a part of the message
@@ -163,6 +164,30 @@ BAD = {
         "executor_tests/LoopFsm",
         "Count",
     ),
+    "fallback": (
+        "priority: 40",
+        "fallback: executor_tests/Backwrds",
+        "executor_tests/Backwrds",
+        "core 'executor_tests/Backwrds' is not installed; did you mean executor_tests/Backwards?",
+    ),
+    "fallback for another shell": (
+        "priority: 40",
+        "fallback: executor_tests/Twin",
+        "executor_tests/Twin",
+        "does not fit component 'source': expected one written for shell executor_tests/CounterShell",
+    ),
+    "alternative for another shell": (
+        "[executor_tests/Backwards]",
+        "[executor_tests/TwinFsm]",
+        "executor_tests/TwinFsm",
+        "'executor_tests/TwinFsm' does not fit component 'source'",
+    ),
+    "trace records": (
+        "priority: 40",
+        "trace_records: 1",
+        "1",
+        "bad trace_records of component 'source': expected at least 2, found 1",
+    ),
     "unknown class": (
         "executor_tests/Backwards",
         "executor_tests/Backward",
@@ -197,13 +222,13 @@ BAD = {
         "[executor_tests/Backwards]",
         "all",
         "all",
-        "a list of cores, or the word installed, found 'all'",
+        "a list of cores, fsms and shells, or the word installed, found 'all'",
     ),
     "resource kind": (
         "kind: ring_buffer",
         "kind: ringbuffer",
         "ringbuffer",
-        "expected shared_data, ring_buffer or",
+        "expected shared_data, ring_buffer, latest_value, event or",
     ),
     "ring without capacity": (
         ", capacity: 4",
@@ -222,6 +247,54 @@ BAD = {
         "count: {capacity: 2, kind: shared_data",
         "capacity: 2",
         "only a ring_buffer has one",
+    ),
+    "overwriting latest value": (
+        "count: {kind: shared_data",
+        "count: {overwrite: true, kind: latest_value",
+        "overwrite: true",
+        "of kind latest_value has no overwrite; only a ring_buffer has one",
+    ),
+    "readers of shared data": (
+        "count: {kind: shared_data",
+        "count: {max_readers: 2, kind: shared_data",
+        "max_readers: 2",
+        "only a latest_value has one",
+    ),
+    "no readers": (
+        "count: {kind: shared_data",
+        "count: {max_readers: 0, kind: latest_value",
+        "0",
+        "bad max_readers of resource 'count': expected at least 1, found 0",
+    ),
+    "too many readers": (
+        "count: {kind: shared_data",
+        "count: {max_readers: 1, kind: latest_value",
+        "count.read]",
+        "too many readers of resource 'count' of kind latest_value",
+    ),
+    "second writer": (
+        "count: {kind: shared_data",
+        "count: {kind: latest_value",
+        "count.write]",
+        "a second writer of resource 'count' of kind latest_value; it has one; see line 17, or use",
+    ),
+    "port beside a topic": (
+        f"count: {{kind: shared_data, {TOPIC}: publish",
+        f"count: {{kind: latest_value, {TOPIC}: subscribe",
+        "count.write]",
+        "a second writer of resource 'count' of kind latest_value; it has one; see line 14",
+    ),
+    "latest value of no plain type": (
+        "queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",
+        "queue: {kind: latest_value, type: executor_tests/Owning}",
+        "executor_tests/Owning",
+        "expected a trivially copyable type, found one with a copy constructor of its own; use shared_data",
+    ),
+    "type of an event": (
+        "queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",
+        "queue: {kind: event, type: std_msgs/msg/UInt64}",
+        "type: std_msgs/msg/UInt64",
+        "resource 'queue' of kind event has no type; leave it out",
     ),
     "unknown type": (
         "Float64, capacity",
@@ -291,6 +364,10 @@ def test_bad_file_gets_one_line_with_its_place(case: str, tmp_path: Path, plugin
         text = text.replace(
             "connections:", "  point: {kind: shared_data, type: geometry_msgs/msg/Point}\nconnections:"
         )
+    if case == "too many readers":
+        text += "  - [source.set, count.read]\n"
+    if case == "second writer":
+        text += "  - [sink.count, count.write]\n"
     assert text != GOOD
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, text)
@@ -359,7 +436,26 @@ def test_good_file_is_built_as_written(tmp_path: Path, plugin_prefix: Path) -> N
     assert ports == {"set": ("count", "read"), "count": ("", "")}
 
 
-def test_installed_alternatives_are_all_cores_of_the_shell(tmp_path: Path, plugin_prefix: Path) -> None:
+def test_latest_values_and_events_are_built_as_written(tmp_path: Path, plugin_prefix: Path) -> None:
+    text = GOOD.replace("count: {kind: shared_data", "count: {kind: latest_value, max_readers: 1").replace(
+        "  queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",
+        "  bumped: {kind: event, topic: {name: bumped, direction: publish}}\n"
+        "  asked: {kind: event, topic: {name: asked, direction: subscribe}}\n"
+        "  heard: {kind: latest_value, type: std_msgs/msg/Float64,\n"
+        "          topic: {name: heard, direction: subscribe}}",
+    )
+    resources = {resource.name: resource for resource in _load(tmp_path, text).resources()}
+    assert {name: resource.kind for name, resource in resources.items()} == {
+        "count": "latest_value",
+        "bumped": "event",
+        "asked": "event",
+        "heard": "latest_value",
+    }
+    services = {(service.name, service.kind, service.type) for service in resources["bumped"].services}
+    assert services == {("raise", "event", ""), ("read", "read", "std_msgs/msg/UInt64")}
+
+
+def test_installed_alternatives_are_all_that_is_installed(tmp_path: Path, plugin_prefix: Path) -> None:
     index = plugin_prefix / "share/ament_index/resource_index/mauve_rt_plugins/executor_tests"
     text = index.read_text(encoding="utf-8")
     index.write_text(
@@ -369,8 +465,20 @@ def test_installed_alternatives_are_all_cores_of_the_shell(tmp_path: Path, plugi
         source, _ = _load(tmp_path, GOOD.replace("[executor_tests/Backwards]", "installed")).components()
     finally:
         index.write_text(text, encoding="utf-8")
-    names = ("Backwards", "PyCounter", "Reluctant", "Slow", "Undeclared", "Unready")
-    assert source.alternatives == [f"executor_tests/{name}" for name in names]
+    names = ("Backwards", "Held", "PyCounter", "Reluctant", "Slow", "Undeclared", "Unready")
+    assert {f"executor_tests/{name}" for name in names} <= set(source.alternatives)
+    assert source.core not in source.alternatives
+
+
+def test_alternatives_may_be_fsms_and_shells_and_a_fallback_is_declared(
+    tmp_path: Path, plugin_prefix: Path
+) -> None:
+    names = ("CalmFsm", "TwinShell", "Twin", "TwinFsm")
+    listed = ", ".join(f"executor_tests/{name}" for name in names)
+    text = GOOD.replace("[executor_tests/Backwards]", f"[{listed}], fallback: executor_tests/Backwards")
+    source, _ = _load(tmp_path, text.replace("priority: 40", "trace_records: 64, priority: 40")).components()
+    assert source.alternatives == ["executor_tests/Twin"], "what the kernel takes as cores"
+    assert (source.fallback, source.fell_back) == ("executor_tests/Backwards", False)
 
 
 def test_overrides_of_the_command_line(tmp_path: Path, plugin_prefix: Path) -> None:

@@ -64,7 +64,7 @@ def test_overlay_hides_the_package_below(tmp_path: Path, monkeypatch: pytest.Mon
     assert found is not None
     assert found.target == "new"
     assert index.find("core", "p/Gone") is None
-    assert {"p/Core", "q/Core"} <= set(index.cores_of("p/Shell"))
+    assert {"p/Core", "q/Core"} <= set(index.names("core"))
     assert any(f"{under}/share" in complaint and "nonsense" in complaint for complaint in index.complaints)
     assert prefixes()[:2] == [over, under]
 

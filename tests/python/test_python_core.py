@@ -18,7 +18,7 @@ from mauve_rt._kernel import (
     PluginRegistry,
     monotonic_ns,
 )
-from mauve_rt.cores import Core, Shell
+from mauve_rt.cores import Core, Shell, core_factory
 from mauve_rt.model import load_architecture
 from mauve_rt.model.build import build
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
@@ -167,8 +167,8 @@ def stage(made: list[Counting]) -> Iterator[Stage]:
         loader.require(kind, name)
 
     def factory(core_class: type[Core]) -> Callable[[object], object]:
-        def make(view: object) -> Core:
-            core = core_class(Shell(view))
+        def make(view: object) -> object:
+            core = core_factory(core_class)(view)
             if isinstance(core, Counting):
                 made.append(core)
             return core

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from mauve_examples.mission.evidence import read_robot, replay_coverage
+from mauve_examples.mission.evidence import CoverageHistory, read_robot, replay_coverage
 from mauve_examples.mission.facts import MissionArea, MissionFacts
 from mauve_examples.mission.results import write_results
-from mauve_examples.mission.summary import build_summary
+from mauve_examples.mission.summary import build_summary, failure_reasons
 from mauve_examples.mission.synthetic import (
     ALONE,
     BLACKOUT_NS,
@@ -143,6 +144,15 @@ def test_no_progress_without_the_link_is_a_failure(mission: Mission):
     late = mission.facts.ended_ns + 100 * S
     found = judge(mission, link_down_ns=[(late, late + S)], expected_swaps=False)
     assert found["reasons"] == ["the robots together explored nothing while the link was down"]
+
+
+def test_on_a_map_already_whole_nothing_new_can_be_found(mission: Mission):
+    late = mission.facts.ended_ns + 100 * S
+    facts = replace(mission.facts, link_down_ns=[(late, late + S)], expected_swaps=False)
+    whole = CoverageHistory(
+        time_s=np.array([0.0]), robots={}, union=np.array([1.0]), explored={}, first=np.zeros((1, 1), np.intp)
+    )
+    assert failure_reasons(facts, [], whole, {}) == []
 
 
 def test_a_missing_bag_is_a_reason_not_an_error(mission: Mission, tmp_path: Path):

@@ -1,11 +1,10 @@
 """Real executor processes, and a node of the test's own to talk with them."""
 
-import os
 import random
-import signal
 import subprocess
 import sys
 import time
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-PATIENCE_S = 20.0
+sys.path.insert(0, str(Path(__file__).parent))  # for ros_processes
+
+from ros_processes import PATIENCE_S, ExecutorProcess
+
+from mauve_msgs.msg import ReconfigurationEvent
+from mauve_msgs.srv import Stop
+
 ARCHITECTURE = """\
 mauve: 1
 executor: {namespace: /robot_1}
 components:
   counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
             alternatives: [executor_tests/Backwards, executor_tests/Reluctant, executor_tests/Unready,
-                           executor_tests/PyCounter, executor_tests/Slow],
+                           executor_tests/PyCounter, executor_tests/Held],
             priority: 40, properties: {period_ms: 20}}
   guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
           reconfigurable: false}
@@ -37,54 +42,6 @@ connections:
   - [counter.count, count.write]
   - [counter.set, set.read]
 """
-
-
-class ExecutorProcess:
-    """`ros2 run mauve_rt executor --ros-args ...`, as a process of its own."""
-
-    def __init__(
-        self,
-        folder: Path,
-        environment: dict[str, str],
-        arguments: Sequence[str],
-        *,
-        wrapper: Sequence[str] = (),
-    ) -> None:
-        self._log = folder / f"executor_{time.monotonic_ns()}.log"
-        with self._log.open("w", encoding="utf-8") as log:
-            self.process = subprocess.Popen(
-                [*wrapper, sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
-                env={**os.environ, **environment},
-                stdout=log,
-                stderr=subprocess.STDOUT,
-            )
-
-    @property
-    def output(self) -> str:
-        """Everything it printed."""
-        return self._log.read_text(encoding="utf-8")
-
-    def wait_begun(self) -> None:
-        """Until it handles signals, as threads that block SIGINT show: loading takes a while."""
-        deadline = time.monotonic() + PATIENCE_S
-        mask = 1 << (signal.SIGINT - 1)
-        while not any(blocked & mask for blocked in self._blocked_signals()):
-            assert time.monotonic() < deadline, self.output
-            time.sleep(0.005)
-
-    def _blocked_signals(self) -> list[int]:
-        threads = Path(f"/proc/{self.process.pid}/task").glob("*/status")
-        return [int(thread.read_text("ascii").partition("SigBlk:")[2].split()[0], 16) for thread in threads]
-
-    def wait(self, timeout_s: float = PATIENCE_S) -> int:
-        """Its exit status."""
-        return self.process.wait(timeout_s)
-
-    def end(self, number: signal.Signals) -> tuple[int, float]:
-        """Send a signal; exit status and the seconds it took to go."""
-        began = time.monotonic()
-        self.process.send_signal(number)
-        return self.wait(), time.monotonic() - began
 
 
 class Graph:
@@ -112,10 +69,19 @@ class Graph:
         return client.call_async(service_type.Request(**fields))
 
     def ask(self, service_type: Any, service: str, **fields: Any) -> Any:
-        """The reply of a service."""
-        future = self.ask_later(service_type, service, **fields)
-        self.spin_until(future.done, f"a reply of {service}")
-        return future.result()
+        """The reply of a service; asked again by the same id while none comes, as `mauve` does."""
+        if "request_id" in service_type.Request.get_fields_and_field_types():
+            fields.setdefault("request_id", str(uuid.uuid4()))
+        futures = [self.ask_later(service_type, service, **fields)]
+        deadline = time.monotonic() + 4.0
+
+        def replied() -> bool:
+            if len(futures) == 1 and time.monotonic() > deadline:
+                futures.append(self.ask_later(service_type, service, **fields))
+            return any(future.done() for future in futures)
+
+        self.spin_until(replied, f"a reply of {service}")
+        return next(future.result() for future in futures if future.done())
 
     def hear(self, message_type: Any, topic: str, qos: QoSProfile | int = 100) -> list[Any]:
         """A list that fills with a topic's messages; returns when a publisher was found."""
@@ -124,6 +90,18 @@ class Graph:
         self.spin_until(lambda: self.node.count_publishers(topic) > 0, f"a publisher of {topic}")
         assert subscription is not None
         return heard
+
+    def hear_events(self, node: str) -> list[Any]:
+        """An executor's events, from now on: it sends to us for certain, as refused requests have shown."""
+        events = self.hear(ReconfigurationEvent, f"{node}/events")
+        deadline = time.monotonic() + PATIENCE_S
+        while not any(event.cause == "heard?" for event in events):
+            assert time.monotonic() < deadline, "gave up waiting for: events"
+            self.ask(Stop, f"{node}/stop", component="nobody", cause="heard?")
+        self.ask(Stop, f"{node}/stop", component="nobody", cause="the last")
+        self.spin_until(lambda: events[-1].cause == "the last", "the last of them")
+        events.clear()
+        return events
 
     def voice(self, message_type: Any, topic: str) -> Any:
         """A publisher that already has a subscriber."""

@@ -12,6 +12,14 @@ from typing import Any
 import pytest
 
 Mauve = Callable[..., subprocess.CompletedProcess[str]]
+STEPS = """\
+- {kind: add_resource, target: sum, value: {kind: shared_data, type: std_msgs/msg/Float64}}
+- kind: add_component
+  target: second
+  value: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm}
+- {kind: connect, target: second, name: count, value: sum.write}
+- {kind: start, target: second}
+"""
 NODE = "/robot_1/executor"
 
 
@@ -50,6 +58,30 @@ def test_verbs_do_what_they_say(mauve: Mauve) -> None:
     assert json.loads(started.stdout)["success"] is True
     states = {part["name"]: part for part in json.loads(mauve("list", NODE, "--json").stdout)["components"]}
     assert states["counter"]["core"] == "executor_tests/Backwards"
+
+
+def test_a_transaction_is_carried_out_and_reported_step_by_step(mauve: Mauve, tmp_path: Path) -> None:
+    file = tmp_path / "steps.yaml"
+    file.write_text(STEPS, encoding="utf-8")
+    dry = mauve("reconfigure", NODE, str(file), "--dry-run")
+    assert (dry.returncode, dry.stderr) == (0, "")
+    assert dry.stdout.startswith("dry run: 'add_resource sum ")
+    done = mauve("reconfigure", NODE, str(file), "--cause", "a test")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("4 steps are in force; prepared in ")
+    begins = [
+        "add_resource sum: prepared",
+        "second: add_component: prepared",
+        "second: connect count sum.write",
+    ]
+    begins.append("second: start")
+    assert len(lines) == 5
+    for line, begin in zip(lines[1:], begins, strict=True):
+        assert line.startswith(f"  {begin}"), lines
+    again = mauve("reconfigure", NODE, str(file))
+    assert (again.returncode, again.stdout) == (1, "")
+    assert again.stderr.startswith("refused, INVALID (14): step 1 (add_resource sum ")
 
 
 def test_events_are_followed(mauve: Mauve, environment: dict[str, str], tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from mauve_examples.mission.radio import Medium, Radio
+from mauve_examples.mission.medium import Medium
+from mauve_examples.mission.radio import Radio
 from mauve_msgs.msg import PeerMessage
 
 ROBOTS = ["robot_1", "robot_2", "robot_3"]

@@ -17,12 +17,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_processes import PATIENCE_S, wait_for_signals
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus, PeerMessage, SupervisorDecision
 from mauve_msgs.srv import Reconfigure
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.rules import RulesFile
-from mauve_rt.node.supervisor import Supervisor
+from mauve_rt.node.supervisor_node import Supervisor
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
 RULES = f"""\
@@ -34,7 +35,6 @@ rules:
     undo: {{for_s: 0.5, do: [{{kind: replace_core, target: exploration, name: {USUAL}}}]}}
 """
 LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
-PATIENCE_S = 20.0
 
 
 class StandIn:
@@ -231,8 +231,9 @@ def test_bad_input_ends_the_process_with_one_line(arguments: list[str], words: s
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_process_cleanly(rules: Path, number: signal.Signals):
     process = run("-r", "__ns:=/robot_1", "-p", f"rules:={rules}")
-    time.sleep(3.0)
+    wait_for_signals(process.pid)
+    time.sleep(random.uniform(0.0, 2.0))  # noqa: S311  any moment is a good one
     process.send_signal(number)
-    _, errors = process.communicate(timeout=10)
+    _, errors = process.communicate(timeout=20)
     assert process.returncode == 0
     assert "Traceback" not in errors

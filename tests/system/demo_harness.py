@@ -56,6 +56,12 @@ class Demo:
         self.process.send_signal(signal.SIGINT)
         return self.finish(timeout_s=EXIT_RULE_S + SLACK_S)
 
+    def handles_signals(self) -> bool:
+        """Whether it catches SIGTERM, which a bare interpreter does not."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text("ascii")
+        caught = int(status.partition("SigCgt:")[2].split()[0], 16)
+        return bool(caught & 1 << (signal.SIGTERM - 1))
+
     def processes(self) -> dict[int, str]:
         """Process ids and command lines of what lives of this demo, itself included."""
         found = {}

@@ -1,6 +1,7 @@
 """The parts of the demo that need no mission."""
 
 import io
+import signal
 import time
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ signal.signal(signal.SIGINT, signal.SIG_IGN)
 print("ready", flush=True)
 time.sleep(60)
 """
+WILLING = "print('ready', flush=True)\nimport time\ntime.sleep(60)\n"
 
 
 @pytest.fixture
@@ -44,16 +46,26 @@ def wait_for(log: Path, word: str) -> None:
 
 def test_a_process_that_ignores_the_interrupt_is_killed_and_named(modules: Path):
     (modules / "stubborn.py").write_text(STUBBORN, encoding="utf-8")
-    (modules / "willing.py").write_text(
-        "print('ready', flush=True)\nimport time\ntime.sleep(60)\n", encoding="utf-8"
-    )
+    (modules / "willing.py").write_text(WILLING, encoding="utf-8")
     processes = Processes(modules / "log")
     for name in ("stubborn", "willing"):
         processes.start(name, name)
         wait_for(modules / "log" / f"{name}.log", "ready")
     assert processes.ended() is None
-    assert processes.stop(lambda: 1.0) == ["stubborn"]
+    assert processes.stop(lambda: 0.0 if processes.ended() else 60.0) == ["stubborn"]
     assert processes.stop(lambda: 1.0) == []
+
+
+def test_a_process_hears_the_interrupt_though_who_started_it_ignores_it(
+    modules: Path, request: pytest.FixtureRequest
+):
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in a shell's background job
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    (modules / "willing.py").write_text(WILLING, encoding="utf-8")
+    processes = Processes(modules / "log")
+    processes.start("willing", "willing")
+    wait_for(modules / "log" / "willing.log", "ready")
+    assert processes.stop(lambda: 50.0) == []
 
 
 def test_a_process_that_ends_is_told_with_its_last_words(modules: Path):
@@ -138,13 +150,17 @@ def test_the_ending_of_a_failure_says_why_and_what_is_missing():
         "success": False,
         "reasons": ["it rained"],
         "coverage": {"robot_1": 0.5, "union": 0.5},
-        "robots": {"robot_1": {"reconfigurations": [swap | figures]}},
+        "robots": {
+            "robot_1": {"reconfigurations": [swap | figures, swap | {"from": None, "to": None} | figures]}
+        },
         "realtime": {"granted": False, "missing": ["rtprio is 0"]},
+        "simulation": None,
     }
     text = ending(Path("out"), ["   1.0 s  something"], summary)
     assert (
         "robot_1  exploration: Exploration -> Local, prepared in 1500 us, blackout 41 us, 0 releases missed"
         in text
     )
+    assert "robot_1  exploration: changed, prepared" in text
     for words in ("FAILED:\n  it rained", "  rtprio is 0", "robot_1 50%, together 50%", "out/summary.json"):
         assert words in text

@@ -9,35 +9,15 @@
 
 #include "mauve_rt/bounded.hpp"
 #include "mauve_rt/cdr.hpp"
+#include "mauve_rt/elements/types.hpp"
 
 namespace mauve_examples {
 
-struct Point {
-  double x{0.0};
-  double y{0.0};
-  double z{0.0};
-};
-
-struct Pose2D {
-  double x{0.0};
-  double y{0.0};
-  double theta{0.0};
-};
-
-struct Vector3 {
-  double x{0.0};
-  double y{0.0};
-  double z{0.0};
-};
-
-struct Twist {
-  Vector3 linear;
-  Vector3 angular;
-};
-
-struct Bool {
-  bool data{false};
-};
+using mauve::types::Bool;
+using mauve::types::Point;
+using mauve::types::Pose2D;
+using mauve::types::Twist;
+using mauve::types::Vector3;
 
 inline constexpr std::size_t kBeamCount = 360;
 
@@ -113,11 +93,6 @@ struct PeerMessage {
 
 }  // namespace mauve_examples
 
-MAUVE_TYPE(mauve_examples::Point, "geometry_msgs/msg/Point", x, y, z)
-MAUVE_TYPE(mauve_examples::Pose2D, "geometry_msgs/msg/Pose2D", x, y, theta)
-MAUVE_TYPE(mauve_examples::Vector3, "geometry_msgs/msg/Vector3", x, y, z)
-MAUVE_TYPE(mauve_examples::Twist, "geometry_msgs/msg/Twist", linear, angular)
-MAUVE_TYPE(mauve_examples::Bool, "std_msgs/msg/Bool", data)
 MAUVE_TYPE(mauve_examples::Scan, "mauve_examples/Scan", max_range_m, ranges_m)
 MAUVE_TYPE(mauve_examples::MapTile, "mauve_msgs/msg/MapTile", column, row, revision, cells)
 MAUVE_TYPE(mauve_examples::MapUpdate, "mauve_msgs/msg/MapUpdate", stamp_ns, resolution_m, origin_x_m,

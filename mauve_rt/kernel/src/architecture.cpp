@@ -7,22 +7,16 @@
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/plugin.hpp"
 
+#include "lookup.hpp"
+
 namespace mauve {
 
 namespace {
 
-template <typename Items>
-std::vector<std::string> names_of(const Items& items) {
-  std::vector<std::string> names;
-  names.reserve(items.size());
-  for (const auto& item : items) names.push_back(item->name());
-  return names;
-}
-
 template <typename Item>
-Item* find_in(const std::vector<std::unique_ptr<Item>>& items, const std::string& name) {
+std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, const std::string& name) {
   for (const auto& item : items) {
-    if (item->name() == name) return item.get();
+    if (item->name() == name) return item;
   }
   return nullptr;
 }
@@ -36,7 +30,10 @@ void require_new(bool known, const std::string& what, const std::string& name) {
 }  // namespace
 
 Architecture::~Architecture() {
-  for (const auto& component : components_) component->task().end_thread(kForever);
+  for (const auto& component : components_) {
+    component->task().end_thread(kForever);
+    component->task().changes().set_listener(nullptr);
+  }
   cleanup();
 }
 
@@ -48,14 +45,20 @@ PluginRegistry& Architecture::require_registry() const {
 
 Component& Architecture::add_component(const std::string& name, std::unique_ptr<Shell> shell,
                                        std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                                       const TaskSettings& settings) {
-  require_new(find_in(components_, name) != nullptr, "component", name);
-  auto component =
-      std::make_unique<Component>(name, static_cast<std::uint16_t>(components_.size()), changes_);
-  component->set_settings(settings);
-  component->set_parts(std::move(shell), std::move(core), std::move(fsm));
-  components_.push_back(std::move(component));
-  return *components_.back();
+                                       const TaskSettings& settings, Component::FsmFactory make_fsm) {
+  require_new(find_in(components(), name) != nullptr, "component", name);
+  const std::size_t numbers_before = numbers();
+  std::shared_ptr<Component> component = make_unlisted(name);
+  try {
+    component->set_settings(settings);
+  } catch (const Error&) {
+    give_back_numbers(numbers_before);
+    throw;
+  }
+  component->set_parts({.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)},
+                       std::move(make_fsm));
+  change_lists({.added_components = {component}});
+  return *component;
 }
 
 Component& Architecture::add_component(const std::string& name, const std::string& shell,
@@ -63,44 +66,28 @@ Component& Architecture::add_component(const std::string& name, const std::strin
                                        const TaskSettings& settings) {
   const PluginRegistry& registry = require_registry();
   return add_component(name, registry.make_shell(shell), registry.make_core(core), registry.make_fsm(fsm),
-                       settings);
+                       settings, [&registry, fsm] { return registry.make_fsm(fsm); });
 }
 
 void Architecture::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
-  require_new(find_in(resources_, name) != nullptr, "resource", name);
+  require_new(find_in(resources(), name) != nullptr, "resource", name);
   resource->set_name(name);
-  resources_.push_back(std::move(resource));
+  change_lists({.added_resources = {std::move(resource)}});
 }
 
 void Architecture::connect(Component& component, const std::string& port_name, Resource& resource,
                            const std::string& service_name) {
-  PortBase* port = component.shell().find_port(port_name);
-  if (port == nullptr) {
-    throw Error(ErrorCode::unknown_port, "the shell has no such port",
-                {.component = component.name(),
-                 .element = "port " + port_name,
-                 .expected = "one of " + join(names_of(component.shell().ports())),
-                 .found = port_name});
-  }
-  if (port->is_connected()) {
+  PortBase& port = find_port(component.shell(), port_name, component.name());
+  if (port.is_connected()) {
     throw Error(ErrorCode::duplicate_name, "the port is connected already",
                 {.component = component.name(),
                  .element = "port " + port_name,
-                 .found = "a connection to " + port->resource_name() + "." + port->service()->name(),
+                 .found = "a connection to " + port.resource_name() + "." + port.service()->name(),
                  .remedy = "connect each port once"});
   }
-  ServiceBase* service = resource.find_service(service_name);
-  if (service == nullptr) {
-    std::vector<std::string> known;
-    for (const ServiceBase* offered : resource.services()) known.push_back(offered->name());
-    throw Error(ErrorCode::unknown_service, "the resource has no such service",
-                {.component = component.name(),
-                 .element = "connection of " + port_name + " to " + resource.name(),
-                 .expected = "one of " + join(known),
-                 .found = service_name});
-  }
+  ServiceBase& service = find_service(resource, service_name, component.name(), port_name);
   try {
-    port->connect(*service, resource.name());
+    port.connect(service, resource.name());
   } catch (const Error& failure) {
     ErrorDetail detail = failure.detail();
     detail.component = component.name();
@@ -116,27 +103,44 @@ void Architecture::connect(const std::string& component_name, const std::string&
 void Architecture::publish(const std::string& name) {
   Resource& published = resource(name);
   if (!published.is_serializable()) {
-    throw Error(
-        ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
-        {.element = "resource " + name, .expected = "shared_data or ring_buffer", .found = published.kind()});
+    throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
+                {.element = "resource " + name,
+                 .expected = "shared_data, ring_buffer, latest_value or event",
+                 .found = published.kind()});
   }
   published.set_notifier(&publications_);
   published_.push_back({&published, 0});
 }
 
-Component& Architecture::component(const std::string& name) const {
-  if (Component* found = find_in(components_, name)) return *found;
-  throw Error(
-      ErrorCode::unknown_component, "there is no such component",
-      {.element = "component " + name, .expected = "one of " + join(names_of(components_)), .found = name});
+bool Architecture::is_published(const Resource& resource) const noexcept {
+  return std::any_of(published_.begin(), published_.end(),
+                     [&resource](const Published& published) { return published.resource == &resource; });
 }
 
-Resource& Architecture::resource(const std::string& name) const {
-  if (Resource* found = find_in(resources_, name)) return *found;
-  throw Error(
-      ErrorCode::unknown_resource, "there is no such resource",
-      {.element = "resource " + name, .expected = "one of " + join(names_of(resources_)), .found = name});
+std::vector<std::shared_ptr<Component>> Architecture::components() const {
+  const std::lock_guard lock(list_mutex_);
+  return components_;
 }
+
+std::vector<std::shared_ptr<Resource>> Architecture::resources() const {
+  const std::lock_guard lock(list_mutex_);
+  return resources_;
+}
+
+std::shared_ptr<Component> Architecture::hold_component(const std::string& name) const {
+  const auto present = components();
+  if (auto found = find_in(present, name)) return found;
+  throw_no_component(name, present);
+}
+
+std::shared_ptr<Resource> Architecture::hold_resource(const std::string& name) const {
+  const auto present = resources();
+  if (auto found = find_in(present, name)) return found;
+  throw_no_resource(name, present);
+}
+
+Component& Architecture::component(const std::string& name) const { return *hold_component(name); }
+Resource& Architecture::resource(const std::string& name) const { return *hold_resource(name); }
 
 std::unique_ptr<CoreBase> Architecture::make_core(const std::string& implementation) const {
   return require_registry().make_core(implementation);
@@ -164,7 +168,7 @@ bool Architecture::configure_hook() {
 }
 
 void Architecture::check_cleanup() const {
-  for (const auto& component : components_) {
+  for (const auto& component : components()) {
     if (component->task().is_parked()) continue;
     throw Error(ErrorCode::already_running, "the component still executes a state",
                 {.component = component->name(),

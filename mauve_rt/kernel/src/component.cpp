@@ -6,54 +6,13 @@
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
 
+#include "lookup.hpp"
+
 namespace mauve {
 
 namespace {
 
 constexpr time_ns_t kShortestUndeclaredPeriod = us_to_ns(100);
-
-/// Puts a prepared core in the old one's place.
-class CoreSwap final : public CommitAction {
- public:
-  CoreSwap(std::unique_ptr<CoreBase>& place, CoreBinding& binding, std::unique_ptr<CoreBase>& fresh,
-           CoreBinding& fresh_binding)
-      : place_(place),
-        binding_(binding),
-        fresh_(fresh),
-        fresh_binding_(fresh_binding),
-        trace_id_(TraceNames::intern("replace_core " + fresh->implementation())) {}
-
-  bool adopt() override { return fresh_->adopt(*place_); }
-  void take() noexcept override {
-    fresh_->take(*place_);
-    std::swap(place_, fresh_);
-    std::swap(binding_, fresh_binding_);
-  }
-  time_ns_t budget_ns() const noexcept override { return fresh_->budget_ns(); }
-  std::uint32_t trace_id() const noexcept override { return trace_id_; }
-
- private:
-  std::unique_ptr<CoreBase>& place_;
-  CoreBinding& binding_;
-  std::unique_ptr<CoreBase>& fresh_;
-  CoreBinding& fresh_binding_;
-  std::uint32_t trace_id_;
-};
-
-class PropertySwap final : public CommitAction {
- public:
-  PropertySwap(PropertyBase& property, PropertyValue& value)
-      : property_(property),
-        value_(value),
-        trace_id_(TraceNames::intern("set_property " + property.name())) {}
-  void take() noexcept override { property_.swap(value_); }
-  std::uint32_t trace_id() const noexcept override { return trace_id_; }
-
- private:
-  PropertyBase& property_;
-  PropertyValue& value_;
-  std::uint32_t trace_id_;
-};
 
 }  // namespace
 
@@ -65,38 +24,48 @@ Component::~Component() {
   cleanup();
 }
 
-void Component::set_parts(std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core,
-                          std::unique_ptr<FsmBase> fsm) {
-  shell_ = std::move(shell);
-  core_ = std::move(core);
-  fsm_ = std::move(fsm);
-  shell_->set_context(&task_.context());
-  declared_core_ = core_->implementation();
-  for (const auto& property : shell_->properties()) shown_properties_.push_back(property->boxed());
-  show_core();
+void Component::set_parts(Parts parts, FsmFactory make_fsm) {
+  parts_ = std::move(parts);
+  make_fsm_ = std::move(make_fsm);
+  parts_.shell->set_context(&task_.context());
+  declared_core_ = parts_.core->implementation();
+  core_name_.store(TraceNames::intern(declared_core_), std::memory_order_relaxed);
+  show();
 }
 
-std::string Component::core_implementation() const {
-  const std::lock_guard lock(shown_mutex_);
-  return shown_core_;
+void Component::set_fallback(std::unique_ptr<CoreBase> core) {
+  fallback_name_ = core->implementation();
+  fallback_core_ = std::move(core);
 }
 
-std::vector<PropertyValue> Component::property_values() const {
+ShownParts Component::shown() const {
   const std::lock_guard lock(shown_mutex_);
-  return shown_properties_;
+  ShownParts shown = shown_;
+  shown.core = TraceNames::word(core_name_.load(std::memory_order_relaxed));
+  return shown;
 }
 
-void Component::show_core() {
+std::shared_ptr<const StateTimes> Component::state_times() const {
   const std::lock_guard lock(shown_mutex_);
-  shown_core_ = core_->implementation();
+  return shown_times_;
 }
 
-void Component::show_property(const PropertyBase& property, PropertyValue value) {
-  const auto& all = shell_->properties();
-  const auto place =
-      std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.get() == &property; });
+void Component::show() {
+  ShownParts now{.shell = parts_.shell->implementation(),
+                 .core = {},  // by name only: a fallback may take its place at any moment
+                 .fsm = parts_.fsm->implementation(),
+                 .ports = {},
+                 .properties = {}};
+  for (const auto& port : parts_.shell->ports()) {
+    const ServiceBase* service = port->service();
+    now.ports.push_back({port->name(), port->kind(), port->type(), port->resource_name(),
+                         service == nullptr ? "" : service->name()});
+  }
+  for (const auto& property : parts_.shell->properties())
+    now.properties.push_back({property->name(), property->boxed(), property->options()});
   const std::lock_guard lock(shown_mutex_);
-  shown_properties_[static_cast<std::size_t>(place - all.begin())] = std::move(value);
+  shown_ = std::move(now);
+  shown_times_ = parts_.fsm->times();
 }
 
 void Component::set_settings(const TaskSettings& settings) {
@@ -121,11 +90,14 @@ void Component::allow(std::vector<std::string> alternatives, bool reconfigurable
   reconfigurable_ = reconfigurable;
 }
 
+void Component::check_reconfigurable() const {
+  if (reconfigurable_) return;
+  throw Error(ErrorCode::not_reconfigurable, "the component is protected (reconfigurable: false)",
+              {.component = name_, .remedy = "allow it in the architecture file"});
+}
+
 void Component::check_allowed(const std::string& core_implementation) const {
-  if (!reconfigurable_) {
-    throw Error(ErrorCode::not_reconfigurable, "the component is protected (reconfigurable: false)",
-                {.component = name_, .remedy = "allow it in the architecture file"});
-  }
+  check_reconfigurable();
   if (core_implementation == declared_core_ ||
       std::find(alternatives_.begin(), alternatives_.end(), core_implementation) != alternatives_.end()) {
     return;
@@ -140,28 +112,24 @@ void Component::check_allowed(const std::string& core_implementation) const {
                .remedy = "name it among the component's alternatives"});
 }
 
-PropertyBase& Component::require_property(const std::string& name) {
-  if (PropertyBase* property = shell_->find_property(name)) return *property;
-  std::vector<std::string> known;
-  for (const auto& property : shell_->properties()) known.push_back(property->name());
-  throw Error(ErrorCode::unknown_property, "the shell has no such property",
-              {.component = name_,
-               .element = "property " + name,
-               .expected = "one of " + join(known),
-               .found = name});
+PropertyBase& Component::require_property(const std::string& name) const {
+  return find_property(*parts_.shell, name, name_);
+}
+
+PortBase& Component::require_port(const std::string& name) const {
+  return find_port(*parts_.shell, name, name_);
 }
 
 StepReport Component::set_property(const std::string& name, const PropertyValue& value,
                                    const CommitTimeouts& timeouts) {
   const time_ns_t began = monotonic_now_ns();
   PropertyBase& property = require_property(name);
-  PropertyValue checked = property.checked(value);
-  if (is_configured() && !reconfigurable_) check_allowed(core_->implementation());
-  const PropertyValue shown = checked;
-  PropertySwap swap(property, checked);
+  const PropertyValue checked = property.checked(value);
+  if (is_configured()) check_reconfigurable();
+  PropertyChange change(property, checked);
   const time_ns_t prepared = monotonic_now_ns();
-  StepReport report = run_commit(swap, timeouts, [&] { show_property(property, shown); });
-  report.step = "set_property " + name + " " + to_string(shown);
+  StepReport report = run_commit(change, timeouts, {});
+  report.step = "set_property " + name + " " + to_string(checked);
   report.prepare_ns = prepared - began;
   return report;
 }
@@ -177,36 +145,39 @@ void Component::require_parked(const std::string& what) const {
 
 void Component::cleanup_core() {
   require_parked("cleanup_core");
-  core_->cleanup();
+  parts_.core->cleanup();
 }
 
 void Component::replace_core(std::unique_ptr<CoreBase> core) {
   require_parked("replace_core");
-  core_->cleanup();
-  std::swap(core_, core);
-  show_core();
+  parts_.core->cleanup();
+  std::swap(parts_.core, core);
+  core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
+  show();
 }
 
 void Component::configure_core() {
   require_parked("configure_core");
-  prepare(*core_, binding_);
+  bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
 }
 
-void Component::prepare(CoreBase& core, CoreBinding& binding) {
-  if (!core.bind_shell(*shell_)) {
-    throw Error(ErrorCode::type_mismatch, "the core was written for another shell",
-                {.component = name_,
-                 .element = core.description(),
-                 .expected = "a core for " + shell_->description()});
+void Component::bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding) {
+  if (!core.bind_shell(shell)) {
+    throw Error(
+        ErrorCode::type_mismatch, "the core was written for another shell",
+        {.component = name_, .element = core.description(), .expected = "a core for " + shell.description()});
   }
   core.set_context(&task_.context());
-  binding = fsm_->bind_core(core);
-  if (binding.object == nullptr && binding.dynamic == nullptr) {
-    throw Error(
-        ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
-        {.component = name_, .element = core.description(), .expected = "a core for " + fsm_->description()});
-  }
+  binding = require_binding(core, fsm);
   core.configure();
+}
+
+CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const {
+  CoreBinding binding = fsm.bind_core(core);
+  if (binding.is_bound()) return binding;
+  throw Error(
+      ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
+      {.component = name_, .element = core.description(), .expected = "a core for " + fsm.description()});
 }
 
 StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts,
@@ -215,28 +186,12 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
     throw Error(ErrorCode::not_configured, "the component is not configured", {.component = name_});
   }
   const time_ns_t began = monotonic_now_ns();
-  CoreBinding binding;
-  const std::string from = core_->implementation();
+  const std::string from = core_implementation();
   const std::string to = core->implementation();
-  try {
-    prepare(*core, binding);
-  } catch (const std::exception& failure) {
-    throw Error(ErrorCode::prepare_failed, failure.what(),
-                {.component = name_, .element = core->description(), .remedy = "the old core goes on"});
-  }
+  PartsChange change(*this, {.shell = {}, .core = std::move(core), .fsm = {}});
+  change.prepare();
   const time_ns_t prepared = monotonic_now_ns();
-  CoreSwap swap(core_, binding_, core, binding);
-  StepReport report;
-  try {
-    report = run_commit(swap, timeouts, [&] {
-      show_core();
-      if (committed) committed();
-    });
-  } catch (...) {
-    core->cleanup();
-    throw;
-  }
-  core->cleanup();  // the old one by now: retire
+  StepReport report = run_commit(change, timeouts, committed);
   report.step = "replace_core " + to;
   report.from_core = from;
   report.to_core = to;
@@ -246,10 +201,12 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
 
 StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& timeouts,
                                  const std::function<void()>& committed) {
-  Commit commit(action);
+  Commit commit(1, {&action});
+  Participant& place = commit.participants().front();
+  place.task = &task_;
   bool made = false;
   try {
-    made = task_.commit(commit, timeouts.commit_ns);
+    made = carry_out(commit, timeouts.commit_ns, nullptr);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& refusal) {
@@ -260,24 +217,39 @@ StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& tim
     throw Error(ErrorCode::adopt_refused, "adopt refused the old core's state",
                 {.component = name_, .remedy = "the old core goes on"});
   }
-  committed();
+  show();
+  if (committed) committed();
   task_.signal_change();
+  return report_of(place, timeouts.phase_ns);
+}
+
+StepReport report_of(Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
-  report.component = name_;
-  report.blackout_ns = commit.armed_ns - commit.parked_ns;
-  if (commit.pending_ns == 0) return report;
-  report.phase_nominal_ns = task_.grid().phase_error(commit.pending_ns);
-  if (task_.wait_release(commit, monotonic_now_ns() + timeouts.phase_ns)) {
-    report.phase_nominal_ns = task_.grid().phase_error(commit.release_nominal_ns);
-    report.phase_actual_ns = report.phase_nominal_ns + commit.release_actual_ns - commit.release_nominal_ns;
-    report.missed_releases = (commit.release_nominal_ns - commit.pending_ns) / task_.grid().period_ns;
-  }
+  report.component = place.task->name();
+  report.blackout_ns = place.armed_ns - place.parked_ns;
+  const Grid& grid = place.task->grid();
+  if (place.pending_ns == 0 || place.afterwards == Afterwards::stop) return report;
+  report.phase_nominal_ns = grid.phase_error(place.pending_ns);
+  if (!place.task->wait_release(place, monotonic_now_ns() + phase_timeout_ns)) return report;
+  report.phase_nominal_ns = grid.phase_error(place.release_nominal_ns);
+  report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
+  if (grid.period_ns != 0)
+    report.missed_releases = (place.release_nominal_ns - place.pending_ns) / grid.period_ns;
   return report;
 }
 
-void Component::settle_period() {
+time_ns_t Component::settled_period_ns(const FsmBase& fsm) const {
   const time_ns_t declared = task_.settings().period_ns;
-  const time_ns_t found = fsm_->period_ns();
+  const time_ns_t found = fsm.period_ns();
+  if (fsm.is_sporadic()) {
+    if (declared == 0) return 0;
+    throw Error(ErrorCode::bad_period, "an fsm that waits for events has no period",
+                {.component = name_,
+                 .element = "period_ns",
+                 .expected = "none",
+                 .found = std::to_string(declared),
+                 .remedy = "declare none"});
+  }
   if (declared != 0 && found % declared != 0) {
     throw Error(ErrorCode::bad_period, "the fsm has a cycle that is no multiple of the declared period",
                 {.component = name_,
@@ -294,22 +266,27 @@ void Component::settle_period() {
                  .found = std::to_string(found) + " ns",
                  .remedy = "declare period_ns if it is meant, or make the waits multiples of a longer one"});
   }
-  task_.context().period_ns = declared != 0 ? declared : found;
+  return declared != 0 ? declared : found;
+}
+
+void Component::bind_fsm(FsmBase& fsm, Shell& shell) const {
+  if (!fsm.bind_shell(shell)) {
+    throw Error(
+        ErrorCode::type_mismatch, "the fsm was written for another shell",
+        {.component = name_, .element = fsm.description(), .expected = "an fsm for " + shell.description()});
+  }
 }
 
 bool Component::configure_hook() {
   require_parked("configure");
-  if (!fsm_->bind_shell(*shell_)) {
-    throw Error(ErrorCode::type_mismatch, "the fsm was written for another shell",
-                {.component = name_,
-                 .element = fsm_->description(),
-                 .expected = "an fsm for " + shell_->description()});
-  }
+  bind_fsm(*parts_.fsm, *parts_.shell);
+  time_ns_t period_ns = 0;
   try {
-    shell_->configure();
-    fsm_->configure();
-    settle_period();
-    prepare(*core_, binding_);
+    parts_.shell->configure();
+    parts_.fsm->configure();
+    period_ns = settled_period_ns(*parts_.fsm);
+    bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+    prepare_fallback();
   } catch (const Error& failure) {
     cleanup_hook();
     if (!failure.detail().component.empty()) throw;
@@ -320,19 +297,71 @@ bool Component::configure_hook() {
     cleanup_hook();
     throw;
   }
-  for (const auto& port : shell_->ports()) port->reopen();
+  for (const auto& port : parts_.shell->ports()) port->reopen();
   task_.clear_fault();
-  task_.set_machine(*shell_, *fsm_, &binding_);
+  task_.set_machine(*parts_.shell, *parts_.fsm, &binding_, period_ns);
+  update_listening(*parts_.fsm);
+  show();
   task_.set_state(ComponentState::stopped);
   return true;
+}
+
+/// The fallback is ready with the component: at the time of a fault nothing is left to be built.
+void Component::prepare_fallback() {
+  if (fallback_core_ == nullptr) return;
+  fallback_ =
+      std::make_unique<PartsChange>(*this, Parts{.shell = {}, .core = std::move(fallback_core_), .fsm = {}});
+  fallback_->start_afresh();
+  spare_ = fallback_->core();
+  fallback_->prepare();
+  task_.set_fallback(fallback_.get());
+}
+
+void Component::check_fallback(const Shell& shell, const FsmBase& fsm) const {
+  if (spare_ == nullptr) return;
+  if (spare_->accepts(shell) && fsm.bind_core(*spare_).is_bound()) return;
+  throw Error(ErrorCode::type_mismatch, "the fallback core would not suit the new parts",
+              {.component = name_,
+               .element = "fallback " + fallback_name_,
+               .expected = "a core for " + shell.description() + " and " + fsm.description(),
+               .remedy = "remove the component and add one with another fallback, in one transaction"});
+}
+
+void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
+  task_.set_fallback(nullptr);
+  spare_ = nullptr;
+  if (fallback_ != nullptr && !fallback_->was_taken()) out = fallback_->give_back_core();
+  fallback_.reset();
+  if (out == nullptr || fallback_name_.empty() || out->implementation() != fallback_name_) return;
+  out->cleanup();
+  fallback_core_ = std::move(out);
+  prepare_fallback();
+}
+
+void Component::update_listening(const FsmBase& fsm) {
+  for (const auto& state : fsm.states()) {
+    if (state->event == nullptr) continue;
+    state->event->set_task(task_);
+    state->event->listen();
+  }
 }
 
 void Component::check_cleanup() const { require_parked("cleanup"); }
 
 void Component::cleanup_hook() {
-  core_->cleanup();
-  fsm_->cleanup();
-  shell_->cleanup();
+  task_.set_fallback(nullptr);
+  spare_ = nullptr;
+  if (fallback_ != nullptr) {
+    // After a fault the declared core is the one that is out: it gets another chance.
+    fallback_core_ = fallback_->give_back_core();
+    if (fallback_->was_taken()) std::swap(fallback_core_, parts_.core);
+    core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
+    fallback_.reset();
+    fallback_core_->cleanup();
+  }
+  parts_.core->cleanup();
+  parts_.fsm->cleanup();
+  parts_.shell->cleanup();
   task_.set_state(ComponentState::unconfigured);
 }
 

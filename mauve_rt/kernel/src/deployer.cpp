@@ -10,8 +10,6 @@ namespace mauve {
 
 namespace {
 
-constexpr time_ns_t kShortestLead = ms_to_ns(20);
-constexpr time_ns_t kLeadPerComponent = ms_to_ns(1);
 constexpr time_ns_t kWatchPeriod = ms_to_ns(5);
 constexpr time_ns_t kStopTimeout = ms_to_ns(500);
 constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
@@ -57,18 +55,18 @@ void Deployer::prepare_process() {
 }
 
 void Deployer::deploy() {
-  const std::lock_guard lock(command_mutex_);
+  const std::lock_guard lock(structure_mutex_);
   if (deployed_) throw Error(ErrorCode::already_running, "the architecture is deployed already");
   if (!architecture_.is_configured()) {
     throw Error(ErrorCode::not_configured, "the architecture is not configured",
                 {.remedy = "call configure() first"});
   }
   prepare_process();
-  const auto& components = architecture_.components();
+  const auto components = architecture_.components();
   barrier_ = std::make_unique<Barrier>(components.size() + 1);
   try {
     for (const auto& component : components) {
-      component->task().create_thread(barrier_->get(), options_.require_realtime, options_.trace);
+      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace);
       barrier_->created_one();
     }
   } catch (...) {
@@ -77,15 +75,14 @@ void Deployer::deploy() {
     throw;
   }
   barrier_->arrive();
+  conductor_ = std::make_unique<Conductor>();
 
   // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
-  const auto count = static_cast<time_ns_t>(components.size());
-  epoch_ns_ = monotonic_now_ns() + std::max(kShortestLead, kLeadPerComponent * count);
+  const time_ns_t epoch_ns = monotonic_now_ns() + deployment_lead_ns(components.size());
+  architecture_.set_deployment_epoch(epoch_ns);
   for (const auto& component : components) {
     Task& task = component->task();
-    const time_ns_t first = epoch_ns_ + task.settings().offset_ns;
-    task.set_grid({.reference_ns = first, .period_ns = task.context().period_ns});
-    task.start_at(first);
+    task.start_at(task.join(epoch_ns));
   }
   for (const auto& component : components) component->task().wait_started();
   deployed_ = true;
@@ -94,13 +91,14 @@ void Deployer::deploy() {
 }
 
 void Deployer::shutdown() noexcept {
-  const std::lock_guard lock(command_mutex_);
+  const std::lock_guard lock(structure_mutex_);
   if (!deployed_) return;
+  deployed_ = false;  // nobody starts anything from here on
   watchdog_stop_.store(1, std::memory_order_release);
   futex_wake_all(watchdog_stop_);
   watchdog_.join();
   const time_ns_t stopped_by = monotonic_now_ns() + kStopTimeout;  // all of them together
-  const auto& components = architecture_.components();
+  const auto components = architecture_.components();
   for (auto component = components.rbegin(); component != components.rend(); ++component) {
     try {
       if ((*component)->task().state() != ComponentState::running) continue;
@@ -110,7 +108,7 @@ void Deployer::shutdown() noexcept {
   }
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : components) component->task().end_thread(until);
-  deployed_ = false;
+  conductor_.reset();
   architecture_.changes().bump();
 }
 
@@ -129,48 +127,58 @@ void Deployer::require_deployed() const {
 }
 
 void Deployer::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
-  const std::lock_guard lock(command_mutex_);
   require_deployed();
-  architecture_.component(component).task().start(clock_ns);
+  architecture_.hold_component(component)->task().start(clock_ns);
 }
 
 void Deployer::stop(const std::string& component, time_ns_t timeout_ns) {
-  const std::lock_guard lock(command_mutex_);
   require_deployed();
-  architecture_.component(component).task().stop(timeout_ns);
+  architecture_.hold_component(component)->task().stop(timeout_ns);
 }
 
 time_ns_t Deployer::get_time(const std::string& component) const {
-  return architecture_.component(component).task().get_time();
+  return architecture_.hold_component(component)->task().get_time();
 }
 
-StepReport Deployer::replace_core(const std::string& component_name, const std::string& core,
+TransactionHost Deployer::host() {
+  return {.deployed = deployed_,
+          .conductor = conductor_.get(),
+          .attach =
+              [this](Task& task) { task.create_thread(nullptr, options_.require_realtime, options_.trace); },
+          .detach = [](Task& task) { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }};
+}
+
+TransactionReport Deployer::commit(Transaction transaction, const TransactionOptions& options) {
+  std::unique_lock lock(structure_mutex_);
+  TransactionCommit work(architecture_, host(), options);
+  work.make(std::move(transaction));
+  lock.unlock();  // waiting for the releases that follow keeps nobody else from the deployer
+  return work.report();
+}
+
+StepReport Deployer::commit_one(Transaction transaction, const CommitTimeouts& timeouts) {
+  try {
+    return commit(std::move(transaction), {.timeouts = timeouts}).steps.front();
+  } catch (const Error& failure) {  // who asked for one thing needs no number for it
+    ErrorDetail detail = failure.detail();
+    detail.step = 0;
+    detail.step_name.clear();
+    throw Error(failure.code(), failure.statement(), detail);
+  }
+}
+
+StepReport Deployer::replace_core(const std::string& component, const std::string& core,
                                   const CommitTimeouts& timeouts) {
-  std::unique_lock lock(command_mutex_);
-  Component& component = architecture_.component(component_name);
-  std::unique_ptr<CoreBase> fresh = architecture_.make_core(core);
-  component.check_allowed(core);
-  // Waiting for the release that follows keeps nobody else from the deployer.
-  return component.swap_core(std::move(fresh), timeouts, [&lock] { lock.unlock(); });
+  Transaction transaction;
+  transaction.replace_core(component, core);
+  return commit_one(std::move(transaction), timeouts);
 }
 
 StepReport Deployer::set_property(const std::string& component, const std::string& name,
                                   const PropertyValue& value, const CommitTimeouts& timeouts) {
-  const std::lock_guard lock(command_mutex_);
-  return architecture_.component(component).set_property(name, value, timeouts);
-}
-
-TraceDrain Deployer::drain_trace() {
-  TraceDrain drain;
-  for (const auto& component : architecture_.components()) {
-    TraceRing& ring = *component->task().ring();
-    ring.drain(drain.records);
-    drain.written.push_back(ring.offered());
-    drain.dropped.push_back(ring.dropped());
-  }
-  drain.monotonic_ns = monotonic_now_ns();
-  drain.realtime_ns = realtime_now_ns();
-  return drain;
+  Transaction transaction;
+  transaction.set_property(component, name, value);
+  return commit_one(std::move(transaction), timeouts);
 }
 
 std::uint32_t Deployer::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept {

@@ -7,6 +7,10 @@ namespace {
 
 std::string one_line(const std::string& what, const ErrorDetail& detail) {
   std::string line;
+  if (detail.step != 0) {
+    line += "step " + std::to_string(detail.step);
+    line += (detail.step_name.empty() ? "" : " (" + detail.step_name + ")") + ": ";
+  }
   if (!detail.component.empty()) line += "component '" + detail.component + "': ";
   if (!detail.element.empty()) line += detail.element + ": ";
   line += what;
@@ -72,6 +76,8 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "prepare_failed";
     case ErrorCode::timeout:
       return "timeout";
+    case ErrorCode::wrong_epoch:
+      return "wrong_epoch";
     case ErrorCode::realtime_denied:
       return "realtime_denied";
     case ErrorCode::plugin:

@@ -124,7 +124,14 @@ State& FsmBase::add_state(std::string name) {
   states_.push_back(std::make_unique<State>());
   states_.back()->trace_id = TraceNames::intern(name);
   states_.back()->name = std::move(name);
+  states_.back()->index = states_.size() - 1;
   return *states_.back();
+}
+
+State& FsmBase::add_execution(std::string name) {
+  State& state = add_state(std::move(name));
+  state.execution_time = &times_->emplace_back(state.name).time;
+  return state;
 }
 
 State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
@@ -136,6 +143,27 @@ State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
   State& state = add_state(std::move(name));
   state.is_wait = true;
   state.duration_ns = duration_ns;
+  return state;
+}
+
+State& FsmBase::wait_event(std::string name, PortBase& port, time_ns_t timeout_ns,
+                           time_ns_t min_interarrival_ns) {
+  if (port.kind() != PortKind::read) {
+    throw Error(ErrorCode::bad_fsm, "an event wait needs a port that reads",
+                {.element = "state " + name,
+                 .expected = "a read port",
+                 .found = "the " + std::string(to_string(port.kind())) + " port " + port.name()});
+  }
+  if (min_interarrival_ns <= 0 || timeout_ns < min_interarrival_ns) {
+    throw Error(ErrorCode::bad_fsm, "an event wait's times do not fit",
+                {.element = "state " + name,
+                 .expected = "0 < min_interarrival_ns <= timeout_ns",
+                 .found = "min_interarrival_ns " + std::to_string(min_interarrival_ns) + ", timeout_ns " +
+                          std::to_string(timeout_ns)});
+  }
+  State& state = wait(std::move(name), timeout_ns);
+  state.event = std::make_unique<EventInput>(port);
+  state.min_interarrival_ns = min_interarrival_ns;
   return state;
 }
 
@@ -173,15 +201,20 @@ bool FsmBase::configure_hook() {
           {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});
     }
   }
-  period_ns_ = cycle_gcd_ns(*initial_);
+  sporadic_ =
+      std::any_of(states_.begin(), states_.end(), [](const auto& state) { return state->event != nullptr; });
+  const time_ns_t cycles_ns = cycle_gcd_ns(*initial_);  // also refuses loops without a wait
+  period_ns_ = sporadic_ ? 0 : std::gcd(cycles_ns, divisor_ns_);
   return true;
 }
 
 void FsmBase::cleanup_hook() {
   states_.clear();
   methods_.clear();
+  times_ = std::make_shared<StateTimes>();
   initial_ = nullptr;
-  period_ns_ = 0;
+  period_ns_ = divisor_ns_ = 0;
+  sporadic_ = false;
 }
 
 }  // namespace mauve

@@ -10,12 +10,12 @@ namespace mauve {
 
 namespace {
 
-thread_local int held_count = 0;
-
-std::int32_t this_thread_id() noexcept {
-  thread_local const std::int32_t id = gettid();
-  return id;
-}
+/// What a lock needs of its thread, in static thread-local storage: no call to find it.
+struct ThisThread {
+  std::int32_t id{0};  // 0: not asked for yet
+  int held{0};
+};
+__attribute__((tls_model("initial-exec"))) constinit thread_local ThisThread this_thread;
 
 }  // namespace
 
@@ -30,10 +30,15 @@ PiMutex::PiMutex() {
 
 PiMutex::~PiMutex() { pthread_mutex_destroy(&mutex_); }
 
+inline void PiMutex::note_holder() noexcept {
+  if (this_thread.id == 0) this_thread.id = gettid();
+  holder_.store(this_thread.id, std::memory_order_relaxed);  // relaxed: a hint for the trace
+  ++this_thread.held;
+}
+
 void PiMutex::lock() noexcept {
   if (pthread_mutex_trylock(&mutex_) != 0) lock_contended();
-  holder_.store(this_thread_id(), std::memory_order_relaxed);  // relaxed: a hint for the trace
-  ++held_count;
+  note_holder();
 }
 
 void PiMutex::lock_contended() noexcept {
@@ -47,16 +52,15 @@ void PiMutex::lock_contended() noexcept {
 
 bool PiMutex::try_lock() noexcept {
   if (pthread_mutex_trylock(&mutex_) != 0) return false;
-  holder_.store(this_thread_id(), std::memory_order_relaxed);
-  ++held_count;
+  note_holder();
   return true;
 }
 
 void PiMutex::unlock() noexcept {
-  --held_count;
+  --this_thread.held;
   pthread_mutex_unlock(&mutex_);
 }
 
-int PiMutex::held_by_this_thread() noexcept { return held_count; }
+int PiMutex::held_by_this_thread() noexcept { return this_thread.held; }
 
 }  // namespace mauve

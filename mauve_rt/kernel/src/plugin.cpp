@@ -4,6 +4,7 @@
 #include <dlfcn.h>
 
 #include "mauve_rt/error.hpp"
+#include "mauve_rt/event_counter.hpp"
 
 namespace mauve {
 
@@ -31,6 +32,11 @@ void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry
 }
 
 }  // namespace
+
+PluginRegistry::PluginRegistry() {
+  add_resource("event", "", [](const ResourceParameters&) { return std::make_unique<EventCounter>(); });
+  ports_.emplace(type_name<EventCount>(), data_ports<EventCount>());
+}
 
 void PluginRegistry::load_library(const std::string& path) {
   if (libraries_.contains(path)) return;
@@ -83,18 +89,48 @@ std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const
 
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,
                                                         const ResourceParameters& parameters) const {
-  if (kind == "ring_buffer" && parameters.capacity == 0) {
-    throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
-                {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
-  }
   if (const auto found = resources_.find({kind, type}); found != resources_.end())
     return found->second(parameters);
-  const bool known_kind = kind == "shared_data" || kind == "ring_buffer";
-  throw Error(known_kind ? ErrorCode::unknown_type : ErrorCode::unknown_resource,
-              known_kind ? "the data type is not registered" : "there is no such kind of resource",
-              {.element = known_kind ? "type " + type : "kind " + kind,
-               .expected = "one of " + join(names(known_kind ? "type" : "resource")),
-               .found = known_kind ? type : kind,
+  if (kind == "event") {
+    throw Error(ErrorCode::invalid_argument, "an event resource has no type",
+                {.element = "type", .expected = "none", .found = type, .remedy = "leave the type out"});
+  }
+  if (kind == "latest_value" && resources_.contains({"shared_data", type})) {
+    throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",
+                {.element = "type " + type,
+                 .expected = "a trivially copyable type",
+                 .found = "one with a copy constructor of its own",
+                 .remedy = "use shared_data, or bounded members in the type"});
+  }
+  if (kind == "shared_data" || kind == "ring_buffer" || kind == "latest_value") throw_unknown_type(type);
+  throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
+              {.element = "kind " + kind,
+               .expected = "one of " + join(names("resource")),
+               .found = kind,
+               .remedy = "check the name, and that a package registers it among its plug-ins"});
+}
+
+std::unique_ptr<PortBase> PluginRegistry::make_port(PortKind kind, const std::string& type,
+                                                    const std::string& name,
+                                                    const OutputOptions& output) const {
+  if (kind == PortKind::event && type.empty()) return std::make_unique<EventPort>(name);
+  if (kind == PortKind::event || kind == PortKind::call) {
+    throw Error(ErrorCode::invalid_argument, "no such port can be made by name",
+                {.element = "port " + name,
+                 .expected = "read or write with a type, or event without",
+                 .found = std::string(to_string(kind)) + " of " + type,
+                 .remedy = "declare call ports in a C++ shell"});
+  }
+  const auto found = ports_.find(type);
+  if (found == ports_.end()) throw_unknown_type(type);
+  return kind == PortKind::read ? found->second.read(name) : found->second.write(name, output);
+}
+
+void PluginRegistry::throw_unknown_type(const std::string& type) const {
+  throw Error(ErrorCode::unknown_type, "the data type is not registered",
+              {.element = "type " + type,
+               .expected = "one of " + join(names("type")),
+               .found = type,
                .remedy = "check the name, and that a package registers it among its plug-ins"});
 }
 

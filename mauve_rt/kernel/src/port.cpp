@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/port.hpp"
 
+#include <mutex>
+#include <utility>
+
 #include "mauve_rt/error.hpp"
+#include "mauve_rt/resource.hpp"
 
 namespace mauve {
 
@@ -19,27 +23,85 @@ std::string_view to_string(PortKind kind) noexcept {
   return "unknown";
 }
 
-void PortBase::connect(ServiceBase& service, const std::string& resource_name) {
+void ServiceBase::check_ports(std::uint32_t wanted) const {
+  const std::uint32_t most = max_ports();
+  if (most == 0 || wanted <= most) return;
+  const std::string place = (resource_ == nullptr ? "" : resource_->name() + ".") + name_;
+  throw Error(ErrorCode::invalid_argument, "the service takes no more ports",
+              {.element = "service " + place,
+               .expected = "at most " + std::to_string(most) + " port" + (most == 1 ? "" : "s"),
+               .found = std::to_string(wanted),
+               .remedy = kind_ == PortKind::write ? "disconnect the other writer, or use shared_data"
+                                                  : "raise max_readers, or use shared_data"});
+}
+
+void PortBase::check(const ServiceBase& service) const {
+  const auto shown = [](PortKind kind, const std::string& type) {
+    return std::string(to_string(kind)) + (type.empty() ? "" : " of " + type);
+  };
+  const Resource* resource = service.resource();
+  const std::string place = (resource == nullptr ? "" : resource->name() + ".") + service.name();
   if (service.kind() != kind_ || service.type() != type_) {
-    const auto shown = [](PortKind kind, const std::string& type) {
-      return std::string(to_string(kind)) + (type.empty() ? "" : " of " + type);
-    };
-    throw Error(
-        ErrorCode::type_mismatch, "the port does not fit the service",
-        {.element = "port " + name_,
-         .expected = shown(kind_, type_),
-         .found = shown(service.kind(), service.type()) + " at " + resource_name + "." + service.name(),
-         .remedy = "connect it to a service of equal kind and type"});
+    throw Error(ErrorCode::type_mismatch, "the port does not fit the service",
+                {.element = "port " + name_,
+                 .expected = shown(kind_, type_),
+                 .found = shown(service.kind(), service.type()) + " at " + place,
+                 .remedy = "connect it to a service of equal kind and type"});
   }
-  base_ = &service;
-  resource_name_ = resource_name;
-  attach(&service);
+  if (service.representation() != representation()) {
+    throw Error(
+        ErrorCode::type_mismatch, "port and service hold the type in different ways",
+        {.element = "port " + name_,
+         .expected = "a service in " + std::string(representation()),
+         .found = "one in " + std::string(service.representation()) + " at " + place,
+         .remedy = "relay through a shared_data whose type a plug-in library registers; load that library "
+                   "before Python makes ports and resources of the type"});
+  }
+  if (!fits(service)) {
+    throw Error(ErrorCode::type_mismatch, "port and service mean different C++ types by one name",
+                {.element = "port " + name_,
+                 .expected = shown(kind_, type_) + " as the port's library declares it",
+                 .found = "another C++ type of that name at " + place,
+                 .remedy = "let both packages use one declaration of the type, from one header"});
+  }
+}
+
+PortConnection PortBase::prepare(ServiceBase& service, const std::string& resource_name) const {
+  check(service);
+  PortConnection connection{.service = &service, .resource = resource_name};
+  if (kind_ == PortKind::call) connection.trace_id = TraceNames::intern(resource_name + "." + service.name());
+  return connection;
+}
+
+void PortBase::swap(PortConnection& connection) noexcept {
+  attach(connection.service);
+  if (connection_.service != nullptr) connection_.service->remove_port();
+  if (connection.service != nullptr) connection.service->add_port();
+  const std::lock_guard lock(shown_mutex_);
+  std::swap(connection_, connection);
+}
+
+void PortBase::connect(ServiceBase& service, const std::string& resource_name) {
+  PortConnection connection = prepare(service, resource_name);
+  if (&service != connection_.service) service.check_ports(service.ports() + 1);
+  swap(connection);
 }
 
 void PortBase::disconnect() noexcept {
-  base_ = nullptr;
-  resource_name_.clear();
-  attach(nullptr);
+  PortConnection none;
+  swap(none);
+}
+
+ConnectedTo PortBase::connected_to() const {
+  constexpr std::size_t kUsualLength = 64;  // nothing is allocated under the lock then
+  ConnectedTo shown;
+  shown.resource.reserve(kUsualLength);
+  shown.service.reserve(kUsualLength);
+  const std::lock_guard lock(shown_mutex_);
+  if (connection_.service == nullptr) return shown;
+  shown.resource = connection_.resource;
+  shown.service = connection_.service->name();
+  return shown;
 }
 
 }  // namespace mauve

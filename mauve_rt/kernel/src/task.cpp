@@ -12,6 +12,7 @@ namespace mauve {
 
 namespace {
 
+/// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
 
 }  // namespace
@@ -37,33 +38,66 @@ std::string_view to_string(ComponentState state) noexcept {
 void ChangeSignal::bump() noexcept {
   word.fetch_add(1, std::memory_order_release);  // release: who sees the bump sees the change
   futex_wake_all(word);
+  if (ChangeSignal* other = listener.load(std::memory_order_acquire)) other->bump();
 }
 
-Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes, const Clock& clock)
-    : name_(std::move(name)), changes_(changes), clock_(clock), ring_(std::make_unique<TraceRing>(number)) {
-  context_.ring = ring_.get();
-}
+Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
+    : name_(std::move(name)), number_(number), changes_(changes), clock_(&MonotonicClock::instance()) {}
 
 Task::~Task() { end_thread(kForever); }
 
-void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core) noexcept {
+void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
   shell_ = &shell;
   fsm_ = &fsm;
   core_ = core;
+  if (grid_.period_ns != period_ns)
+    grid_.period_ns = period_ns;  // who reports an earlier commit may be reading it
+  context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
 }
 
-void Task::set_grid(const Grid& grid) noexcept { grid_ = grid; }
+time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
+  grid_ = {.reference_ns = epoch_ns + settings_.offset_ns, .period_ns = grid_.period_ns};
+  return grid_.reference_ns;
+}
 
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
 void Task::clear_fault() noexcept {
-  fault_ = {};
+  {
+    const std::lock_guard lock(fault_mutex_);
+    fault_ = {};
+  }
+  fallen_back_.store(false, std::memory_order_release);
   condemned_.store(0, std::memory_order_release);
 }
 
-std::string Task::current_state() const {
-  const State* state = current_.load(std::memory_order_relaxed);
-  return state == nullptr ? "" : state->name;
+Fault Task::fault() const {
+  const std::lock_guard lock(fault_mutex_);
+  return fault_;
+}
+
+std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
+
+void Task::begin_trace(bool trace) {
+  if (!trace) {
+    ring_.reset();
+  } else if (ring_ == nullptr) {
+    ring_ = std::make_unique<TraceRing>(number_, settings_.trace_records);
+  }
+  if (ring_ != nullptr) ring_->set_clock(simulated_ ? clock_ : nullptr);
+}
+
+void Task::simulate(const Clock& clock, bool trace) {
+  simulated_ = true;
+  clock_ = &clock;
+  begin_trace(trace);
+}
+
+void Task::end_simulation() noexcept {
+  if (!simulated_) return;
+  simulated_ = false;
+  clock_ = &MonotonicClock::instance();
+  if (ring_ != nullptr) ring_->set_clock(nullptr);
 }
 
 bool Task::end_thread(time_ns_t until_ns) noexcept {
@@ -75,7 +109,7 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
     if (!futex_wait_until(ended_, 0, until_ns) && ended_.load(std::memory_order_acquire) == 0) return false;
   }
   pthread_join(thread_, nullptr);
-  has_thread_ = false;
+  has_thread_.store(false, std::memory_order_release);
   control_.store(0, std::memory_order_relaxed);  // relaxed: no thread is left to race with
   return true;
 }
@@ -89,6 +123,7 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
   start_at_ns_ = instant_ns;
   // A stop bit that came too late for the last run must not end this one: store, not or.
   control_.store(kStart, std::memory_order_release);
+  if (simulated_) return resume();
   futex_wake_all(control_);
 }
 
@@ -101,19 +136,23 @@ void Task::start(std::optional<time_ns_t> clock_ns) {
       throw Error(ErrorCode::not_configured, "the component is not configured",
                   {.component = name_, .remedy = "configure it first"});
     case ComponentState::faulted:
-      throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault_.what,
+      throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault().what,
                   {.component = name_, .remedy = "clean it up and configure it, then start it"});
     default:
       throw Error(ErrorCode::already_running, "the component is running already",
                   {.component = name_, .expected = "STOPPED", .found = std::string(to_string(state()))});
   }
-  if (!has_thread_) {
+  if (!has_thread_ && !simulated_) {
     throw Error(ErrorCode::not_configured, "the component has no thread",
                 {.component = name_, .remedy = "deploy the architecture first"});
   }
-  const Grid grid{.reference_ns = clock_ns.value_or(grid_.reference_ns), .period_ns = context_.period_ns};
-  post_start(grid.first_not_before(clock_.now_ns() + kStartMargin + 1));
+  post_start(next_instant(clock_ns));
   wait_started();
+}
+
+time_ns_t Task::next_instant(std::optional<time_ns_t> reference_ns) const noexcept {
+  const Grid grid{.reference_ns = reference_ns.value_or(grid_.reference_ns), .period_ns = grid_.period_ns};
+  return grid.first_not_before(clock_->now_ns() + kStartMargin + 1);
 }
 
 void Task::wait_started() noexcept {
@@ -146,84 +185,40 @@ void Task::stop(time_ns_t timeout_ns) {
   }
   changes_.bump();
   control_.fetch_or(kStop, std::memory_order_acq_rel);
+  if (simulated_) resume();
   futex_wake_all(control_);
   const time_ns_t until = monotonic_now_ns() + timeout_ns;
-  constexpr auto kStopping = static_cast<std::uint32_t>(ComponentState::stopping);
-  while (state_.load(std::memory_order_acquire) == kStopping) {
-    if (futex_wait_until(state_, kStopping, until)) continue;
-    if (state_.load(std::memory_order_acquire) != kStopping) break;
+  // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
+  const auto is_going = [](std::uint32_t found) {
+    const auto state = static_cast<ComponentState>(found);
+    return state != ComponentState::stopped && state != ComponentState::faulted;
+  };
+  for (seen = state_.load(std::memory_order_acquire); is_going(seen);
+       seen = state_.load(std::memory_order_acquire)) {
+    if (futex_wait_until(state_, seen, until)) continue;
+    if (!is_going(state_.load(std::memory_order_acquire))) break;
     throw_state_running("the stop stays pending", timeout_ns, "it takes effect when the state ends");
   }
   if (state() == ComponentState::faulted) {
-    throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault_.what,
+    throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault().what,
                 {.component = name_});
   }
-}
-
-bool Task::commit(Commit& commit, time_ns_t timeout_ns) {
-  const std::lock_guard lock(command_mutex_);
-  const ComponentState now = state();
-  if (now == ComponentState::stopping) {
-    throw Error(ErrorCode::timeout, "the component is STOPPING",
-                {.component = name_,
-                 .element = "state " + current_state(),
-                 .remedy = "try again when it has stopped"});
-  }
-  if (now == ComponentState::faulted) {
-    throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault_.what,
-                {.component = name_, .remedy = "clean it up and configure it first"});
-  }
-  if (!has_thread_ || is_parked()) {
-    carry_out(commit, nullptr);
-  } else {
-    commit_budget_ns_.store(commit.action.budget_ns(), std::memory_order_relaxed);
-    commit_.store(&commit, std::memory_order_release);
-    control_.fetch_or(kCommit, std::memory_order_acq_rel);
-    futex_wake_all(control_);
-    const time_ns_t until = monotonic_now_ns() + timeout_ns;
-    while (commit.done.load(std::memory_order_acquire) == 0) {
-      if (futex_wait_until(commit.done, 0, until)) continue;
-      Commit* mine = &commit;
-      if (commit_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) {
-        throw_state_running("the component did not reach a wait in time; nothing was changed", timeout_ns,
-                            "try again, or allow a longer commit timeout");
-      }
-      // Too late to withdraw: the thread has taken it and is done in no time.
-      futex_wait_until(commit.done, 0, kForever);
-    }
-  }
-  if (commit.refusal) std::rethrow_exception(commit.refusal);
-  if (commit.not_running) {
-    throw Error(ErrorCode::faulted, "the component parked before the change: " + fault_.what,
-                {.component = name_});
-  }
-  return commit.committed;
-}
-
-bool Task::wait_release(Commit& commit, time_ns_t until_ns) noexcept {
-  while (commit.released.load(std::memory_order_acquire) == 0) {
-    if (futex_wait_until(commit.released, 0, until_ns)) continue;
-    Commit* mine = &commit;
-    // Out of the slot the thread cannot reach it any more; not in the slot, it is writing it this moment.
-    if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) return false;
-    futex_wait_until(commit.released, 0, kForever);
-  }
-  return commit.released.load(std::memory_order_acquire) == Commit::kReleased;
 }
 
 bool Task::check_execution(time_ns_t now_ns) {
   const time_ns_t began = execution_began_ns_.load(std::memory_order_acquire);
-  const State* state = current_.load(std::memory_order_relaxed);
-  if (began == 0 || state == nullptr || state->max_execution_ns == 0) return false;
-  if (now_ns - began <= state->max_execution_ns) return false;
+  if (began == 0 || now_ns - began <= execution_limit_ns_.load(std::memory_order_relaxed)) return false;
   if (execution_began_ns_.load(std::memory_order_acquire) != began)
-    return false;  // another execution than the state's
+    return false;  // another execution than the limit's
   std::uint32_t nobody = 0;
   if (!condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) return false;
-  fault_ = {.what = "the state ran longer than its declared " +
-                    std::to_string(state->max_execution_ns / 1000) + " us",
-            .where = state->name,
-            .when_ns = now_ns};
+  const time_ns_t limit = execution_limit_ns_.load(std::memory_order_relaxed);
+  {
+    const std::lock_guard lock(fault_mutex_);
+    fault_ = {.what = "the state ran longer than its declared " + std::to_string(limit / 1000) + " us",
+              .where = current_state(),
+              .when_ns = now_ns};
+  }
   const sched_param ordinary{};
   pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
   for (const auto& port : shell_->ports()) port->close();

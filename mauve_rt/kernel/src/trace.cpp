@@ -20,9 +20,9 @@ NameTable& name_table() {
   return table;
 }
 
-thread_local TraceRing* this_threads_ring = nullptr;
-
 }  // namespace
+
+constinit thread_local TraceRing* detail::this_threads_ring = nullptr;
 
 std::uint32_t TraceNames::intern(std::string_view word) {
   NameTable& table = name_table();
@@ -34,6 +34,12 @@ std::uint32_t TraceNames::intern(std::string_view word) {
   return number;
 }
 
+std::string TraceNames::word(std::uint32_t number) {
+  NameTable& table = name_table();
+  const std::lock_guard lock(table.mutex);
+  return number < table.words.size() ? table.words[number] : "";
+}
+
 std::vector<std::string> TraceNames::all() {
   NameTable& table = name_table();
   const std::lock_guard lock(table.mutex);
@@ -41,27 +47,9 @@ std::vector<std::string> TraceNames::all() {
 }
 
 TraceRing::TraceRing(std::uint16_t component, std::size_t capacity)
-    : places_(std::bit_ceil(capacity)), mask_(places_.size() - 1), component_(component) {}
-
-void TraceRing::push_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a, std::int64_t b,
-                        std::int64_t c) noexcept {
-  const std::uint64_t sequence = offered_.load(std::memory_order_relaxed);
-  offered_.store(sequence + 1, std::memory_order_relaxed);
-  const std::uint64_t head = head_.load(std::memory_order_relaxed);  // relaxed: only this thread writes it
-  if (head - tail_.load(std::memory_order_acquire) == places_.size()) {
-    dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    return;
-  }
-  places_[head & mask_] = {.sequence = sequence,
-                           .time_ns = time_ns,
-                           .a = a,
-                           .b = b,
-                           .c = c,
-                           .name = name,
-                           .kind = static_cast<std::uint16_t>(kind),
-                           .component = component_};
-  head_.store(head + 1, std::memory_order_release);
-}
+    : places_(std::make_unique<TraceRecord[]>(std::bit_ceil(capacity))),
+      mask_(std::bit_ceil(capacity) - 1),
+      component_(component) {}
 
 void TraceRing::drain(std::vector<TraceRecord>& into) {
   const std::uint64_t head = head_.load(std::memory_order_acquire);
@@ -69,8 +57,5 @@ void TraceRing::drain(std::vector<TraceRecord>& into) {
   for (; tail != head; ++tail) into.push_back(places_[tail & mask_]);
   tail_.store(tail, std::memory_order_release);
 }
-
-TraceRing* TraceRing::of_this_thread() noexcept { return this_threads_ring; }
-void TraceRing::set_for_this_thread(TraceRing* ring) noexcept { this_threads_ring = ring; }
 
 }  // namespace mauve

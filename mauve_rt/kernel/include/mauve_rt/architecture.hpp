@@ -2,18 +2,54 @@
 // Architecture: components and resources, connected.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/component.hpp"
+#include "mauve_rt/description.hpp"
 #include "mauve_rt/resource.hpp"
 
 namespace mauve {
 
 class PluginRegistry;
 
-/// Components and resources by name. Ordinary threads; one at a time.
+/// What drain_trace() yields; indices are component numbers, removed components included.
+struct TraceDrain {
+  std::vector<TraceRecord> records;
+  std::vector<std::uint64_t> written;
+  std::vector<std::uint64_t> dropped;
+  time_ns_t monotonic_ns{0};
+  time_ns_t realtime_ns{0};
+};
+
+/// From a deployment to its epoch, so that every thread is ready by then (rule 5). [rt]
+constexpr time_ns_t deployment_lead_ns(std::size_t components) noexcept {
+  return std::max(ms_to_ns(20), ms_to_ns(1) * static_cast<time_ns_t>(components));
+}
+
+/// What a transaction puts on and takes off an architecture's lists, and whose looks it changed.
+struct ListChange {
+  std::vector<std::shared_ptr<Component>> added_components{};
+  std::vector<std::shared_ptr<Component>> removed_components{};
+  std::vector<std::shared_ptr<Resource>> added_resources{};
+  std::vector<std::shared_ptr<Resource>> removed_resources{};
+  std::vector<Component*> changed{};
+};
+
+/// Components and resources by name. Ordinary threads. Those that change it: one at a time; those that look at it: any.
+///
+/// | member                          | written by            | read by | under                          |
+/// | ------------------------------- | --------------------- | ------- | ------------------------------ |
+/// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
+/// | published_                      | [setup]               | one     | -                              |
+/// | leaving_                        | who changes it        | same    | -                              |
+/// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
+/// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
 class Architecture final : public Configurable {
  public:
   /// With a registry, parts can be named as well as given by type.
@@ -26,11 +62,12 @@ class Architecture final : public Configurable {
   template <typename ShellType, typename CoreType, typename FsmType>
   Component& add_component(const std::string& name, const TaskSettings& settings = {}) {
     return add_component(name, std::make_unique<ShellType>(), std::make_unique<CoreType>(),
-                         std::make_unique<FsmType>(), settings);
+                         std::make_unique<FsmType>(), settings, [] { return std::make_unique<FsmType>(); });
   }
+  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone.
   Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
                            std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                           const TaskSettings& settings);
+                           const TaskSettings& settings, Component::FsmFactory make_fsm = {});
   /// Adds a component of registered parts. [setup] Throws Error: unknown_shell, unknown_core, unknown_fsm
   /// besides.
   Component& add_component(const std::string& name, const std::string& shell, const std::string& core,
@@ -52,41 +89,99 @@ class Architecture final : public Configurable {
   void connect(const std::string& component, const std::string& port, const std::string& resource,
                const std::string& service);
 
-  /// Marks a resource as bound to an outgoing topic. [setup]
+  /// Marks a resource as bound to an outgoing topic; it cannot be removed then. [setup]
   void publish(const std::string& resource);
+  bool is_published(const Resource& resource) const noexcept;
 
   Component& component(const std::string& name) const;  // Throws Error: unknown_component
   Resource& resource(const std::string& name) const;    // Throws Error: unknown_resource
-  const std::vector<std::unique_ptr<Component>>& components() const noexcept { return components_; }
-  const std::vector<std::unique_ptr<Resource>>& resources() const noexcept { return resources_; }
+  /// The same, kept alive while the caller holds it, whatever is removed meanwhile. [non-rt]
+  std::shared_ptr<Component> hold_component(const std::string& name) const;
+  std::shared_ptr<Resource> hold_resource(const std::string& name) const;
+  /// All there are now, in the order of declaration. [non-rt]
+  std::vector<std::shared_ptr<Component>> components() const;
+  std::vector<std::shared_ptr<Resource>> resources() const;
+
+  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. [non-rt]
+  ArchitectureDescription describe() const;
 
   /// A new, unconfigured core of a registered implementation. Throws Error: unknown_core.
   std::unique_ptr<CoreBase> make_core(const std::string& implementation) const;
+  /// Throws Error (invalid_argument) when there is none.
+  PluginRegistry& require_registry() const;
+  PluginRegistry* registry() const noexcept { return registry_; }
 
   ChangeSignal& changes() noexcept { return changes_; }
+  /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
+  std::uint64_t epoch() const noexcept {
+    return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
+  }
+  /// The instant that all grids are counted from; 0 before deployment. [rt]
+  time_ns_t deployment_epoch_ns() const noexcept {
+    return deployment_epoch_ns_.load(std::memory_order_relaxed);
+  }
+  /// By who deploys: now + deployment_lead_ns(). [non-rt]
+  void set_deployment_epoch(time_ns_t epoch_ns) noexcept {
+    deployment_epoch_ns_.store(epoch_ns, std::memory_order_relaxed);
+  }
+
+  /// Names by the numbers that trace records carry; those of removed components stay. [non-rt]
+  std::vector<std::string> trace_components() const;
+  /// Empties every ring, and what removed components left. [non-rt]
+  TraceDrain drain_trace();
 
   /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one
   /// thread.
   bool next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns);
   Notifier& publications() noexcept { return publications_; }
 
+  // ---- for transactions
+
+  /// A component with a number of its own, not listed yet: its changes are nobody's business. [non-rt]
+  /// Throws Error (out_of_range) when all numbers are used up.
+  std::shared_ptr<Component> make_unlisted(const std::string& name);
+  /// How many numbers were given out; give_back() forgets those from `numbers` on. [non-rt]
+  std::size_t numbers() const;
+  void give_back_numbers(std::size_t numbers);
+  /// Puts a change of the lists in force, as one for all who look. [non-rt]
+  void change_lists(const ListChange& change);
+  /// Keeps a component whose thread has not ended; reap() lets those go that have. [non-rt]
+  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed);
+  void reap();
+  /// Keeps what a removed component's ring holds until the next drain. [non-rt]
+  void retire_trace(Task& task);
+
  private:
   struct Published {
     Resource* resource;
     std::uint64_t seen;
   };
+  struct Leaving {
+    std::shared_ptr<Component> component;
+    bool was_listed;
+  };
+  struct Final {  // of a removed component
+    std::uint64_t written{0};
+    std::uint64_t dropped{0};
+  };
 
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
-  PluginRegistry& require_registry() const;
 
   PluginRegistry* registry_;
   ChangeSignal changes_;
   Notifier publications_;
   std::vector<Published> published_;
-  std::vector<std::unique_ptr<Resource>> resources_;
-  std::vector<std::unique_ptr<Component>>
+  std::atomic<time_ns_t> deployment_epoch_ns_{0};
+  mutable std::mutex list_mutex_;
+  std::vector<std::string> names_;  // by number
+  std::mutex trace_mutex_;
+  std::deque<TraceRecord> retired_;
+  std::vector<Final> finals_;  // by number
+  std::vector<std::shared_ptr<Resource>> resources_;
+  std::vector<Leaving> leaving_;
+  std::vector<std::shared_ptr<Component>>
       components_;  // after the resources: ports go before what they connect to
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Component: a shell, a core and an fsm, run by a task; its core and properties can be replaced while it
-// runs.
+// Component: a shell, a core and an fsm, run by a task; each can be replaced while it runs.
 #pragma once
 
 #include <functional>
@@ -33,42 +32,151 @@ struct CommitTimeouts {
   time_ns_t phase_ns{s_to_ns(1)};   // for the release that follows, to measure its phase; 0: do not wait
 };
 
-/// One component of an architecture. Its functions are for ordinary threads; its parts run on its task.
+/// The parts of a component; in a change a null pointer says that the part stays.
+struct Parts {
+  std::unique_ptr<Shell> shell{};
+  std::unique_ptr<CoreBase> core{};
+  std::unique_ptr<FsmBase> fsm{};
+};
+
+class Component;
+
+/// New parts for a component: made ready while the old ones run, put in by a commit, the old ones retired after.
+class PartsChange final : public CommitAction {
+ public:
+  /// A new shell takes the property values of the old one where name, type and range fit. With a new shell and no new
+  /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
+  /// `make_fsm` makes another instance of a new fsm.
+  PartsChange(Component& component, Parts fresh, std::function<std::unique_ptr<FsmBase>()> make_fsm = {});
+  ~PartsChange() override;
+
+  /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]
+  Shell& shell() noexcept;
+  /// The fsm that will be in force. [non-rt], before the commit
+  const FsmBase& fsm() const noexcept;
+  /// Binds and configures the new parts. [non-rt] Throws Error; nothing but the new parts is touched.
+  void prepare();
+  /// Whether the component starts anew in its initial state: a new shell or fsm. [rt]
+  bool restarts() const noexcept { return restarts_; }
+  /// Cleans up what is out: the old parts once they were taken, else the new ones. [non-rt]
+  void retire() noexcept;
+  /// The new core takes nothing over from the old one: that has failed. [setup]
+  void start_afresh() noexcept { afresh_ = true; }
+
+  /// The core that is not in force now. [setup]
+  CoreBase* core() noexcept { return parts_.core.get(); }
+  /// Gives away the core that is not in force now. [non-rt]
+  std::unique_ptr<CoreBase> give_back_core() noexcept { return std::move(parts_.core); }
+  bool was_taken() const noexcept { return taken_; }
+
+  bool adopt() override;
+  void take() noexcept override;
+  time_ns_t budget_ns() const noexcept override;
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  void prepare_parts();
+
+  Component& component_;
+  Parts parts_;  // the new ones; after take the old ones
+  std::function<std::unique_ptr<FsmBase>()> make_fsm_;
+  CoreBinding binding_;
+  time_ns_t period_ns_{0};
+  bool restarts_;
+  const CoreBase* kept_core_{nullptr};  // the one that the binding was made for, when it stays
+  std::uint32_t core_name_{0};
+  bool afresh_{false};
+  bool taken_{false};
+  std::uint32_t trace_id_;
+  std::string what_{};  // the part being prepared
+};
+
+/// Sets a property in a commit. The value is swapped with the old one, so that nothing is freed there.
+class PropertyChange final : public CommitAction {
+ public:
+  /// `value` as PropertyBase::checked returned it.
+  PropertyChange(PropertyBase& property, PropertyValue value);
+  void take() noexcept override { property_.swap(value_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  PropertyBase& property_;
+  PropertyValue value_;
+  std::uint32_t trace_id_;
+};
+
+/// What a component looks like, for those who must not touch its parts.
+struct ShownPort {
+  std::string name;
+  PortKind kind;
+  std::string type;
+  std::string resource;  // empty: not connected
+  std::string service;
+  bool operator==(const ShownPort&) const = default;
+};
+struct ShownProperty {
+  std::string name;
+  PropertyValue value;
+  PropertyOptions options;
+  bool operator==(const ShownProperty&) const = default;
+};
+struct ShownParts {
+  std::string shell;
+  std::string core;
+  std::string fsm;
+  std::vector<ShownPort> ports;
+  std::vector<ShownProperty> properties;
+  bool operator==(const ShownParts&) const = default;
+};
+
+/// One component of an architecture. Its functions are for ordinary threads, those that change it for one at a time;
+/// its parts run on its task.
 ///
-/// | member                         | written by                               | read by             | under            |
-/// | ------------------------------ | ---------------------------------------- | ------------------- | ---------------- |
-/// | core_, binding_                | commanders, parked; the task, in commits | the task            | parking, commits |
-/// | shown_core_, shown_properties_ | who changed one, after the fact          | any ordinary thread | shown_mutex_     |
-/// | the rest                       | [setup]                                  | anyone              | -                |
+/// | member           | written by                                | read by             | under            |
+/// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
+/// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
+/// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
+/// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
  public:
+  using FsmFactory = std::function<std::unique_ptr<FsmBase>()>;
+
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Component() override;
 
-  void set_parts(std::unique_ptr<Shell> shell, std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm);
+  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone. [setup]
+  void set_parts(Parts parts, FsmFactory make_fsm = {});
   void set_settings(const TaskSettings& settings);
+  /// The core that takes over after a fault, without a word from anybody. [setup]
+  void set_fallback(std::unique_ptr<CoreBase> core);
 
   const std::string& name() const noexcept { return name_; }
-  Shell& shell() noexcept { return *shell_; }
-  CoreBase& core() noexcept { return *core_; }
-  const FsmBase& fsm() const noexcept { return *fsm_; }
+  Shell& shell() noexcept { return *parts_.shell; }
+  CoreBase& core() noexcept { return *parts_.core; }
+  const FsmBase& fsm() const noexcept { return *parts_.fsm; }
   Task& task() noexcept { return task_; }
   const Task& task() const noexcept { return task_; }
   /// The shell as the type it has. Throws std::bad_cast.
   template <typename ShellType>
   ShellType& shell_as() {
-    return dynamic_cast<ShellType&>(*shell_);
+    return dynamic_cast<ShellType&>(*parts_.shell);
   }
   template <typename CoreType>
   CoreType& core_as() {
-    return dynamic_cast<CoreType&>(*core_);
+    return dynamic_cast<CoreType&>(*parts_.core);
   }
   std::string description() const override { return "component " + name_; }
 
-  /// The core that runs now, package/Class; unlike core() safe while it is being replaced. [non-rt]
-  std::string core_implementation() const;
-  /// The properties' values in the shell's order; safe while one is being set. [non-rt]
-  std::vector<PropertyValue> property_values() const;
+  /// Names, wiring and property values now; unlike the parts themselves safe while they are being replaced. [non-rt]
+  ShownParts shown() const;
+  /// How long the execution states took since the fsm was configured. [non-rt]
+  std::shared_ptr<const StateTimes> state_times() const;
+  /// To be called by who changed something, after the fact. [non-rt]
+  void show();
+  /// The core that runs now, package/Class. [non-rt]
+  std::string core_implementation() const { return shown().core; }
+  /// The fallback's name; empty when none was declared. [non-rt]
+  const std::string& fallback_implementation() const noexcept { return fallback_name_; }
 
   /// Cores it takes beside the one it was declared with, and whether it may be changed at all. [setup]
   void allow(std::vector<std::string> alternatives, bool reconfigurable);
@@ -76,6 +184,14 @@ class Component final : public Configurable {
   bool is_reconfigurable() const noexcept { return reconfigurable_; }
   /// Throws Error: not_reconfigurable, undeclared_core.
   void check_allowed(const std::string& core_implementation) const;
+  /// Throws Error: not_reconfigurable.
+  void check_reconfigurable() const;
+  /// Throws Error: unknown_property.
+  PropertyBase& require_property(const std::string& name) const;
+  /// Throws Error: unknown_port.
+  PortBase& require_port(const std::string& name) const;
+  /// Whether an fsm of the present kind can be made once more. [non-rt]
+  const FsmFactory& fsm_factory() const noexcept { return make_fsm_; }
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
   /// Throws Error: unknown_property, type_mismatch, out_of_range, not_reconfigurable (while running),
@@ -104,32 +220,50 @@ class Component final : public Configurable {
   StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {},
                        const std::function<void()>& committed = {});
 
+  /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
+  /// `out`: the core that was replaced, which may be the fallback itself.
+  void renew_fallback(std::unique_ptr<CoreBase> out);
+
+  /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
+  void update_listening() { update_listening(*parts_.fsm); }
+
  private:
+  friend class PartsChange;
+
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
-  PropertyBase& require_property(const std::string& name);
   void require_parked(const std::string& what) const;
-  void prepare(CoreBase& core, CoreBinding& binding);
-  void settle_period();
+  void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
+  CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
+  void bind_fsm(FsmBase& fsm, Shell& shell) const;
+  time_ns_t settled_period_ns(const FsmBase& fsm) const;
+  void update_listening(const FsmBase& fsm);
+  void prepare_fallback();
+  void check_fallback(const Shell& shell, const FsmBase& fsm) const;
   StepReport run_commit(CommitAction& action, const CommitTimeouts& timeouts,
                         const std::function<void()>& committed);
-  void show_core();
-  void show_property(const PropertyBase& property, PropertyValue value);
 
   std::string name_;
   Task task_;
-  std::unique_ptr<Shell> shell_;
-  std::unique_ptr<CoreBase> core_;
-  std::unique_ptr<FsmBase> fsm_;
+  Parts parts_;
+  FsmFactory make_fsm_;
   CoreBinding binding_;
   std::string declared_core_;
   std::vector<std::string> alternatives_;
   bool reconfigurable_{true};
+  CoreBase* spare_{nullptr};                 // the fallback while one is ready or in force
+  std::unique_ptr<CoreBase> fallback_core_;  // until it is put in
+  std::string fallback_name_;
+  std::unique_ptr<PartsChange> fallback_;
 
   mutable std::mutex shown_mutex_;
-  std::string shown_core_;
-  std::vector<PropertyValue> shown_properties_;
+  ShownParts shown_;
+  std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
+  std::shared_ptr<const StateTimes> shown_times_;
 };
+
+/// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]
+StepReport report_of(Participant& place, time_ns_t phase_timeout_ns);
 
 }  // namespace mauve

@@ -16,13 +16,11 @@ namespace mauve {
 /// | ---------- | ---------- | ---------- | ---------------------------------------------------- |
 /// | clock_ns   | component  | any thread | relaxed: a lone number, nothing is published with it |
 /// | instant_ns | component  | any thread | relaxed: likewise                                    |
-/// | period_ns  | [setup]    | any thread | -                                                    |
-/// | ring       | [setup]    | component  | -                                                    |
+/// | period_ns  | commits    | any thread | relaxed: likewise                                    |
 struct Context {
   std::atomic<time_ns_t> clock_ns{0};    // the logical clock
   std::atomic<time_ns_t> instant_ns{0};  // nominal instant of the last entry of the initial state
-  time_ns_t period_ns{0};
-  TraceRing* ring{nullptr};
+  std::atomic<time_ns_t> period_ns{0};   // g; 0 for a sporadic fsm
 };
 
 }  // namespace mauve

@@ -16,6 +16,8 @@ class CoreBase : public Configurable {
  public:
   /// Binds the core to a shell; false when the shell is not of the type the core was written for. [setup]
   virtual bool bind_shell(Shell& shell) noexcept = 0;
+  /// Whether bind_shell would succeed; changes nothing. [non-rt]
+  virtual bool accepts(const Shell& /*shell*/) const noexcept { return false; }
 
   /// Checks that the old core's state can be carried over; nothing is changed yet. [rt]
   /// Runs on the component's thread, inside its wait. Returning false or throwing refuses the replacement.
@@ -38,7 +40,9 @@ class CoreBase : public Configurable {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
   }
   /// The component's period g. [rt]
-  time_ns_t period_ns() const noexcept { return context_ != nullptr ? context_->period_ns : 0; }
+  time_ns_t period_ns() const noexcept {
+    return context_ != nullptr ? context_->period_ns.load(std::memory_order_relaxed) : 0;
+  }
 
  private:
   const Context* context_{nullptr};
@@ -54,6 +58,9 @@ class Core : public CoreBase {
   bool bind_shell(Shell& shell) noexcept override {
     shell_ = dynamic_cast<ShellType*>(&shell);
     return shell_ != nullptr;
+  }
+  bool accepts(const Shell& shell) const noexcept override {
+    return dynamic_cast<const ShellType*>(&shell) != nullptr;
   }
 
  protected:

@@ -11,6 +11,7 @@
 
 #include "mauve_rt/architecture.hpp"
 #include "mauve_rt/realtime.hpp"
+#include "mauve_rt/transaction_commit.hpp"
 
 namespace mauve {
 
@@ -19,16 +20,14 @@ struct DeployerOptions {
   bool trace{true};
 };
 
-/// What drain_trace() yields; indices are component numbers.
-struct TraceDrain {
-  std::vector<TraceRecord> records;
-  std::vector<std::uint64_t> written;
-  std::vector<std::uint64_t> dropped;
-  time_ns_t monotonic_ns{0};
-  time_ns_t realtime_ns{0};
-};
-
-/// The threads of an architecture. Ordinary threads; commands are serialised.
+/// The threads of an architecture. Ordinary threads.
+///
+/// | member       | written by           | read by  | under            |
+/// | ------------ | -------------------- | -------- | ---------------- |
+/// | conductor_   | deploy(), shutdown() | commit() | structure_mutex_ |
+/// | architecture | these three          | anyone   | structure_mutex_ |
+///
+/// start(), stop() and what only looks take no part in that: a long preparation keeps nobody from stopping a component.
 class Deployer {
  public:
   explicit Deployer(Architecture& architecture, DeployerOptions options = {});
@@ -48,6 +47,9 @@ class Deployer {
   void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
   void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
   time_ns_t get_time(const std::string& component) const;
+  /// Carries out a transaction, deployed or not; one at a time. [non-rt]
+  /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
+  TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
   /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
   StepReport replace_core(const std::string& component, const std::string& core,
                           const CommitTimeouts& timeouts = {});
@@ -56,11 +58,11 @@ class Deployer {
 
   bool is_deployed() const noexcept { return deployed_; }
   /// The instant that all grids are counted from; 0 before deployment.
-  time_ns_t epoch_ns() const noexcept { return epoch_ns_; }
+  time_ns_t epoch_ns() const noexcept { return architecture_.deployment_epoch_ns(); }
   const RealtimeStatus& realtime_status() const noexcept { return process_.status(); }
 
   /// Empties every ring. [non-rt], one thread at a time.
-  TraceDrain drain_trace();
+  TraceDrain drain_trace() { return architecture_.drain_trace(); }
   /// Waits until a component changed its state or core after `seen`; returns the word to pass next. [non-rt]
   std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
 
@@ -69,13 +71,16 @@ class Deployer {
 
   void require_deployed() const;
   void watch() noexcept;
+  TransactionHost host();
+  StepReport commit_one(Transaction transaction, const CommitTimeouts& timeouts);
 
   Architecture& architecture_;
   DeployerOptions options_;
   RealtimeProcess process_;
-  std::mutex command_mutex_;
-  std::atomic<bool> deployed_{false};  // seq_cst: set and cleared under the mutex, read for messages only
-  time_ns_t epoch_ns_{0};
+  std::mutex structure_mutex_;
+  std::atomic<bool> deployed_{
+      false};  // seq_cst: set and cleared under the mutex, read by commands without it
+  std::unique_ptr<Conductor> conductor_;
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::thread watchdog_;
   std::atomic<std::uint32_t> watchdog_stop_{0};

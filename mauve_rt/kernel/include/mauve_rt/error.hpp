@@ -40,6 +40,7 @@ enum class ErrorCode : std::uint16_t {
   adopt_refused,
   prepare_failed,
   timeout,
+  wrong_epoch,
   realtime_denied,
   plugin,
   io,
@@ -56,6 +57,8 @@ struct ErrorDetail {
   std::string expected{};
   std::string found{};
   std::string remedy{};
+  int step{0};  // of a transaction, from 1; 0: none
+  std::string step_name{};
 };
 
 /// The kernel's one exception class. what() is one line made of all fields.

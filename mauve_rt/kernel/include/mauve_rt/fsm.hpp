@@ -5,11 +5,14 @@
 #include <array>
 #include <bit>
 #include <cstddef>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/core.hpp"
+#include "mauve_rt/event_input.hpp"
+#include "mauve_rt/statistics.hpp"
 
 namespace mauve {
 
@@ -18,6 +21,9 @@ struct CoreBinding {
   void* object{nullptr};          // of the fsm's core type, when it is a C++ core
   DynamicCore* dynamic{nullptr};  // otherwise
   std::vector<int> method_slots;  // of dynamic, by method number
+
+  /// Whether the fsm can run the core. [rt]
+  bool is_bound() const noexcept { return object != nullptr || dynamic != nullptr; }
 };
 
 /// A method of the core, by name and by pointer, whichever the core at hand needs.
@@ -71,23 +77,34 @@ class Method {
 
 struct State;
 
+/// How long an execution state of a machine took.
+struct StateTime {
+  std::string state;
+  ExecutionTime time{};
+};
+using StateTimes = std::deque<StateTime>;  // elements stay where they are
+
 struct Transition {
   std::size_t guard;  // index of the fsm's methods
   State* to;
 };
 
-/// A node of the machine. Filled by Fsm during configure, constant afterwards.
+/// A node of the machine. Filled by Fsm during configure, constant afterwards but for what it counts.
 struct State {
   static constexpr std::size_t kNone = SIZE_MAX;
 
   std::string name;
+  std::size_t index{0};  // in the order of declaration
   bool is_wait{false};
-  time_ns_t duration_ns{0};             // of a wait
+  time_ns_t duration_ns{0};             // of a wait; of an event wait its timeout
+  std::unique_ptr<EventInput> event;    // of an event wait
+  time_ns_t min_interarrival_ns{0};     // of an event wait: the least time from one release to the next
   std::size_t action{kNone};            // of an execution state
   time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   std::vector<Transition> transitions;  // the first whose guard holds is taken
   State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
+  ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
 };
 
 /// An fsm seen without its types.
@@ -101,8 +118,12 @@ class FsmBase : public Configurable {
   const State& initial() const noexcept { return *initial_; }
   const std::vector<std::unique_ptr<State>>& states() const noexcept { return states_; }
   const std::vector<Method>& methods() const noexcept { return methods_; }
-  /// g: the greatest common divisor of the lengths of all cycles. Valid once configured. [rt]
+  /// The execution states' times; who holds them may read them when the machine is gone. [non-rt]
+  std::shared_ptr<const StateTimes> times() const noexcept { return times_; }
+  /// g: the greatest common divisor of the lengths of all cycles; 0 when sporadic. Valid once configured. [rt]
   time_ns_t period_ns() const noexcept { return period_ns_; }
+  /// Whether it waits for events: phase and missed releases do not apply to it then. Valid once configured. [rt]
+  bool is_sporadic() const noexcept { return sporadic_; }
 
   void set_implementation(std::string name) { implementation_ = std::move(name); }
   const std::string& implementation() const noexcept { return implementation_; }
@@ -113,11 +134,17 @@ class FsmBase : public Configurable {
   virtual void define() = 0;
 
   State& wait(std::string name, time_ns_t duration_ns);
+  /// Waits for a write to the resource that a read port is connected to. The clock goes on to the event's time, but
+  /// by min_interarrival at least; or by the timeout when no event comes. Both > 0 ns. [setup]
+  State& wait_event(std::string name, PortBase& port, time_ns_t timeout_ns, time_ns_t min_interarrival_ns);
   void set_initial(State& state) noexcept { initial_ = &state; }
   /// Where a state goes when no transition's guard holds. Every state needs one.
   void next(State& from, State& to) noexcept { from.next = &to; }
   State& add_state(std::string name);
+  State& add_execution(std::string name);
   std::size_t add_method(Method method);
+  /// Makes g a divisor of this too, for machines that declare a period of their own. In define(). [setup]
+  void declare_divisor(time_ns_t divisor_ns) noexcept { divisor_ns_ = divisor_ns; }
   int method_count() const noexcept { return static_cast<int>(methods_.size()); }
   CoreBinding bind_dynamic(DynamicCore& core) const;
 
@@ -127,8 +154,11 @@ class FsmBase : public Configurable {
  private:
   std::vector<std::unique_ptr<State>> states_;
   std::vector<Method> methods_;
+  std::shared_ptr<StateTimes> times_{std::make_shared<StateTimes>()};
   State* initial_{nullptr};
   time_ns_t period_ns_{0};
+  bool sporadic_{false};
+  time_ns_t divisor_ns_{0};  // 0: none
   std::string implementation_;
 };
 
@@ -156,7 +186,7 @@ class Fsm : public FsmBase {
   /// A state that runs a method of the core; the method's name serves cores that are not C++.
   State& execution(std::string name, std::string method_name, void (CoreType::*method)(),
                    time_ns_t max_execution_ns = 0) {
-    State& state = add_state(std::move(name));
+    State& state = add_execution(std::move(name));
     state.action = add_method(Method::action(std::move(method_name), method_count(), method));
     state.max_execution_ns = max_execution_ns;
     return state;

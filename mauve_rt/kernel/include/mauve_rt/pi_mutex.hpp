@@ -37,6 +37,7 @@ class PiMutex {
 
  private:
   void lock_contended() noexcept;
+  void note_holder() noexcept;
 
   pthread_mutex_t mutex_;
   std::atomic<std::int32_t> holder_{0};  // thread id, for the trace only

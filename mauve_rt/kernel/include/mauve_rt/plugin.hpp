@@ -10,14 +10,17 @@
 #include <vector>
 
 #include "mauve_rt/component.hpp"
+#include "mauve_rt/latest_value.hpp"
+#include "mauve_rt/port.hpp"
 #include "mauve_rt/ring_buffer.hpp"
 #include "mauve_rt/shared_data.hpp"
 
 namespace mauve {
 
 struct ResourceParameters {
-  std::size_t capacity{0};
-  bool overwrite{false};
+  std::size_t capacity{0};                        // ring_buffer
+  bool overwrite{false};                          // ring_buffer
+  std::uint32_t max_readers{kDefaultMaxReaders};  // latest_value
 };
 
 /// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at
@@ -25,6 +28,10 @@ struct ResourceParameters {
 class PluginRegistry {
  public:
   using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
+  using ResourceFactory = std::function<std::unique_ptr<Resource>(const ResourceParameters&)>;
+
+  /// Knows the kind event, which needs no type.
+  PluginRegistry();
 
   /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call
   /// does nothing. Throws Error (plugin) with the loader's words.
@@ -48,25 +55,47 @@ class PluginRegistry {
   void resource(const std::string& name) {
     add_resource(name, "", [](const ResourceParameters&) { return std::make_unique<ResourceType>(); });
   }
-  /// A data type: makes shared_data and ring_buffer resources of it possible.
+  /// A data type: makes shared_data, ring_buffer, ports and, if it can be copied as bytes, latest_value of it
+  /// possible.
   template <Described T>
   void type() {
+    // Ports of the C++ type that the resources are of, whoever else registers the name later.
+    if (!resources_.contains({"shared_data", type_name<T>()}))
+      ports_.insert_or_assign(type_name<T>(), data_ports<T>());
     add_resource("shared_data", type_name<T>(),
                  [](const ResourceParameters&) { return std::make_unique<SharedData<T>>(); });
     add_resource("ring_buffer", type_name<T>(), [](const ResourceParameters& parameters) {
       return std::make_unique<RingBuffer<T>>(parameters.capacity,
                                              parameters.overwrite ? WhenFull::overwrite : WhenFull::refuse);
     });
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      add_resource("latest_value", type_name<T>(), [](const ResourceParameters& parameters) {
+        return std::make_unique<LatestValue<T>>(parameters.max_readers);
+      });
+    }
   }
 
+  // The same with a factory, for parts that are no C++ class of their own.
+
+  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
   void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory);
+  void add_fsm(const std::string& name, const std::string& shell_name,
+               std::function<std::unique_ptr<FsmBase>()> factory);
+  void add_resource(const std::string& kind, const std::string& type, ResourceFactory factory);
 
   std::unique_ptr<Shell> make_shell(const std::string& name) const;
   std::unique_ptr<CoreBase> make_core(const std::string& name) const;
   std::unique_ptr<FsmBase> make_fsm(const std::string& name) const;
-  /// Throws Error: unknown_resource (kind), unknown_type, invalid_argument (a ring without capacity).
+  /// Throws Error: unknown_resource (kind), unknown_type, type_mismatch (latest_value of a type that cannot be
+  /// copied as bytes), invalid_argument (a ring without capacity, an event with a type), out_of_range
+  /// (max_readers).
   std::unique_ptr<Resource> make_resource(const std::string& kind, const std::string& type,
                                           const ResourceParameters& parameters) const;
+
+  /// A read or write port of a registered type, or an event port (`type` is empty).
+  /// Throws Error: unknown_type, invalid_argument (a call port, whose signature only C++ knows).
+  std::unique_ptr<PortBase> make_port(PortKind kind, const std::string& type, const std::string& name,
+                                      const OutputOptions& output = {}) const;
 
   const std::string& core_shell(const std::string& name) const;
   const std::string& fsm_shell(const std::string& name) const;
@@ -80,18 +109,28 @@ class PluginRegistry {
     std::string shell;
     std::function<std::unique_ptr<Product>()> make;
   };
-  using ResourceFactory = std::function<std::unique_ptr<Resource>(const ResourceParameters&)>;
+  struct PortFactories {
+    std::unique_ptr<PortBase> (*read)(const std::string& name);
+    std::unique_ptr<PortBase> (*write)(const std::string& name, const OutputOptions& output);
+  };
+  template <Described T>
+  static PortFactories data_ports() {
+    return {[](const std::string& name) -> std::unique_ptr<PortBase> {
+              return std::make_unique<ReadPort<T>>(name);
+            },
+            [](const std::string& name, const OutputOptions& output) -> std::unique_ptr<PortBase> {
+              return std::make_unique<WritePort<T>>(name, output);
+            }};
+  }
 
-  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
-  void add_fsm(const std::string& name, const std::string& shell_name,
-               std::function<std::unique_ptr<FsmBase>()> factory);
-  void add_resource(const std::string& kind, const std::string& type, ResourceFactory factory);
+  [[noreturn]] void throw_unknown_type(const std::string& type) const;
 
   std::set<std::string> libraries_;
   std::map<std::string, Entry<Shell>> shells_;
   std::map<std::string, Entry<CoreBase>> cores_;
   std::map<std::string, Entry<FsmBase>> fsms_;
   std::map<std::pair<std::string, std::string>, ResourceFactory> resources_;  // by (kind, type)
+  std::map<std::string, PortFactories> ports_;                                // by type
 };
 
 }  // namespace mauve

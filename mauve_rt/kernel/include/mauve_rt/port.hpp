@@ -2,90 +2,15 @@
 // Ports: a shell's way to the services of resources.
 #pragma once
 
-#include <atomic>
 #include <memory>
-#include <span>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <type_traits>
 
-#include "mauve_rt/context.hpp"
-#include "mauve_rt/service.hpp"
+#include "mauve_rt/latest_register.hpp"
+#include "mauve_rt/port_base.hpp"
 
 namespace mauve {
-
-/// What the kernel does to an output while its component is not running.
-enum class OutputPolicy : std::uint8_t {
-  hold,      // leave the last value
-  set_zero,  // write the type's default value
-};
-
-struct OutputOptions {
-  OutputPolicy on_commit{OutputPolicy::hold};
-  OutputPolicy on_stop{OutputPolicy::set_zero};
-};
-
-/// A port seen without its type. Connected while the component is not running.
-///
-/// | member                   | written by                  | read by        | order                                |
-/// | ------------------------ | --------------------------- | -------------- | ------------------------------------ |
-/// | service_, resource_name_ | connect(), component parked | component, any | parking publishes it                 |
-/// | context_                 | [setup]                     | component      | -                                    |
-/// | closed_                  | the watchdog                | component      | release/acquire: its zeros stay last |
-class PortBase {
- public:
-  PortBase(std::string name, PortKind kind, std::string type)
-      : name_(std::move(name)), kind_(kind), type_(std::move(type)) {}
-  virtual ~PortBase() = default;
-  PortBase(const PortBase&) = delete;
-  PortBase& operator=(const PortBase&) = delete;
-
-  const std::string& name() const noexcept { return name_; }
-  PortKind kind() const noexcept { return kind_; }
-  const std::string& type() const noexcept { return type_; }
-  bool is_connected() const noexcept { return base_ != nullptr; }
-  /// The connected service, or nullptr.
-  const ServiceBase* service() const noexcept { return base_; }
-  const std::string& resource_name() const noexcept { return resource_name_; }
-
-  /// Connects to a service of equal kind and type. [setup] Throws Error (type_mismatch).
-  void connect(ServiceBase& service, const std::string& resource_name);
-  /// [setup]
-  void disconnect() noexcept;
-  void set_context(const Context* context) noexcept { context_ = context; }
-
-  /// Writes the type's default value; a port that is no write port does nothing. [rt]
-  virtual void write_zero() noexcept {}
-  virtual OutputOptions output() const noexcept { return {OutputPolicy::hold, OutputPolicy::hold}; }
-  /// After this the port swallows writes, until reopened. [rt]
-  void close() noexcept { closed_.store(true, std::memory_order_release); }
-  void reopen() noexcept { closed_.store(false, std::memory_order_release); }
-
-  /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
-  virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
-                               time_ns_t& /*time*/) {
-    return false;
-  }
-  /// A write of a serialized message; false when malformed or no write port. [non-rt]
-  virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
-
- protected:
-  virtual void attach(ServiceBase* service) noexcept = 0;
-  /// Component's logical clock, or the real one outside of any. [rt]
-  time_ns_t stamp_ns() const noexcept {
-    return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
-  }
-  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire); }
-
- private:
-  std::string name_;
-  PortKind kind_;
-  std::string type_;
-  ServiceBase* base_{nullptr};
-  std::string resource_name_;
-  const Context* context_{nullptr};
-  std::atomic<bool> closed_{false};
-};
 
 /// Reads from a resource. Unconnected, it yields its default with status none.
 template <Described T>
@@ -95,18 +20,26 @@ class ReadPort final : public PortBase {
       : PortBase(std::move(name), PortKind::read, type_name<T>()), default_(std::move(initial)) {}
 
   /// Value, status and writer's time. [rt]
+  /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
   Sample<T> read() noexcept {
-    Sample<T> sample{.value = default_};
-    if (service_ != nullptr) sample.status = service_->read(sample.value, sample.time_ns, seen_);
+    Sample<T> sample = find();
+    status_ = sample.status;
+    reader_.time_ns = sample.time_ns;
     return sample;
   }
   /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
   DataStatus read(T& value, time_ns_t* time_ns = nullptr) noexcept {
-    time_ns_t time = 0;
-    const DataStatus status = service_ != nullptr ? service_->read(value, time, seen_) : DataStatus::none;
+    time_ns_t time = reader_.time_ns;
+    status_ = find(value, time);
+    reader_.time_ns = time;
     if (time_ns != nullptr) *time_ns = time;
-    return status;
+    return status_;
   }
+
+  /// What the last read found, without reading; none before the first one. [rt]
+  DataStatus status() const noexcept { return status_; }
+  /// How old what the last read found is by the component's clock; 0 when there was nothing. [rt]
+  time_ns_t age_ns() const noexcept { return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns; }
 
   bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
     auto value = std::make_unique<T>(default_);
@@ -116,14 +49,36 @@ class ReadPort final : public PortBase {
   }
 
  protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const ReadService<T>*>(&service) != nullptr;
+  }
   void attach(ServiceBase* service) noexcept override {
-    service_ = static_cast<ReadService<T>*>(service);
-    seen_ = 0;
+    if (service_ != nullptr) service_->let_go(reader_);
+    service_ = static_cast<ReadService<T>*>(service);  // fits() was asked
+    latest_ = service_ != nullptr ? service_->latest() : nullptr;
+    reader_ = {};
+    status_ = DataStatus::none;
   }
 
  private:
+  Sample<T> find() noexcept {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      if (latest_ != nullptr) return latest_->sample(default_, reader_);
+    }
+    if (service_ == nullptr) return {.value = default_};
+    return service_->sample(default_, reader_);
+  }
+  DataStatus find(T& value, time_ns_t& time_ns) noexcept {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      if (latest_ != nullptr) return latest_->read(value, time_ns, reader_);
+    }
+    return service_ != nullptr ? service_->read(value, time_ns, reader_) : DataStatus::none;
+  }
+
   ReadService<T>* service_{nullptr};
-  std::uint64_t seen_{0};
+  LatestRegister<T>* latest_{nullptr};
+  ReaderState reader_;
+  DataStatus status_{DataStatus::none};
   T default_;
 };
 
@@ -137,7 +92,10 @@ class WritePort final : public PortBase {
   /// False when the resource had no room. [rt]
   bool write(const T& value) noexcept {
     if (service_ == nullptr || is_closed()) return true;
-    return service_->write(value, stamp_ns());
+    const bool taken = service_->write(value, stamp_ns());
+    // Closed in between: the zeros stay last, whoever wrote first.
+    if (is_closed() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    return taken;
   }
   void write_zero() noexcept override {
     if (service_ != nullptr) service_->write(zero_, stamp_ns());
@@ -150,6 +108,9 @@ class WritePort final : public PortBase {
   }
 
  protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
+  }
   void attach(ServiceBase* service) noexcept override { service_ = static_cast<WriteService<T>*>(service); }
 
  private:
@@ -171,36 +132,20 @@ class CallPort<R(Args...)> final : public PortBase {
   /// is_connected()).
   R operator()(Args... args) {
     if (service_ == nullptr) throw std::logic_error("call port '" + name() + "' is not connected");
-    const ServiceSpan span(trace_id_);
+    const ServiceSpan span(trace_id());
     return service_->call(std::forward<Args>(args)...);
   }
 
  protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const CallService<R(Args...)>*>(&service) != nullptr;
+  }
   void attach(ServiceBase* service) noexcept override {
     service_ = static_cast<CallService<R(Args...)>*>(service);
-    if (service != nullptr) trace_id_ = TraceNames::intern(resource_name() + "." + service->name());
   }
 
  private:
-  /// Records begin and end of a service on the calling thread, also when it throws.
-  class ServiceSpan {
-   public:
-    explicit ServiceSpan(std::uint32_t name) noexcept : name_(name), ring_(TraceRing::of_this_thread()) {
-      if (ring_ != nullptr) ring_->push(TraceKind::service_begin, name_);
-    }
-    ~ServiceSpan() {
-      if (ring_ != nullptr) ring_->push(TraceKind::service_end, name_);
-    }
-    ServiceSpan(const ServiceSpan&) = delete;
-    ServiceSpan& operator=(const ServiceSpan&) = delete;
-
-   private:
-    std::uint32_t name_;
-    TraceRing* ring_;
-  };
-
   CallService<R(Args...)>* service_{nullptr};
-  std::uint32_t trace_id_{0};
 };
 
 /// Raises an event of a resource. Unconnected, it does nothing.
@@ -213,6 +158,9 @@ class EventPort final : public PortBase {
   }
 
  protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const EventService*>(&service) != nullptr;
+  }
   void attach(ServiceBase* service) noexcept override { service_ = static_cast<EventService*>(service); }
 
  private:

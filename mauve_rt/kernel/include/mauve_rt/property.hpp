@@ -27,6 +27,7 @@ struct PropertyOptions {
   std::string description{};
   std::optional<double> minimum{};
   std::optional<double> maximum{};
+  bool operator==(const PropertyOptions&) const = default;
 };
 
 /// A property seen without its type.

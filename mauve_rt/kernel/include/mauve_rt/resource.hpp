@@ -2,6 +2,7 @@
 // Resources: data plus the services to reach it.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <span>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/configurable.hpp"
+#include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/service.hpp"
 
 namespace mauve {
@@ -34,6 +36,49 @@ class Notifier {
   std::atomic<std::uint32_t> waiters_{0};
 };
 
+/// Someone told of every write to a resource, e.g. a task that waits for one.
+class EventListener {
+ public:
+  EventListener() = default;
+  virtual ~EventListener() = default;
+  EventListener(const EventListener&) = delete;
+  EventListener& operator=(const EventListener&) = delete;
+
+  /// Called on the writer's thread with the writer's time, the data in place, under the listeners' lock.
+  /// [rt] Short; writes to and listens to no resource.
+  virtual void on_event(time_ns_t time_ns) noexcept = 0;
+};
+
+/// The listeners of one resource; a write without any costs one load.
+///
+/// | member     | written by       | read by | under                                                       |
+/// | ---------- | ---------------- | ------- | ----------------------------------------------------------- |
+/// | listeners_ | ordinary threads | writers | mutex_                                                      |
+/// | count_     | ordinary threads | writers | relaxed: only says whether to look, under the lock, at all  |
+class EventListeners {
+ public:
+  static constexpr std::size_t kCapacity = 8;
+
+  /// Adds one registration; who is added twice is called twice. [non-rt]
+  /// Throws Error (out_of_range) naming the resource when there are kCapacity.
+  void add(EventListener& listener, const std::string& resource);
+  /// Takes one registration away, if there is one; no call to it is under way afterwards. [non-rt]
+  void remove(EventListener& listener) noexcept;
+  /// Gives the registration of one to another: no write goes by in between. [non-rt]
+  void replace(EventListener& listener, EventListener& by) noexcept;
+  /// Calls all. [rt]
+  void call(time_ns_t time_ns) noexcept {
+    if (count_.load(std::memory_order_relaxed) != 0) call_all(time_ns);
+  }
+
+ private:
+  void call_all(time_ns_t time_ns) noexcept;
+
+  PiMutex mutex_;
+  std::array<EventListener*, kCapacity> listeners_{};
+  std::atomic<std::size_t> count_{0};
+};
+
 /// Derive from this to offer services of your own; a service is a member registered by offer().
 class Resource : public Configurable {
  public:
@@ -52,6 +97,16 @@ class Resource : public Configurable {
 
   /// Whom to tell of writes, for topics. [setup]
   void set_notifier(Notifier* notifier) noexcept { notifier_ = notifier; }
+  /// Whom else to tell of every write that succeeded, until unlisten(), while writers run. [non-rt]
+  /// Throws Error (out_of_range) when there are too many.
+  void listen(EventListener& listener) { listeners_.add(listener, name_); }
+  /// After this the listener is called no more and may end. [non-rt]
+  void unlisten(EventListener& listener) noexcept { listeners_.remove(listener); }
+  /// From now on the other is called in place of a listener. [non-rt]
+  void relisten(EventListener& listener, EventListener& by) noexcept { listeners_.replace(listener, by); }
+  /// Counts who calls write_sample(), e.g. an incoming topic, as one port of each service that writes.
+  /// [setup] Throws Error (invalid_argument) when one takes no more.
+  void bind_input();
 
   // The serialized face, for topics and for languages other than C++. Ordinary threads.
 
@@ -67,15 +122,19 @@ class Resource : public Configurable {
                            std::uint64_t& /*sequence*/) {
     return false;
   }
-  /// Writes a serialized message, stamped with the real clock; false when malformed or there is no room.
+  /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
-  virtual bool write_sample(std::span<const std::byte> /*message*/) { return false; }
+  virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
 
  protected:
-  void offer(ServiceBase& service) { services_.push_back(&service); }
-  /// To be called by services after a write. [rt]
-  void notify() const noexcept {
+  void offer(ServiceBase& service) {
+    service.resource_ = this;
+    services_.push_back(&service);
+  }
+  /// To be called by services after a write that succeeded, no lock held. [rt]
+  void written(time_ns_t time_ns) noexcept {
     if (notifier_ != nullptr) notifier_->notify();
+    listeners_.call(time_ns);
   }
 
  private:
@@ -84,6 +143,25 @@ class Resource : public Configurable {
   std::string name_;
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};
+  EventListeners listeners_;
+};
+
+/// A resource that holds one newest value: its serialized face is one look at it.
+class NewestResource : public Resource {
+ public:
+  using Resource::Resource;
+  bool is_serializable() const noexcept override { return true; }
+  bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    return serialize(message, time_ns, seen) == DataStatus::new_data;
+  }
+  bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    sequence = 0;
+    return serialize(message, time_ns, sequence) != DataStatus::none;
+  }
+
+ private:
+  /// The value as a message; `seen` as ReaderState::seen. [non-rt]
+  virtual DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) = 0;
 };
 
 }  // namespace mauve

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <vector>
 
+#include "mauve_rt/error.hpp"
 #include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/resource.hpp"
 
@@ -14,16 +15,22 @@ namespace mauve {
 /// What a full ring does with one more element.
 enum class WhenFull : std::uint8_t { refuse, overwrite };
 
-/// A bounded queue; services `read` (removes the oldest) and `write`.
+/// A bounded queue; services `read` (removes the oldest) and `write`. A reader that finds it empty gets status
+/// old if it ever got an element, and no value.
 ///
-/// | member                          | written by           | under  | hot |
-/// |---------------------------------|----------------------|--------|-----|
-/// | places_, first_, size_, lost_   | read, write services | mutex_ | yes |
+/// | member                                   | written by           | under  | hot |
+/// |------------------------------------------|----------------------|--------|-----|
+/// | places_, first_, size_, sequence_, lost_ | read, write services | mutex_ | yes |
 template <Described T>
 class RingBuffer final : public Resource {
  public:
+  /// Throws Error (invalid_argument) without a capacity. [setup]
   explicit RingBuffer(std::size_t capacity, WhenFull when_full = WhenFull::refuse)
       : Resource("ring_buffer", type_name<T>()), places_(capacity), when_full_(when_full) {
+    if (capacity == 0) {
+      throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
+                  {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
+    }
     offer(read);
     offer(write);
   }
@@ -42,25 +49,28 @@ class RingBuffer final : public Resource {
 
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
     auto value = std::make_unique<T>();
-    if (pop(*value, time_ns, seen) != DataStatus::new_data) return false;
+    ReaderState reader{.seen = seen};
+    if (pop(*value, time_ns, reader) != DataStatus::new_data) return false;
+    seen = reader.seen;
     CdrWriter(message).put(*value);
     return true;
   }
-  bool write_sample(std::span<const std::byte> message) override {
+  bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     auto value = std::make_unique<T>();
-    return CdrReader(message).get(*value) && write.write(*value, monotonic_now_ns());
+    return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
 
  private:
   struct Place {
     T value{};
     time_ns_t time_ns{0};
+    std::uint64_t sequence{0};
   };
   class Read final : public ReadService<T> {
    public:
     explicit Read(RingBuffer& owner) : ReadService<T>("read"), owner_(owner) {}
-    DataStatus read(T& value, time_ns_t& time_ns, std::uint64_t& seen) noexcept override {
-      return owner_.pop(value, time_ns, seen);
+    DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      return owner_.pop(value, time_ns, reader);
     }
 
    private:
@@ -75,15 +85,19 @@ class RingBuffer final : public Resource {
     RingBuffer& owner_;
   };
 
-  DataStatus pop(T& value, time_ns_t& time_ns, std::uint64_t& seen) noexcept {
+  DataStatus pop(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
     const std::lock_guard lock(mutex_);
-    if (size_ == 0) return seen == 0 ? DataStatus::none : DataStatus::old_data;
+    if (size_ == 0) {
+      if (reader.seen == 0) return DataStatus::none;
+      time_ns = reader.time_ns;
+      return DataStatus::old_data;
+    }
     const Place& place = places_[first_];
     value = place.value;
     time_ns = place.time_ns;
     first_ = (first_ + 1) % places_.size();
     --size_;
-    ++seen;
+    reader.seen = place.sequence;
     return DataStatus::new_data;
   }
   bool push(const T& value, time_ns_t time_ns) noexcept {
@@ -98,9 +112,10 @@ class RingBuffer final : public Resource {
       Place& place = places_[(first_ + size_) % places_.size()];
       place.value = value;
       place.time_ns = time_ns;
+      place.sequence = ++sequence_;
       ++size_;
     }
-    notify();
+    written(time_ns);
     return true;
   }
 
@@ -108,6 +123,7 @@ class RingBuffer final : public Resource {
   std::vector<Place> places_;
   std::size_t first_{0};
   std::size_t size_{0};
+  std::uint64_t sequence_{0};
   std::uint64_t lost_{0};
   WhenFull when_full_;
 

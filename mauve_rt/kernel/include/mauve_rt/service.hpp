@@ -2,6 +2,7 @@
 // Services: what resources offer and ports connect to.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -40,7 +41,30 @@ std::string type_name() {
   return std::string(TypeTraits<T>::name);
 }
 
-/// A service seen without its type; ports connect on equal kind and type.
+/// What a read port remembers between its reads; a new connection starts with a fresh one.
+struct ReaderState {
+  std::uint64_t seen{0};  // sequence number of the last sample read; 0: none yet
+  std::uint32_t held{0};  // what the service keeps for the reader from read to read; 0: nothing
+  time_ns_t time_ns{0};   // writer's time of the last sample read; set by the port
+
+  /// Whether the sample of this number is another one than the last; remembers it. [rt]
+  DataStatus look(std::uint64_t sequence) noexcept {
+    const bool is_new = seen != sequence;
+    seen = sequence;
+    return is_new ? DataStatus::new_data : DataStatus::old_data;
+  }
+};
+
+class Resource;
+template <typename T>
+class LatestRegister;
+
+/// A service seen without its type; ports connect on equal kind, type and C++ type.
+///
+/// | member    | written by                             | read by         | order                          |
+/// | --------- | -------------------------------------- | --------------- | ------------------------------ |
+/// | resource_ | Resource::offer()                      | any             | - [setup]                      |
+/// | ports_    | connecting threads, commits            | ordinary thread | relaxed: they are serialized   |
 class ServiceBase {
  public:
   ServiceBase(std::string name, PortKind kind, std::string type)
@@ -52,19 +76,47 @@ class ServiceBase {
   const std::string& name() const noexcept { return name_; }
   PortKind kind() const noexcept { return kind_; }
   const std::string& type() const noexcept { return type_; }
+  /// How it holds values of the type: "C++", or what another language does. [rt]
+  virtual std::string_view representation() const noexcept { return "C++"; }
+  /// The resource that offers it, or nullptr. [rt]
+  Resource* resource() const noexcept { return resource_; }
+
+  /// How many ports may be connected at once; 0: any number. [rt]
+  virtual std::uint32_t max_ports() const noexcept { return 0; }
+  /// How many are connected. [rt]
+  std::uint32_t ports() const noexcept { return ports_.load(std::memory_order_relaxed); }
+  /// Refuses more ports than max_ports(). [non-rt] Throws Error (invalid_argument).
+  void check_ports(std::uint32_t wanted) const;
+  /// A port came or went; kept by PortBase and Resource. [rt]
+  void add_port() noexcept { ports_.fetch_add(1, std::memory_order_relaxed); }
+  void remove_port() noexcept { ports_.fetch_sub(1, std::memory_order_relaxed); }
 
  private:
+  friend class Resource;
+
   std::string name_;
   PortKind kind_;
   std::string type_;
+  Resource* resource_{nullptr};
+  std::atomic<std::uint32_t> ports_{0};
 };
 
 template <Described T>
 class ReadService : public ServiceBase {
  public:
   explicit ReadService(std::string name) : ServiceBase(std::move(name), PortKind::read, type_name<T>()) {}
-  /// Copies what is there; `seen` is the reading port's last sequence number, kept by the port. [rt]
-  virtual DataStatus read(T& value, time_ns_t& time_ns, std::uint64_t& seen) noexcept = 0;
+  /// Copies what is there; leaves value and time alone when there is nothing. [rt]
+  virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept = 0;
+  /// The same by value, `fallback` when there is nothing; override it where that saves a copy. [rt]
+  virtual Sample<T> sample(const T& fallback, ReaderState& reader) noexcept {
+    Sample<T> found{.value = fallback};
+    found.status = read(found.value, found.time_ns, reader);
+    return found;
+  }
+  /// The register a port may read by itself, at a third of a call's price; nullptr: there is none. [rt]
+  virtual LatestRegister<T>* latest() noexcept { return nullptr; }
+  /// Gives back what is held for a reader that goes; the state is fresh afterwards. [rt]
+  virtual void let_go(ReaderState& reader) noexcept { reader = {}; }
 };
 
 template <Described T>

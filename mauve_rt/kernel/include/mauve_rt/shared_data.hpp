@@ -10,15 +10,15 @@
 
 namespace mauve {
 
-/// One value; services `read` and `write`.
+/// One value; services `read` and `write`, any number of each.
 ///
-/// | member                   | written by     | under  | hot |
-/// |--------------------------|----------------|--------|-----|
-/// | value_, time_, sequence_ | write service  | mutex_ | yes |
+/// | member                      | written by     | under  | hot |
+/// |-----------------------------|----------------|--------|-----|
+/// | value_, time_ns_, sequence_ | write service  | mutex_ | yes |
 template <Described T>
-class SharedData final : public Resource {
+class SharedData final : public NewestResource {
  public:
-  SharedData() : Resource("shared_data", type_name<T>()) {
+  SharedData() : NewestResource("shared_data", type_name<T>()) {
     offer(read);
     offer(write);
   }
@@ -27,32 +27,26 @@ class SharedData final : public Resource {
     Resource::set_name(name);
     mutex_.set_trace_id(TraceNames::intern(name));
   }
-  bool is_serializable() const noexcept override { return true; }
-
-  bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+  bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     auto value = std::make_unique<T>();
-    if (copy(*value, time_ns, seen) != DataStatus::new_data) return false;
-    CdrWriter(message).put(*value);
-    return true;
-  }
-  bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
-    auto value = std::make_unique<T>();
-    sequence = 0;
-    const DataStatus status = copy(*value, time_ns, sequence);
-    CdrWriter(message).put(*value);
-    return status != DataStatus::none;
-  }
-  bool write_sample(std::span<const std::byte> message) override {
-    auto value = std::make_unique<T>();
-    return CdrReader(message).get(*value) && write.write(*value, monotonic_now_ns());
+    return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
 
  private:
   class Read final : public ReadService<T> {
    public:
     explicit Read(SharedData& owner) : ReadService<T>("read"), owner_(owner) {}
-    DataStatus read(T& value, time_ns_t& time_ns, std::uint64_t& seen) noexcept override {
-      return owner_.copy(value, time_ns, seen);
+    DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      if (owner_.sequence_ == 0) return DataStatus::none;
+      value = owner_.value_;
+      time_ns = owner_.time_ns_;
+      return reader.look(owner_.sequence_);
+    }
+    Sample<T> sample(const T& fallback, ReaderState& reader) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      if (owner_.sequence_ == 0) return {.value = fallback};
+      return {.value = owner_.value_, .status = reader.look(owner_.sequence_), .time_ns = owner_.time_ns_};
     }
 
    private:
@@ -68,7 +62,7 @@ class SharedData final : public Resource {
         owner_.time_ns_ = time_ns;
         ++owner_.sequence_;
       }
-      owner_.notify();
+      owner_.written(time_ns);
       return true;
     }
 
@@ -76,14 +70,13 @@ class SharedData final : public Resource {
     SharedData& owner_;
   };
 
-  DataStatus copy(T& value, time_ns_t& time_ns, std::uint64_t& seen) noexcept {
-    const std::lock_guard lock(mutex_);
-    if (sequence_ == 0) return DataStatus::none;
-    value = value_;
-    time_ns = time_ns_;
-    const bool is_new = seen != sequence_;
-    seen = sequence_;
-    return is_new ? DataStatus::new_data : DataStatus::old_data;
+  DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    auto value = std::make_unique<T>();
+    ReaderState reader{.seen = seen};
+    const DataStatus status = read.read(*value, time_ns, reader);
+    seen = reader.seen;
+    CdrWriter(message).put(*value);
+    return status;
   }
 
   PiMutex mutex_;

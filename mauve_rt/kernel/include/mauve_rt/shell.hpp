@@ -46,6 +46,8 @@ class Shell : public Configurable {
   CallPort<Signature>& call_port(std::string name, std::string type) {
     return add(ports_, std::make_unique<CallPort<Signature>>(std::move(name), std::move(type)));
   }
+  /// A port whose type is known at run time only.
+  PortBase& add_port(std::unique_ptr<PortBase> port) { return add(ports_, std::move(port)); }
   EventPort& event_port(std::string name) {
     return add(ports_, std::make_unique<EventPort>(std::move(name)));
   }

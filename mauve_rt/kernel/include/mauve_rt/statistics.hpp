@@ -26,6 +26,32 @@ class LatencyHistogram {
   std::atomic<time_ns_t> max_{0};
 };
 
+/// How long a state executed: how often, on average and at most. One writer, relaxed for the same reason; the
+/// average of a reader who comes in between can lack the newest execution's time.
+class ExecutionTime {
+ public:
+  /// [rt]
+  void record(time_ns_t duration_ns) noexcept {
+    count_.store(count_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    total_.store(total_.load(std::memory_order_relaxed) + duration_ns, std::memory_order_relaxed);
+    if (duration_ns > max_ns()) max_.store(duration_ns, std::memory_order_relaxed);
+  }
+  /// [rt]
+  std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
+  /// 0 when there was none. [rt]
+  time_ns_t mean_ns() const noexcept {
+    const std::uint64_t executions = count();
+    return executions == 0 ? 0 : total_.load(std::memory_order_relaxed) / static_cast<time_ns_t>(executions);
+  }
+  /// [rt]
+  time_ns_t max_ns() const noexcept { return max_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::uint64_t> count_{0};
+  std::atomic<time_ns_t> total_{0};
+  std::atomic<time_ns_t> max_{0};
+};
+
 /// One writer (the component's thread), relaxed for the same reason.
 struct TaskStatistics {
   std::atomic<std::uint64_t> releases{0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Task: the real-time thread that runs one component's state machine on its grid.
+// Task: runs one component's state machine on its grid, on a real-time thread of its own or in simulated time.
 #pragma once
 
 #include <pthread.h>
@@ -13,7 +13,9 @@
 #include "mauve_rt/commit.hpp"
 #include "mauve_rt/context.hpp"
 #include "mauve_rt/fsm.hpp"
+#include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/statistics.hpp"
+#include "mauve_rt/thread_counters.hpp"
 
 namespace mauve {
 
@@ -21,6 +23,10 @@ enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, 
 
 /// "UNCONFIGURED", "STOPPED", ... [rt]
 std::string_view to_string(ComponentState state) noexcept;
+/// HELD is RUNNING to who looks at an architecture: it is for a moment only. [rt]
+constexpr ComponentState settled(ComponentState state) noexcept {
+  return state == ComponentState::held ? ComponentState::running : state;
+}
 
 /// What to do when an instant has passed before its wait is entered.
 enum class OverrunPolicy : std::uint8_t {
@@ -36,7 +42,8 @@ struct TaskSettings {
   time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
   OverrunPolicy overrun{OverrunPolicy::skip};
   std::int64_t max_backlog{10};
-  std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 128 KiB are prefaulted
+  std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 64 KiB are prefaulted
+  std::size_t trace_records{2048};                   // room in the trace's ring until it is drained
 };
 
 /// What the kernel gave the thread, read back from it.
@@ -53,54 +60,84 @@ struct Fault {
 };
 
 /// Shared by all tasks of a deployment: bumped on every change of a component's state.
+/// A component not listed yet has nobody to tell.
 struct ChangeSignal {
   std::atomic<std::uint32_t> word{0};
+  std::atomic<ChangeSignal*> listener{nullptr};  // release/acquire: it is there before it is told of anything
+
+  /// Who else is told from now on; nullptr: nobody. [non-rt]
+  void set_listener(ChangeSignal* other) noexcept { listener.store(other, std::memory_order_release); }
   void bump() noexcept;  // [rt]
 };
 
-/// The thread of one component.
+/// Runs one component.
 ///
-/// | member                | written by                           | read by      | order                              |
-/// | --------------------- | ------------------------------------ | ------------ | ---------------------------------- |
-/// | control_ (futex)      | commanders set bits, thread clears   | thread       | acq_rel: a bit hands over its data |
-/// | state_ (futex)        | thread; watchdog: faulted            | anyone       | release/acquire: publishes fault_  |
-/// | commit_               | commanders; who takes it out owns it | both         | acq_rel: hands over the commit     |
-/// | commit_budget_ns_     | commanders, before commit_           | thread       | relaxed: control_ orders it        |
-/// | awaiting_release_     | thread; who takes it out owns it     | both         | acq_rel: hands over the commit     |
-/// | parked_, ended_       | thread                               | commanders   | release/acquire: all it wrote      |
-/// | start_at_ns_          | commanders, thread parked            | thread       | the kStart bit of control_         |
-/// | current_              | thread                               | anyone       | relaxed: a lone fact               |
-/// | context_, statistics_ | thread                               | anyone       | relaxed: lone facts                |
-/// | shell_, fsm_, core_   | commanders, thread parked; commits   | thread       | parking                            |
-/// | fault_                | who set condemned_, before state_    | anyone after | through state_                     |
-/// | condemned_            | thread or watchdog, the first wins   | both         | acq_rel: one writer of fault_      |
-/// | facts_                | thread, before the barrier           | anyone after | the barrier                        |
-/// | boundary_ns_ ...      | thread                               | thread       | its own                            |
-/// | command_mutex_        | ordinary threads, a command each     | -            | -                                  |
+/// The machine goes from wait to wait: resume() ends a wait, runs the execution states after it and enters the next.
+/// A thread sleeps in between; in simulated time whoever simulates calls resume().
+///
+/// | member                 | written by                            | read by      | order                              |
+/// | ---------------------- | ------------------------------------- | ------------ | ---------------------------------- |
+/// | control_ (futex)       | commanders set bits, machine clears   | machine      | acq_rel: a bit hands over its data |
+/// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
+/// | place_                 | who conducts a commit                 | machine      | seq_cst with at_commit_            |
+/// | commit_budget_ns_      | who conducts, before place_           | machine      | relaxed: control_ orders it        |
+/// | at_commit_ (futex)     | machine, around its use of place_     | conductor    | seq_cst: who retracts sees the use |
+/// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
+/// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
+/// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
+/// | current_               | machine                               | anyone       | relaxed: a lone fact               |
+/// | execution_*            | machine                               | watchdog     | release: the limit before began    |
+/// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
+/// | shell_, fsm_, core_,   | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
+/// | grid_                  |                                       |              |                                    |
+/// | fault_                 | who set condemned_                    | anyone       | under fault_mutex_ (PI)            |
+/// | condemned_             | machine or watchdog, the first wins   | both         | acq_rel: one fault at a time       |
+/// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
+/// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
+/// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
+/// | boundary_ns_ ...       | machine                               | machine      | its own                            |
+/// | command_mutex_         | ordinary threads, a command each      | -            | -                                  |
 class Task {
  public:
-  Task(std::string name, std::uint16_t number, ChangeSignal& changes,
-       const Clock& clock = MonotonicClock::instance());
+  Task(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Task();
   Task(const Task&) = delete;
   Task& operator=(const Task&) = delete;
 
-  /// What the thread will run. Not while running. [setup]
-  void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core) noexcept;
+  /// What the machine will run. Parked, or in a commit. [rt]
+  void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept;
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
   const TaskSettings& settings() const noexcept { return settings_; }
   Context& context() noexcept { return context_; }
+  /// What puts a fallback core in after a fault; nullptr: a fault is the end. [non-rt]
+  void set_fallback(CommitAction* fallback) noexcept { fallback_.store(fallback, std::memory_order_release); }
+  void set_fallen_back(bool fallen_back) noexcept {
+    fallen_back_.store(fallen_back, std::memory_order_release);
+  }
+  /// Whether the core that runs is the fallback. [rt]
+  bool has_fallen_back() const noexcept { return fallen_back_.load(std::memory_order_acquire); }
 
-  /// Creates the thread, which prefaults its stack, reads back its rights and meets the barrier, then parks.
+  /// Creates the thread, which prefaults its stack, reads back its rights and meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
   /// when told so.
-  void create_thread(pthread_barrier_t& barrier, bool require_realtime, bool trace);
+  void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace);
   /// Tells the thread to end, then joins it; false when it was still in user code at the instant. [non-rt]
   bool end_thread(time_ns_t until_ns) noexcept;
-  bool has_thread() const noexcept { return has_thread_; }
+  bool has_thread() const noexcept { return has_thread_.load(std::memory_order_acquire); }
 
-  /// The grid of the deployment: start() falls back on it. [setup]
-  void set_grid(const Grid& grid) noexcept;
+  /// In place of a thread: every command is taken up at once, on the calling thread. [setup]
+  void simulate(const Clock& clock, bool trace);
+  void end_simulation() noexcept;
+  bool is_simulated() const noexcept { return simulated_; }
+  const Clock& clock() const noexcept { return *clock_; }
+
+  /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt]
+  void resume() noexcept;
+  /// The instant that the wait under way ends at; kForever while parked. [rt], the machine's thread or a simulation.
+  time_ns_t due_ns() const noexcept;
+
+  /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
+  time_ns_t join(time_ns_t epoch_ns) noexcept;
   const Grid& grid() const noexcept { return grid_; }
 
   /// Enters the initial state at exactly this instant; for deployment. Does not wait for the thread. [non-rt]
@@ -116,13 +153,28 @@ class Task {
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
   time_ns_t get_time() const noexcept { return context_.instant_ns.load(std::memory_order_relaxed); }
 
-  /// Carries out the action inside the component's wait, or here and now when it is parked. [non-rt]
-  /// Returns false when adopt returned false; rethrows what it threw. Throws Error (timeout) naming the state
-  /// still running; nothing was changed then.
-  bool commit(Commit& commit, time_ns_t timeout_ns);
+  // ---- the task's side of a commit (commit.hpp)
+
+  /// Asks the machine to come to the commit's gate in its next wait. [rt]
+  void post(Participant& place) noexcept;
+  /// After this the machine does not refer to the participant any more, but for its next release. [rt]
+  void retract() noexcept;
+  /// Writes the outputs that say so: on_commit, or on_stop. [rt]
+  void write_outputs(bool commit) noexcept;
+  /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
+  void hold_parked(Participant& place) const noexcept;
+  /// Carries on after a commit, when parked or simulated. [non-rt], command mutex held.
+  void finish_parked(Participant& place, bool committed) noexcept;
   /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
   /// came first. [non-rt]
-  bool wait_release(Commit& commit, time_ns_t until_ns) noexcept;
+  bool wait_release(Participant& place, time_ns_t until_ns) noexcept;
+  ChangeSignal& changes() noexcept { return changes_; }
+  std::mutex& command_mutex() noexcept { return command_mutex_; }
+  [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
+                                        const std::string& remedy) const;
+
+  /// Tells the machine that an event it may wait for has come. [rt]
+  void signal_event() noexcept;
 
   /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component
   /// FAULTED, writes its outputs and takes the thread's priority away. Returns whether it did. [non-rt]
@@ -133,67 +185,89 @@ class Task {
   }
   /// For configure and cleanup of the component. [non-rt]
   void set_state(ComponentState state) noexcept;
-  /// Forgets a fault, for configure; the thread must be parked. [non-rt]
+  /// Forgets a fault, for configure; the machine must be parked. [non-rt]
   void clear_fault() noexcept;
   /// Tells who waits for changes that there was one. [rt]
   void signal_change() noexcept { changes_.bump(); }
-  /// Whether the thread is out of user code for good, until the next start. [non-rt]
+  /// Whether the machine is out of user code for good, until the next start. [non-rt]
   bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
   /// The state being executed or waited in; empty before the start. [non-rt]
   std::string current_state() const;
-  const Fault& fault() const noexcept { return fault_; }
+  /// The last fault, also of a core that a fallback has replaced; empty when there was none. [non-rt]
+  Fault fault() const;
   const ThreadFacts& facts() const noexcept { return facts_; }
   const TaskStatistics& statistics() const noexcept { return statistics_; }
+  /// What the thread allocated, and its page faults, since its last start.
+  const ThreadCounters& counters() const noexcept { return counters_; }
+  /// The trace's ring; nullptr when nothing is traced. [non-rt]
   TraceRing* ring() noexcept { return ring_.get(); }
+  /// Gives the ring away, when the component is removed before the ring is drained; parked, no thread. [non-rt]
+  std::unique_ptr<TraceRing> release_ring() noexcept { return std::move(ring_); }
   const std::string& name() const noexcept { return name_; }
+  std::uint16_t number() const noexcept { return number_; }
 
  private:
-  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8;
+  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16;  // of control_
+  enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
 
+  // commands
+  void post_start(time_ns_t instant_ns) noexcept;
+  time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
+  void begin_trace(bool trace);
+
+  // the thread
   static void* thread_entry(void* self) noexcept;
   void thread_main() noexcept;
-  bool wait_for_start() noexcept;
-  void run_machine();
+  bool must_act(std::uint32_t control) noexcept;
+  void read_back_thread();
+
+  // the machine
+  void take_up_start() noexcept;
+  void start_machine(time_ns_t instant_ns) noexcept;
+  void warm_up() noexcept;
+  void run_to_next_wait();
   const State* execute(const State& state);
-  bool wait(const State& state);
+  void enter_wait(const State& state);
+  void settle_event() noexcept;
   void handle_overrun(const State& state, time_ns_t now_ns);
-  bool sleep_until_clock(const State& state);
-  bool may_commit_now() noexcept;
-  void commit_pending(const State& state) noexcept;
-  void carry_out(Commit& commit, const State* state) noexcept;
-  void refuse_pending_commit() noexcept;
-  void release(const State& state, time_ns_t actual_ns) noexcept;
+  void release(time_ns_t actual_ns) noexcept;
+  bool may_commit_now() const noexcept;
+  void come_to_commit() noexcept;
+  void visit(Participant& place) noexcept;
+  void exchange_state(ComponentState from, ComponentState to) noexcept;
+  void continue_after(Participant& place, bool made_it) noexcept;
+  void refuse_commit() noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what) noexcept;
+  void park_condemned() noexcept;
+  void end_in_fault() noexcept;
   void park(ComponentState state) noexcept;
   void wait_condemned() const noexcept;
-  void post_start(time_ns_t instant_ns) noexcept;
-  void write_outputs(bool commit) noexcept;
+  void fall_back(CommitAction& fallback) noexcept;
   void publish_state(ComponentState state) noexcept;
-  void read_back_thread();
+
   void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
              std::int64_t c = 0) noexcept {
-    if (active_ring_ != nullptr) active_ring_->push(kind, name, a, b, c);
+    if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
   }
   void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0,
                 std::int64_t b = 0) noexcept {
-    if (active_ring_ != nullptr) active_ring_->push_at(time_ns, kind, name, a, b);
+    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b);
   }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
   void set_clock_ns(time_ns_t instant) noexcept {
     context_.clock_ns.store(instant, std::memory_order_relaxed);
   }
-  [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
-                                        const std::string& remedy) const;
 
   std::string name_;
+  std::uint16_t number_;
   ChangeSignal& changes_;
-  const Clock& clock_;
+  const Clock* clock_;
   TaskSettings settings_;
   Context context_;
   TaskStatistics statistics_;
+  ThreadCounters counters_;
   std::unique_ptr<TraceRing> ring_;
-  TraceRing* active_ring_{nullptr};
 
   Shell* shell_{nullptr};
   const FsmBase* fsm_{nullptr};
@@ -203,24 +277,39 @@ class Task {
   std::mutex command_mutex_;
   pthread_t thread_{};
   pthread_barrier_t* barrier_{nullptr};
-  bool has_thread_{false};
+  std::atomic<bool> has_thread_{false};
+  bool simulated_{false};
   ThreadFacts facts_;
+  mutable PiMutex fault_mutex_;
   Fault fault_;
 
   alignas(64) std::atomic<std::uint32_t> control_{0};
   std::atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
   std::atomic<std::uint32_t> parked_{1};
+  std::atomic<std::uint32_t> ready_{0};
   std::atomic<std::uint32_t> ended_{0};
-  std::atomic<Commit*> commit_{nullptr};
+  std::atomic<Participant*> place_{nullptr};
   std::atomic<time_ns_t> commit_budget_ns_{0};
+  std::atomic<std::uint32_t> at_commit_{0};
   time_ns_t start_at_ns_{0};
-  std::atomic<const State*> current_{nullptr};
-  std::atomic<time_ns_t> execution_began_ns_{0};  // 0: no execution state under way
-  std::atomic<Commit*> awaiting_release_{nullptr};
+  std::atomic<std::uint32_t> current_{0};         // the state's name in the trace; 0: none yet
+  std::atomic<time_ns_t> execution_began_ns_{0};  // 0: no execution state with a bound under way
+  std::atomic<time_ns_t> execution_limit_ns_{0};
+  std::atomic<Participant*> awaiting_release_{nullptr};
   std::atomic<std::uint32_t> condemned_{0};
-  time_ns_t boundary_ns_{
-      0};             // the thread's own: when the last state ended or the last release came, read once
-  int deferrals_{0};  // the thread's own: releases a commit was put off for want of time
+  std::atomic<CommitAction*> fallback_{nullptr};
+  std::atomic<bool> fallen_back_{false};
+
+  // the machine's own
+  const State* waiting_{
+      nullptr};  // the state it waits in; the initial one before its first release; nullptr: parked
+  const State* next_{nullptr};  // where it goes on after the wait
+  time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
+  bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
+  time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
+  int deferrals_{0};            // releases a commit was put off for want of time
+  bool is_cold_{false};         // started, and not woken ahead of its first release yet
+  bool left_gate_{false};       // it came to the gate in this wait, and left for its instant
 };
 
 }  // namespace mauve

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A trace record: of a thread that traces, of one that does not, beside clock_gettime.
+//   bench_trace [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0]
+// Prints {"on_ps": [...], "off_ps": [...], "clock_ps": [...]}: a user's own mark with a ring, without, and a
+// bare clock_gettime(CLOCK_MONOTONIC), in picoseconds a call. Rings are emptied between blocks.
+#include <ctime>
+
+#include "mauve_rt/trace.hpp"
+
+#include "support/micro.hpp"
+
+namespace {
+
+void mark(std::int64_t calls) {
+  for (std::int64_t i = 0; i < calls; ++i) {
+    mauve::trace_mark(1, i);
+    bench::keep(i);  // or the question whether there is a ring would be asked once for all
+  }
+}
+
+void measure(const bench::Options& options) {
+  const bench::Micro micro(options);
+  mauve::TraceRing ring(0);
+  if (micro.calls > static_cast<std::int64_t>(mauve::TraceRing::kDefaultCapacity))
+    throw std::runtime_error("--calls: a block does not fit into a ring");
+  std::vector<mauve::TraceRecord> records;
+  records.reserve(mauve::TraceRing::kDefaultCapacity);
+  const auto traced = [&](std::int64_t calls) {
+    mauve::TraceRing::set_for_this_thread(&ring);
+    mark(calls);
+    mauve::TraceRing::set_for_this_thread(nullptr);
+  };
+  const auto clock = [](std::int64_t calls) {
+    for (std::int64_t i = 0; i < calls; ++i) {
+      timespec now;
+      clock_gettime(CLOCK_MONOTONIC, &now);
+      bench::keep(now);
+    }
+  };
+  const auto drain = [&] {
+    records.clear();
+    ring.drain(records);
+  };
+  bench::JsonLine line;
+  micro.compare(line, {{"on", traced, drain}, {"off", mark}, {"clock", clock}});
+  if (ring.dropped() != 0) throw std::runtime_error("trace records were lost");
+  line.print();
+}
+
+}  // namespace
+
+int main(int count, char** words) { return bench::run_program(count, words, measure); }

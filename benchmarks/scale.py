@@ -1,0 +1,62 @@
+"""Many components in one process: time to start, CPU share, locked memory."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import native
+from rows import Row, alone, compared
+from settings import Settings
+
+_COUNTS = (8, 64, 500)
+_KIB = 1024
+_LINEAR = 1.5
+"""A component of the most costs at most so many times one of the middle count, or it is not linear."""
+
+
+def scale_rows(settings: Settings) -> Iterator[Row]:
+    """Components at 10 Hz, as many as there may be."""
+    rounds = native.interleaved(
+        settings.rounds,
+        *[_measure(count, settings.scale_s) for count in _COUNTS],
+    )
+    found = {count: [found[place] for found in rounds] for place, count in enumerate(_COUNTS)}
+    for count in _COUNTS:
+        lead_ms = max(20, count)
+        firsts = sorted(one["first_ns"] / 1e6 for one in found[count])
+        note = f"the last first release came {firsts[len(firsts) // 2]:.0f} ms after the call of deploy(), "
+        note += f"{lead_ms} ms of them the lead that every deployment of {count} gives its threads"
+        what = f"{count} components at 10 Hz"
+        starts = [one["start_ns"] / 1e6 for one in found[count]]
+        yield alone(f"{what}: time until all threads are ready", starts, unit="ms", note=note)
+        shares = [100 * one["cpu_ns"] / one["ran_ns"] for one in found[count]]
+        yield alone(f"{what}: share of one CPU", shares, unit="%")
+        reserved = found[count][0]["reserved_bytes"] / count / _KIB
+        note = "resident pages of locked mappings (Locked of smaps_rollup); the mappings themselves (VmLck) "
+        note += f"grew by {reserved:.0f} KiB each"
+        locked = [one["locked_bytes"] / count / _KIB for one in found[count]]
+        yield alone(f"{what}: locked memory each", locked, unit="KiB", limit=256, note=note)
+    for what, name in (
+        ("time to start", "start_ns"),
+        ("CPU time", "cpu_ns"),
+        ("locked memory", "locked_bytes"),
+    ):
+        middle, most = _COUNTS[1:]
+        pairs = [
+            (big[name] / most, small[name] / middle)
+            for big, small in zip(found[most], found[middle], strict=True)
+        ]
+        unit, scale = ("KiB", _KIB) if name == "locked_bytes" else ("us", 1000)
+        yield compared(
+            f"{what} of one component among {most}",
+            [(a / scale, b / scale) for a, b in pairs],
+            unit=unit,
+            beside=f"among {middle}",
+            ratio_limit=_LINEAR,
+        )
+
+
+def _measure(count: int, duration_s: float) -> native.Measure:
+    def measure(_: int) -> dict[str, Any]:
+        return native.run("bench_scale", components=count, duration_ms=round(duration_s * 1000))
+
+    return measure

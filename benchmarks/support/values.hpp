@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Values of the sizes that are measured.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "mauve_rt/cdr.hpp"
+
+namespace bench {
+
+/// 16 bytes; equal halves are whole, others are torn.
+struct Small {
+  std::int64_t first{};
+  std::int64_t second{};
+};
+
+/// 4 KiB.
+struct Large {
+  std::array<double, 512> items{};
+};
+
+static_assert(sizeof(Small) == 16 && sizeof(Large) == 4096);
+
+}  // namespace bench
+
+MAUVE_TYPE(bench::Small, "bench/Small", first, second)
+MAUVE_TYPE(bench::Large, "bench/Large", items)

@@ -1,0 +1,93 @@
+"""The kernel's concepts in Python, under the names they have in C++.
+
+    from mauve_rt.api import Architecture, Core, Deployer, Fsm, PluginRegistry, SharedData, Shell
+
+Shells, cores, fsms and resources may be written in Python or come by name from libraries, mixed at will.
+"""
+
+from mauve_rt._kernel import (
+    NOT_MEASURED,
+    Architecture,
+    ArchitectureDescription,
+    Component,
+    ComponentDescription,
+    Deployer,
+    ExecutionTimeDescription,
+    MauveError,
+    PluginRegistry,
+    PortDescription,
+    PropertyDescription,
+    RealtimeStatus,
+    ResourceDescription,
+    ServiceDescription,
+    Simulation,
+    StepReport,
+    TraceDrain,
+    Transaction,
+    TransactionReport,
+    monotonic_ns,
+)
+from mauve_rt.cores import Core
+from mauve_rt.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
+from mauve_rt.fsms import Fsm, State
+from mauve_rt.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
+from mauve_rt.resources import (
+    AnyResource,
+    EventCounter,
+    LatestValue,
+    Resource,
+    RingBuffer,
+    SharedData,
+    service,
+)
+from mauve_rt.shells import NativeShell, Shell
+from mauve_rt.time import ms_to_ns, s_to_ns, us_to_ns
+
+__all__ = [
+    "NOT_MEASURED",
+    "AnyResource",
+    "Architecture",
+    "ArchitectureDescription",
+    "CallPort",
+    "Component",
+    "ComponentDescription",
+    "Core",
+    "Deployer",
+    "EventCounter",
+    "EventPort",
+    "ExecutionTimeDescription",
+    "Fsm",
+    "LatestValue",
+    "MauveError",
+    "NativeShell",
+    "PluginRegistry",
+    "PortDescription",
+    "Property",
+    "PropertyDescription",
+    "ReadPort",
+    "RealtimeStatus",
+    "Resource",
+    "ResourceDescription",
+    "RingBuffer",
+    "Sample",
+    "ServiceDescription",
+    "SharedData",
+    "Shell",
+    "Simulation",
+    "State",
+    "StepReport",
+    "TraceDrain",
+    "Transaction",
+    "TransactionReport",
+    "WritePort",
+    "call_port",
+    "event_port",
+    "monotonic_ns",
+    "ms_to_ns",
+    "property",
+    "read_port",
+    "s_to_ns",
+    "service",
+    "us_to_ns",
+    "write_port",
+]

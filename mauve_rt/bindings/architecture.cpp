@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Architectures and their components.
+#include "component.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+// A lock that a call may wait for is never waited for under the interpreter's lock.
+using Unlocked = py::call_guard<py::gil_scoped_release>;
+
+std::vector<ComponentDescription> describe_components(PyArchitecture& self) {
+  const py::gil_scoped_release release;
+  const std::lock_guard lock(self.describing);
+  std::vector<ComponentDescription> all;
+  for (const auto& component : self.architecture.components()) all.push_back(describe_component(*component));
+  return all;
+}
+
+std::vector<ResourceDescription> describe_resources(PyArchitecture& self) {
+  std::vector<ResourceDescription> all;
+  for (const auto& resource : self.architecture.resources()) all.push_back(describe_resource(*resource));
+  return all;
+}
+
+}  // namespace
+
+void bind_architecture(py::module_& module) {
+  bind_component(module);
+  py::class_<PyArchitecture>(module, "Architecture")
+      .def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
+      .def(
+          "add_component",
+          [](const py::object& object, const std::string& name, const py::object& shell,
+             const py::object& core, const py::object& fsm, int priority, const std::vector<int>& cpus,
+             time_ns_t offset_ns, time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
+             std::size_t stack_bytes, std::size_t trace_records, const std::vector<std::string>& alternatives,
+             const py::object& fallback, bool reconfigurable) {
+            auto& self = object.cast<PyArchitecture&>();
+            const PluginRegistry& registry = self.registry;
+            std::unique_ptr<CoreBase> fallback_core;
+            if (!fallback.is_none()) fallback_core = make_core(fallback, registry);
+            Component& component = self.architecture.add_component(
+                name, make_shell(shell, registry), make_core(core, registry), make_fsm(fsm, registry),
+                task_settings(priority, cpus, offset_ns, period_ns, overrun, max_backlog, stack_bytes,
+                              trace_records),
+                fsm_factory(fsm, registry));
+            if (fallback_core != nullptr) component.set_fallback(std::move(fallback_core));
+            component.allow(alternatives, reconfigurable);
+            return PyComponent(object, name);
+          },
+          py::arg("name"), py::arg("shell"), py::arg("core"), py::arg("fsm"), py::kw_only(),
+          py::arg("priority") = 50, py::arg("cpus") = std::vector<int>{}, py::arg("offset_ns") = 0,
+          py::arg("period_ns") = 0, py::arg("overrun") = "skip", py::arg("max_backlog") = 10,
+          py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
+          py::arg("trace_records") = TaskSettings{}.trace_records,
+          py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = py::none(),
+          py::arg("reconfigurable") = true)
+      .def(
+          "component",
+          [](const py::object& object, const std::string& name) {
+            static_cast<void>(object.cast<PyArchitecture&>().architecture.component(name));
+            return PyComponent(object, name);
+          },
+          py::arg("name"))
+      .def(
+          "add_resource",
+          [](PyArchitecture& self, const std::string& name, const py::object& resource) {
+            self.architecture.add_resource(name, make_resource(resource, self.registry));
+          },
+          py::arg("name"), py::arg("resource"))
+      .def(
+          "add_resource",
+          [](PyArchitecture& self, const std::string& name, const std::string& kind, const std::string& type,
+             std::size_t capacity, bool overwrite, std::uint32_t max_readers) {
+            self.architecture.add_resource(
+                name,
+                self.registry.make_resource(
+                    kind, type, {.capacity = capacity, .overwrite = overwrite, .max_readers = max_readers}));
+          },
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
+          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders)
+      .def(
+          "connect",
+          [](PyArchitecture& self, const std::string& component, const std::string& port,
+             const std::string& resource,
+             const std::string& service) { self.architecture.connect(component, port, resource, service); },
+          py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"), Unlocked())
+      .def(
+          "set_property",
+          [](PyArchitecture& self, const std::string& component, const std::string& name,
+             const PropertyValue& value) {
+            self.architecture.component(component).set_property(name, value);
+          },
+          py::arg("component"), py::arg("name"), py::arg("value"), Unlocked())
+      .def(
+          "publish",
+          [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },
+          py::arg("resource"))
+      .def(
+          "subscribe",
+          [](PyArchitecture& self, const std::string& resource) {
+            self.architecture.resource(resource).bind_input();
+          },
+          py::arg("resource"))
+      .def(
+          "configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
+      .def(
+          "cleanup",
+          [](PyArchitecture& self) {
+            const std::lock_guard lock(self.describing);
+            self.architecture.cleanup();
+          },
+          Unlocked())
+      .def(
+          "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked())
+      .def("epoch", [](PyArchitecture& self) { return self.architecture.epoch(); })
+      .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
+      .def("components", &describe_components)
+      .def("resources", &describe_resources);
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Shells written in Python, and what Python objects see of the shell of their component.
+#include "python_call.hpp"
+#include "python_resource.hpp"
+#include "serialized.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+std::span<const std::byte> as_bytes_view(std::string_view data) { return std::as_bytes(std::span(data)); }
+
+OutputPolicy output_policy(const std::string& name, const char* element) {
+  if (name == "hold") return OutputPolicy::hold;
+  if (name == "set_zero") return OutputPolicy::set_zero;
+  throw Error(ErrorCode::invalid_argument, "there is no such output policy",
+              {.element = element, .expected = "hold or set_zero", .found = name});
+}
+
+/// Handed to the Python object while it declares itself.
+class ShellBuilder {
+ public:
+  ShellBuilder(PythonShell& shell, const PluginRegistry& registry) : shell_(shell), registry_(registry) {}
+
+  void read_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero) {
+    data_port(PortKind::read, name, type, {}, zero);
+  }
+  void write_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero,
+                  const std::string& on_commit, const std::string& on_stop) {
+    data_port(
+        PortKind::write, name, type,
+        {.on_commit = output_policy(on_commit, "on_commit"), .on_stop = output_policy(on_stop, "on_stop")},
+        zero);
+  }
+  void call_port(const std::string& name, const std::string& type) {
+    shell_.add_port(std::make_unique<PythonCallPort>(name, type));
+  }
+  void event_port(const std::string& name) { shell_.event_port(name); }
+  void property(const std::string& name, const PropertyValue& value, const std::string& unit,
+                const std::string& description, std::optional<double> minimum,
+                std::optional<double> maximum) {
+    const PropertyOptions options{unit, description, minimum, maximum};
+    std::visit([&](const auto& initial) { add_property(name, initial, options); }, value);
+    static_cast<void>(shell_.find_property(name)->checked(value));  // the default is in the range, too
+  }
+
+ private:
+  template <typename T>
+  void add_property(const std::string& name, const T& initial, const PropertyOptions& options) {
+    shell_.property(name, initial, options);
+  }
+  void add_property(const std::string& name, const std::string& initial, const PropertyOptions& options) {
+    shell_.property(name, initial.c_str(), options);
+  }
+  /// C++ has the type where a plug-in registered it; a message that none registered travels serialized.
+  void data_port(PortKind kind, const std::string& name, const std::string& type, OutputOptions output,
+                 const std::optional<std::string>& zero) {
+    const std::vector<std::string> registered = registry_.names("type");
+    if (zero.has_value() && !std::binary_search(registered.begin(), registered.end(), type)) {
+      shell_.add_port(make_serialized_port(kind, name, type, output, as_bytes_view(*zero)));
+    } else {
+      shell_.add_port(registry_.make_port(kind, type, name, output));
+    }
+  }
+
+  PythonShell& shell_;
+  const PluginRegistry& registry_;
+};
+
+}  // namespace
+
+PythonShell::PythonShell(const PartFactory& factory, const PluginRegistry& registry)
+    : link_(std::make_shared<ShellLink>(ShellLink{this, nullptr})) {
+  set_implementation(factory.name);
+  in_python([&] {
+    object_.set(factory.make->get()());
+    ShellBuilder builder(*this, registry);
+    object_.get().attr("_declare")(py::cast(builder, py::return_value_policy::reference));
+    object_.get().attr("_bind")(ShellView(link_));
+  });
+}
+
+PythonShell::~PythonShell() {
+  const py::gil_scoped_acquire lock;
+  link_->shell = nullptr;
+  link_->context = nullptr;
+}
+
+bool PythonShell::configure_hook() {
+  return in_python([&] { return call_hook(object(), "configure"); });
+}
+void PythonShell::cleanup_hook() {
+  in_python([&] { call_hook(object(), "cleanup"); });
+}
+
+Shell& ShellView::shell() const {
+  if (link_->shell != nullptr) return *link_->shell;
+  throw Error(ErrorCode::not_configured, "the component of this shell is gone",
+              {.remedy = "keep no core or shell longer than its component"});
+}
+
+PortBase& ShellView::require_port(const std::string& name, PortKind kind) const {
+  PortBase* port = shell().find_port(name);
+  if (port == nullptr) throw py::key_error("the shell has no port '" + name + "'");
+  if (port->kind() != kind) {
+    throw py::type_error("port '" + name + "' is a " + std::string(to_string(port->kind())) + " port");
+  }
+  return *port;
+}
+
+py::tuple ShellView::read(const std::string& name) const {
+  PortBase& port = require_port(name, PortKind::read);
+  std::vector<std::byte> message;
+  DataStatus status = DataStatus::none;
+  time_ns_t time_ns = 0;
+  {
+    const py::gil_scoped_release release;  // the resource has a lock of its own
+    port.read_serialized(message, status, time_ns);
+  }
+  return py::make_tuple(to_bytes(message), static_cast<int>(status), time_ns);
+}
+
+bool ShellView::write(const std::string& name, const py::bytes& data) const {
+  PortBase& port = require_port(name, PortKind::write);
+  const std::string_view message = data;
+  const py::gil_scoped_release release;
+  return port.write_serialized(as_bytes_view(message));
+}
+
+py::object ShellView::call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const {
+  auto* port = dynamic_cast<PythonCallPort*>(&require_port(name, PortKind::call));
+  if (port == nullptr) throw py::type_error("call port '" + name + "' has a signature in C++");
+  return port->call(args, kwargs);
+}
+
+void ShellView::raise_event(const std::string& name) const {
+  auto& port = dynamic_cast<EventPort&>(require_port(name, PortKind::event));
+  const py::gil_scoped_release release;
+  port.raise();
+}
+
+py::object ShellView::property(const std::string& name) const {
+  const PropertyBase* property = shell().find_property(name);
+  if (property == nullptr) throw py::key_error("the shell has no property '" + name + "'");
+  return to_python(property->boxed());
+}
+
+time_ns_t ShellView::clock() const {
+  static_cast<void>(shell());
+  return link_->context != nullptr ? link_->context->clock_ns.load(std::memory_order_relaxed)
+                                   : monotonic_now_ns();
+}
+
+time_ns_t ShellView::period() const {
+  static_cast<void>(shell());
+  return link_->context != nullptr ? link_->context->period_ns.load(std::memory_order_relaxed) : 0;
+}
+
+py::object ShellView::python() const {
+  const auto* python = dynamic_cast<const PythonShell*>(&shell());
+  return python != nullptr ? python->object() : py::none();
+}
+
+std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const PluginRegistry& registry) {
+  return std::make_unique<PythonShell>(factory, registry);
+}
+
+void bind_python_shell(py::module_& module) {
+  py::class_<ShellView>(module, "ShellView")
+      .def("read", &ShellView::read, py::arg("port"))
+      .def("write", &ShellView::write, py::arg("port"), py::arg("data"))
+      .def("call", &ShellView::call, py::arg("port"))
+      .def("raise_event", &ShellView::raise_event, py::arg("port"))
+      .def("property", &ShellView::property, py::arg("name"))
+      .def("ports", &ShellView::ports)
+      .def("properties", &ShellView::properties)
+      .def("clock", &ShellView::clock)
+      .def("period", &ShellView::period)
+      .def("python", &ShellView::python)
+      .def("implementation", &ShellView::implementation);
+  py::class_<ShellBuilder>(module, "ShellBuilder")
+      .def("read_port", &ShellBuilder::read_port, py::arg("name"), py::arg("type"), py::arg("zero"))
+      .def("write_port", &ShellBuilder::write_port, py::arg("name"), py::arg("type"), py::arg("zero"),
+           py::arg("on_commit"), py::arg("on_stop"))
+      .def("call_port", &ShellBuilder::call_port, py::arg("name"), py::arg("type"))
+      .def("event_port", &ShellBuilder::event_port, py::arg("name"))
+      .def("property", &ShellBuilder::property, py::arg("name"), py::arg("value"), py::arg("unit"),
+           py::arg("description"), py::arg("minimum"), py::arg("maximum"));
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Data of ROS messages that no C++ library registered: serialized, between components in Python and topics.
+#pragma once
+
+#include <mutex>
+
+#include "mauve_rt/mauve_rt.hpp"
+
+namespace mauve::bindings {
+
+inline constexpr std::string_view kSerializedRepresentation = "serialized";
+
+using Message = std::vector<std::byte>;
+
+class SerializedReadService : public ServiceBase {
+ public:
+  explicit SerializedReadService(std::string type) : ServiceBase("read", PortKind::read, std::move(type)) {}
+  std::string_view representation() const noexcept override { return kSerializedRepresentation; }
+  /// Copies what is there, else the type's zero. [non-rt]
+  virtual DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) = 0;
+};
+
+class SerializedWriteService : public ServiceBase {
+ public:
+  explicit SerializedWriteService(std::string type)
+      : ServiceBase("write", PortKind::write, std::move(type)) {}
+  std::string_view representation() const noexcept override { return kSerializedRepresentation; }
+  /// Takes a copy; false when there was no room, or more bytes than declared. [rt]
+  virtual bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+};
+
+/// What a resource of serialized messages holds.
+struct SerializedOptions {
+  std::string type;
+  Message zero;                 // the message with every field at its default
+  std::size_t max_bytes{4096};  // of one message
+  std::size_t capacity{0};      // of a ring_buffer
+  bool overwrite{false};        // a full ring's oldest
+};
+
+/// As ReadPort<T> and WritePort<T>.
+std::unique_ptr<PortBase> make_serialized_port(PortKind kind, const std::string& name,
+                                               const std::string& type, OutputOptions output,
+                                               std::span<const std::byte> zero);
+/// As PluginRegistry::make_resource, of "shared_data" or "ring_buffer". Throws Error: invalid_argument.
+std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, SerializedOptions options);
+
+}  // namespace mauve::bindings

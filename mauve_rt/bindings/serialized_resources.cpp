@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "serialized.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+/// One serialized message in memory that was set aside for the longest.
+struct Place {
+  Message message;
+  time_ns_t time_ns{0};
+
+  void set(std::span<const std::byte> bytes, time_ns_t time) noexcept {
+    message.assign(bytes.begin(), bytes.end());  // within what was reserved: allocates nothing
+    time_ns = time;
+  }
+};
+
+/// What shared data and rings of serialized messages have in common: services and serialized face.
+class SerializedResource : public Resource {
+ public:
+  SerializedResource(std::string kind, SerializedOptions options)
+      : Resource(std::move(kind), options.type), options_(std::move(options)) {
+    offer(read_);
+    offer(write_);
+  }
+
+  void set_name(const std::string& name) override {
+    Resource::set_name(name);
+    mutex_.set_trace_id(TraceNames::intern(name));
+  }
+  bool is_serializable() const noexcept override { return true; }
+  bool next_sample(Message& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    return read(message, time_ns, seen) == DataStatus::new_data;
+  }
+  bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
+    return message.size() >= kCdrHeader.size() && write(message, time_ns);
+  }
+
+ protected:
+  virtual DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept = 0;
+  virtual bool put_in(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+
+  DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) {
+    message.reserve(options_.max_bytes);  // not under the lock
+    const std::lock_guard lock(mutex_);
+    return take_out(message, time_ns, seen);
+  }
+  bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
+    if (message.size() > options_.max_bytes) return false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!put_in(message, time_ns)) return false;
+    }
+    written(time_ns);
+    return true;
+  }
+  Place place() const {
+    Place made;
+    made.message.reserve(options_.max_bytes);
+    return made;
+  }
+  const SerializedOptions& options() const noexcept { return options_; }
+
+ private:
+  class Read final : public SerializedReadService {
+   public:
+    explicit Read(SerializedResource& owner) : SerializedReadService(owner.type()), owner_(owner) {}
+    DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+      return owner_.read(message, time_ns, seen);
+    }
+
+   private:
+    SerializedResource& owner_;
+  };
+  class Write final : public SerializedWriteService {
+   public:
+    explicit Write(SerializedResource& owner) : SerializedWriteService(owner.type()), owner_(owner) {}
+    bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
+      return owner_.write(message, time_ns);
+    }
+
+   private:
+    SerializedResource& owner_;
+  };
+
+  SerializedOptions options_;
+  PiMutex mutex_;
+  Read read_{*this};
+  Write write_{*this};
+};
+
+/// As SharedData<T>.
+///
+/// | member            | written by    | under   |
+/// | ----------------- | ------------- | ------- |
+/// | place_, sequence_ | write service | mutex_  |
+class SerializedData final : public SerializedResource {
+ public:
+  explicit SerializedData(SerializedOptions options)
+      : SerializedResource("shared_data", std::move(options)), place_(place()) {}
+
+  bool peek_sample(Message& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    sequence = 0;
+    if (read(message, time_ns, sequence) != DataStatus::none) return true;
+    message = options().zero;
+    return false;
+  }
+
+ protected:
+  DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept override {
+    if (sequence_ == 0) return DataStatus::none;
+    message.assign(place_.message.begin(), place_.message.end());
+    time_ns = place_.time_ns;
+    return std::exchange(seen, sequence_) != sequence_ ? DataStatus::new_data : DataStatus::old_data;
+  }
+  bool put_in(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
+    place_.set(message, time_ns);
+    ++sequence_;
+    return true;
+  }
+
+ private:
+  Place place_;
+  std::uint64_t sequence_{0};
+};
+
+/// As RingBuffer<T>.
+///
+/// | member                 | written by           | under  |
+/// | ---------------------- | -------------------- | ------ |
+/// | places_, first_, size_ | read, write services | mutex_ |
+class SerializedRing final : public SerializedResource {
+ public:
+  explicit SerializedRing(SerializedOptions options) : SerializedResource("ring_buffer", std::move(options)) {
+    for (std::size_t i = 0; i < this->options().capacity; ++i) places_.push_back(place());
+  }
+
+ protected:
+  DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept override {
+    if (size_ == 0) {
+      message.clear();
+      return seen == 0 ? DataStatus::none : DataStatus::old_data;
+    }
+    const Place& oldest = places_[first_];
+    message.assign(oldest.message.begin(), oldest.message.end());
+    time_ns = oldest.time_ns;
+    drop_oldest();
+    ++seen;
+    return DataStatus::new_data;
+  }
+  bool put_in(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
+    if (size_ == places_.size()) {
+      if (!options().overwrite) return false;
+      drop_oldest();
+    }
+    places_[(first_ + size_) % places_.size()].set(message, time_ns);
+    ++size_;
+    return true;
+  }
+
+ private:
+  void drop_oldest() noexcept {
+    first_ = (first_ + 1) % places_.size();
+    --size_;
+  }
+
+  std::vector<Place> places_;
+  std::size_t first_{0};
+  std::size_t size_{0};
+};
+
+}  // namespace
+
+std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, SerializedOptions options) {
+  if (options.max_bytes < options.zero.size()) {
+    throw Error(ErrorCode::invalid_argument, "the resource has no room for a message of its type",
+                {.element = "max_bytes",
+                 .expected = "at least " + std::to_string(options.zero.size()),
+                 .found = std::to_string(options.max_bytes)});
+  }
+  if (kind == "shared_data") return std::make_unique<SerializedData>(std::move(options));
+  if (kind == "ring_buffer" && options.capacity == 0) {
+    throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
+                {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add a capacity"});
+  }
+  if (kind == "ring_buffer") return std::make_unique<SerializedRing>(std::move(options));
+  throw Error(ErrorCode::unknown_type, "the data type is not registered",
+              {.element = "type " + options.type,
+               .expected = "a type that a plug-in library registers, for a resource of kind " + kind,
+               .found = "a message that is only known to Python",
+               .remedy = "load a library that registers it, or use shared_data or ring_buffer"});
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "transaction.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+using Self = PyTransaction&;
+
+PyTransaction& add_component(Self self, const std::string& name, const py::object& shell,
+                             const py::object& core, const py::object& fsm, int priority,
+                             const std::vector<int>& cpus, time_ns_t offset_ns, time_ns_t period_ns,
+                             const std::string& overrun, std::int64_t max_backlog, std::size_t stack_bytes,
+                             std::size_t trace_records,
+                             const std::map<std::string, PropertyValue>& properties,
+                             const std::vector<std::string>& alternatives, const std::string& fallback,
+                             bool reconfigurable) {
+  const ComponentParts rest{.settings = task_settings(priority, cpus, offset_ns, period_ns, overrun,
+                                                      max_backlog, stack_bytes, trace_records),
+                            .properties = properties,
+                            .alternatives = alternatives,
+                            .fallback = fallback,
+                            .reconfigurable = reconfigurable};
+  return self.add([=](Transaction& transaction, const PluginRegistry& registry) {
+    transaction.add_component(name,
+                              Parts{.shell = make_shell(shell, registry),
+                                    .core = make_core(core, registry),
+                                    .fsm = make_fsm(fsm, registry)},
+                              rest, fsm_factory(fsm, registry));
+  });
+}
+
+bool is_name(const py::object& part) { return py::isinstance<py::str>(part); }
+
+void bind_replacements(py::class_<PyTransaction>& transaction) {
+  transaction
+      .def(
+          "replace_core",
+          [](Self self, const std::string& component, const py::object& core) -> Self {
+            return self.add([=](Transaction& steps, const PluginRegistry& registry) {
+              if (is_name(core)) {
+                steps.replace_core(component, core.cast<std::string>());
+              } else {
+                steps.replace_core(component, make_core(core, registry));
+              }
+            });
+          },
+          py::arg("component"), py::arg("core"))
+      .def(
+          "replace_fsm",
+          [](Self self, const std::string& component, const py::object& fsm) -> Self {
+            return self.add([=](Transaction& steps, const PluginRegistry& registry) {
+              if (is_name(fsm)) {
+                steps.replace_fsm(component, fsm.cast<std::string>());
+              } else {
+                steps.replace_fsm(component, make_fsm(fsm, registry));
+              }
+            });
+          },
+          py::arg("component"), py::arg("fsm"))
+      .def(
+          "replace_shell",
+          [](Self self, const std::string& component, const py::object& shell) -> Self {
+            return self.add([=](Transaction& steps, const PluginRegistry& registry) {
+              if (is_name(shell)) {
+                steps.replace_shell(component, shell.cast<std::string>());
+              } else {
+                steps.replace_shell(component, make_shell(shell, registry));
+              }
+            });
+          },
+          py::arg("component"), py::arg("shell"));
+}
+
+void bind_wiring(py::class_<PyTransaction>& transaction) {
+  using Steps = Transaction&;
+  using Registry = const PluginRegistry&;
+  transaction
+      .def(
+          "set_property",
+          [](Self self, const std::string& component, const std::string& name,
+             const PropertyValue& value) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.set_property(component, name, value); });
+          },
+          py::arg("component"), py::arg("name"), py::arg("value"))
+      .def(
+          "connect",
+          [](Self self, const std::string& component, const std::string& port, const std::string& resource,
+             const std::string& service) -> Self {
+            return self.add(
+                [=](Steps steps, Registry) { steps.connect(component, port, resource, service); });
+          },
+          py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"))
+      .def(
+          "disconnect",
+          [](Self self, const std::string& component, const std::string& port) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.disconnect(component, port); });
+          },
+          py::arg("component"), py::arg("port"))
+      .def(
+          "remove_component",
+          [](Self self, const std::string& name) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.remove_component(name); });
+          },
+          py::arg("name"))
+      .def(
+          "add_resource",
+          [](Self self, const std::string& name, const py::object& resource) -> Self {
+            return self.add([=](Steps steps, Registry registry) {
+              steps.add_resource(name, make_resource(resource, registry));
+            });
+          },
+          py::arg("name"), py::arg("resource"))
+      .def(
+          "add_resource",
+          [](Self self, const std::string& name, const std::string& kind, const std::string& type,
+             std::size_t capacity, bool overwrite, std::uint32_t max_readers) -> Self {
+            return self.add([=](Steps steps, Registry) {
+              steps.add_resource(name, kind, type,
+                                 {.capacity = capacity, .overwrite = overwrite, .max_readers = max_readers});
+            });
+          },
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
+          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders)
+      .def(
+          "remove_resource",
+          [](Self self, const std::string& name) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.remove_resource(name); });
+          },
+          py::arg("name"))
+      .def(
+          "start",
+          [](Self self, const std::string& component, std::optional<time_ns_t> clock_ns) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.start(component, clock_ns); });
+          },
+          py::arg("component"), py::arg("clock_ns") = std::nullopt)
+      .def(
+          "stop",
+          [](Self self, const std::string& component) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.stop(component); });
+          },
+          py::arg("component"));
+}
+
+}  // namespace
+
+Transaction PyTransaction::build(const PluginRegistry& registry) const {
+  Transaction transaction;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    try {
+      steps_[i](transaction, registry);
+    } catch (const Error& failure) {
+      ErrorDetail detail = failure.detail();
+      if (detail.step == 0) detail.step = static_cast<int>(i) + 1;
+      throw Error(failure.code(), failure.statement(), detail);
+    }
+  }
+  return transaction;
+}
+
+void bind_transaction(py::module_& module) {
+  py::class_<TransactionReport>(module, "TransactionReport")
+      .def_readonly("steps", &TransactionReport::steps)
+      .def_readonly("epoch", &TransactionReport::epoch)
+      .def_readonly("prepare_ns", &TransactionReport::prepare_ns)
+      .def_readonly("blackout_ns", &TransactionReport::blackout_ns);
+  py::class_<ArchitectureDescription>(module, "ArchitectureDescription")
+      .def(
+          "__eq__",
+          [](const ArchitectureDescription& self, const py::object& other) {
+            return py::isinstance<ArchitectureDescription>(other) &&
+                   self == other.cast<const ArchitectureDescription&>();
+          },
+          py::arg("value"))
+      .def("__str__", [](const ArchitectureDescription& self) { return to_string(self); });
+  py::class_<PyTransaction> transaction(module, "Transaction");
+  transaction.def(py::init<>())
+      .def("add_component", &add_component, py::arg("name"), py::arg("shell"), py::arg("core"),
+           py::arg("fsm"), py::kw_only(), py::arg("priority") = 50, py::arg("cpus") = std::vector<int>{},
+           py::arg("offset_ns") = 0, py::arg("period_ns") = 0, py::arg("overrun") = "skip",
+           py::arg("max_backlog") = 10, py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
+           py::arg("trace_records") = TaskSettings{}.trace_records,
+           py::arg("properties") = std::map<std::string, PropertyValue>{},
+           py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = "",
+           py::arg("reconfigurable") = true);
+  bind_replacements(transaction);
+  bind_wiring(transaction);
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What all ports are, whatever they carry: a name, a kind, a type, and one connection that can be exchanged.
+#pragma once
+
+#include <atomic>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/context.hpp"
+#include "mauve_rt/pi_mutex.hpp"
+#include "mauve_rt/service.hpp"
+
+namespace mauve {
+
+/// What the kernel does to an output while its component is not running.
+enum class OutputPolicy : std::uint8_t {
+  hold,      // leave the last value
+  set_zero,  // write the type's default value
+};
+
+struct OutputOptions {
+  OutputPolicy on_commit{OutputPolicy::hold};
+  OutputPolicy on_stop{OutputPolicy::set_zero};
+};
+
+/// All that a port needs to be connected, made beforehand; default: no connection.
+struct PortConnection {
+  ServiceBase* service{nullptr};
+  std::string resource;
+  std::uint32_t trace_id{0};  // of "resource.service", for calls
+};
+
+/// Where a port leads to, by name; both empty: nowhere.
+struct ConnectedTo {
+  std::string resource;
+  std::string service;
+};
+
+/// A port seen without its type. Its connection changes only while the component is parked or held.
+/// A port does not know when its service ends: disconnect it before the resource goes.
+///
+/// | member      | written by                     | read by                   | order                                |
+/// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
+/// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
+/// | context_    | [setup]                        | component                 | -                                    |
+/// | closed_     | the watchdog                   | component                 | release/acquire: its zeros stay last |
+class PortBase {
+ public:
+  PortBase(std::string name, PortKind kind, std::string type)
+      : name_(std::move(name)), kind_(kind), type_(std::move(type)) {}
+  virtual ~PortBase() = default;
+  PortBase(const PortBase&) = delete;
+  PortBase& operator=(const PortBase&) = delete;
+
+  const std::string& name() const noexcept { return name_; }
+  PortKind kind() const noexcept { return kind_; }
+  const std::string& type() const noexcept { return type_; }
+  /// As ServiceBase::representation(). [rt]
+  virtual std::string_view representation() const noexcept { return "C++"; }
+  bool is_connected() const noexcept { return connection_.service != nullptr; }
+  /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
+  ServiceBase* service() const noexcept { return connection_.service; }
+  const std::string& resource_name() const noexcept { return connection_.resource; }
+  /// Where it leads to, also while that is being changed. [non-rt]
+  ConnectedTo connected_to() const;
+
+  /// Checks that a service fits, without regard to how many ports it has. [non-rt]
+  /// Throws Error (type_mismatch): kind, type, or the C++ type behind an equal name.
+  void check(const ServiceBase& service) const;
+  /// Checks a service and makes the connection to it, to be swapped in. [non-rt] Throws as check().
+  PortConnection prepare(ServiceBase& service, const std::string& resource_name) const;
+  /// Exchanges the connection for one made by this port's prepare(), or for none. [rt]
+  /// The component is parked or held. What was read is forgotten; the caller frees what it gets.
+  void swap(PortConnection& connection) noexcept;
+
+  /// check, prepare and swap. [non-rt] The component is parked.
+  /// Throws Error: type_mismatch, invalid_argument (the service takes no more ports).
+  void connect(ServiceBase& service, const std::string& resource_name);
+  /// [non-rt] The component is parked.
+  void disconnect() noexcept;
+  void set_context(const Context* context) noexcept { context_ = context; }
+
+  /// Writes the type's default value; a port that is no write port does nothing. [rt]
+  virtual void write_zero() noexcept {}
+  virtual OutputOptions output() const noexcept { return {OutputPolicy::hold, OutputPolicy::hold}; }
+  /// After this the port swallows writes, until reopened. [rt]
+  void close() noexcept { closed_.store(true, std::memory_order_release); }
+  void reopen() noexcept { closed_.store(false, std::memory_order_release); }
+
+  /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
+  virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
+                               time_ns_t& /*time*/) {
+    return false;
+  }
+  /// A write of a serialized message; false when malformed or no write port. [non-rt]
+  virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
+
+ protected:
+  /// Whether a service of equal kind and type name is of the C++ type this port needs.
+  virtual bool fits(const ServiceBase& service) const noexcept = 0;
+  /// Lets go of the old service and takes the new one, which fits, or none. [rt]
+  virtual void attach(ServiceBase* service) noexcept = 0;
+  std::uint32_t trace_id() const noexcept { return connection_.trace_id; }
+  /// Component's logical clock, or the real one outside of any. [rt]
+  time_ns_t stamp_ns() const noexcept {
+    return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
+  }
+  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire); }
+
+ private:
+  std::string name_;
+  PortKind kind_;
+  std::string type_;
+  mutable PiMutex shown_mutex_;  // a commit may swap while an ordinary thread describes the architecture
+  PortConnection connection_;
+  const Context* context_{nullptr};
+  std::atomic<bool> closed_{false};
+};
+
+}  // namespace mauve

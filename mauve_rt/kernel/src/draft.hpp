@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Draft: what the steps of a transaction, one after another, will have made of an architecture.
+#pragma once
+
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture.hpp"
+#include "mauve_rt/error.hpp"
+#include "mauve_rt/plugin.hpp"
+
+namespace mauve {
+
+/// Steps count from 1; 0 stands for what was there before.
+struct Wire {
+  std::string resource;
+  ServiceBase* service{nullptr};
+  int step{0};
+};
+
+struct DraftProperty {
+  PropertyValue value;  // as PropertyBase::checked returned it
+  int step{0};
+};
+
+struct DraftComponent {
+  std::shared_ptr<Component> component;
+  bool is_added{false};
+  ComponentState state{ComponentState::unconfigured};  // as the draft found it; HELD is RUNNING
+  bool ran{false};
+  bool runs{false};      // afterwards
+  bool restarts{false};  // because it was stopped and started
+  std::optional<time_ns_t> clock_ns{};
+  Parts fresh{};  // of an added one: all its parts
+  Component::FsmFactory make_fsm{};
+  std::map<std::string, Wire> wires_before{};  // by port
+  std::map<std::string, Wire> wires{};
+  std::map<std::string, DraftProperty> properties{};
+  int shell_step{0};
+  int fsm_step{0};
+  int core_step{0};
+  int first_step{0};
+
+  const std::string& name() const noexcept { return component->name(); }
+  /// The shell that will be in force.
+  Shell& shell() const noexcept { return fresh.shell != nullptr ? *fresh.shell : component->shell(); }
+  bool has_new_parts() const noexcept {
+    return fresh.shell != nullptr || fresh.core != nullptr || fresh.fsm != nullptr;
+  }
+};
+
+struct DraftResource {
+  std::shared_ptr<Resource> resource;
+  int added_step{0};
+
+  const std::string& name() const noexcept { return resource->name(); }
+};
+
+/// An overlay of an architecture; nothing of it is in force. Ordinary threads.
+class Draft {
+ public:
+  Draft(Architecture& architecture, bool deployed);
+
+  Architecture& architecture() const noexcept { return architecture_; }
+  bool is_deployed() const noexcept { return deployed_; }
+  const PluginRegistry& registry() const { return architecture_.require_registry(); }
+
+  /// The step being entered.
+  void begin(int step) noexcept { step_ = step; }
+  int step() const noexcept { return step_; }
+
+  /// Marks it as touched by this step. Throws Error: unknown_component.
+  DraftComponent& touch(const std::string& name);
+  /// The same for what `reconfigurable: false` and a fault forbid. Throws Error: not_reconfigurable, faulted besides.
+  DraftComponent& change(const std::string& name);
+  /// Throws Error: unknown_resource.
+  Resource& resource(const std::string& name);
+
+  /// Throws Error: duplicate_name, out_of_range (settings).
+  DraftComponent& add_component(const std::string& name, const TaskSettings& settings);
+  void remove_component(const std::string& name);
+  void add_resource(const std::string& name, std::shared_ptr<Resource> resource);
+  /// Throws Error (invalid_argument) while it is connected or bound to a topic.
+  void remove_resource(const std::string& name);
+  void connect(DraftComponent& component, const std::string& port, const std::string& resource,
+               const std::string& service);
+  void disconnect(DraftComponent& component, const std::string& port);
+  void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
+
+  /// Checks what only the whole shows: kept connections of new shells, ports per service. Throws Error with the step.
+  void finish() const;
+
+  std::list<DraftComponent>& components() noexcept { return components_; }
+  std::list<DraftComponent>& removed_components() noexcept { return removed_components_; }
+  std::list<DraftResource>& resources() noexcept { return resources_; }
+  std::vector<std::shared_ptr<Resource>>& removed_resources() noexcept { return removed_resources_; }
+
+ private:
+  void check_kept_wires(const DraftComponent& component) const;
+  void check_port_counts() const;
+
+  Architecture& architecture_;
+  bool deployed_;
+  int step_{0};
+  std::list<DraftComponent> components_;
+  std::list<DraftComponent> removed_components_;  // those that were there before
+  std::list<DraftResource> resources_;
+  std::vector<std::shared_ptr<Resource>> removed_resources_;
+};
+
+/// An error of a thing that knows neither its component nor the step.
+[[noreturn]] void rethrow_as_of(const Error& failure, const std::string& component, int step);
+
+}  // namespace mauve

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The state machine of a task. Everything between a start and a park is real-time code.
+#include <pthread.h>
+
+#include <stdexcept>
+
+#include "mauve_rt/error.hpp"
+#include "mauve_rt/futex.hpp"
+#include "mauve_rt/pi_mutex.hpp"
+#include "mauve_rt/task.hpp"
+
+namespace mauve {
+
+void Task::resume() noexcept {
+  try {
+    if (waiting_ == nullptr) return take_up_start();
+    const std::uint32_t control = control_.load(std::memory_order_acquire);
+    if ((control & kStop) != 0) return park_stopped();
+    if ((control & kCommit) != 0 && may_commit_now()) {
+      come_to_commit();
+      if (waiting_ == nullptr) return;
+      // Less than a period past its instant it is released late, as after any wait: the wait was entered in time.
+      const time_ns_t period = grid_.period_ns;
+      if (event_settled_ && period != 0 && boundary_ns_ - clock_ns() >= period)
+        handle_overrun(*waiting_, boundary_ns_);
+    }
+    if (!event_settled_ && (control & kEvent) != 0) settle_event();
+    const time_ns_t now = clock_->now_ns();
+    if (now < due_ns()) return;
+    release(now);
+    run_to_next_wait();
+  } catch (const std::exception& failure) {
+    park_faulted(failure.what());
+  } catch (...) {
+    park_faulted("an exception that is no std::exception");
+  }
+}
+
+time_ns_t Task::due_ns() const noexcept {
+  if (waiting_ == nullptr) return kForever;
+  return event_settled_ ? clock_ns() : wait_from_ns_ + waiting_->duration_ns;
+}
+
+void Task::take_up_start() noexcept {
+  const std::uint32_t control = control_.load(std::memory_order_acquire);
+  if ((control & kCommit) != 0) refuse_commit();  // posted just before the park, too late for park() to see
+  if ((control & kStart) == 0) return;
+  control_.fetch_and(~kStart, std::memory_order_acq_rel);
+  if (!simulated_) counters_.mark();
+  start_machine(start_at_ns_);
+}
+
+void Task::start_machine(time_ns_t instant_ns) noexcept {
+  waiting_ = next_ = &fsm_->initial();
+  is_cold_ = true;
+  event_settled_ = true;
+  set_clock_ns(instant_ns);
+  current_.store(waiting_->trace_id, std::memory_order_relaxed);
+  parked_.store(0, std::memory_order_release);
+  publish_state(ComponentState::running);
+  trace(TraceKind::deployment, 0, grid_.reference_ns - settings_.offset_ns, settings_.offset_ns,
+        grid_.period_ns);
+  trace(TraceKind::start, 0, instant_ns);
+}
+
+void Task::release(time_ns_t actual_ns) noexcept {
+  if (!event_settled_) set_clock_ns(due_ns());  // the time is up, and no event has come
+  event_settled_ = true;
+  statistics_.releases.fetch_add(1, std::memory_order_relaxed);
+  statistics_.wakeup.record(actual_ns - clock_ns());
+  boundary_ns_ = actual_ns;
+  trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns);
+  if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) ++deferrals_;
+  left_gate_ = false;
+  if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
+  if (Participant* place = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
+    place->release_nominal_ns = clock_ns();
+    place->release_actual_ns = actual_ns;
+    place->released.store(Participant::kReleased, std::memory_order_release);
+    futex_wake_all(place->released);
+  }
+}
+
+void Task::run_to_next_wait() {
+  const State* const initial = &fsm_->initial();
+  const State* state = next_;
+  for (;;) {
+    if ((control_.load(std::memory_order_acquire) & kStop) != 0) return park_stopped();
+    if (state == initial) context_.instant_ns.store(clock_ns(), std::memory_order_relaxed);
+    current_.store(state->trace_id, std::memory_order_relaxed);
+    if (state->is_wait) return enter_wait(*state);
+    state = execute(*state);
+    if (state == nullptr) return park_condemned();
+  }
+}
+
+const State* Task::execute(const State& state) {
+  const time_ns_t began = boundary_ns_;
+  trace_at(began, TraceKind::state_begin, state.trace_id);
+  if (state.max_execution_ns != 0) {
+    execution_limit_ns_.store(state.max_execution_ns,
+                              std::memory_order_relaxed);  // relaxed: began publishes it
+    execution_began_ns_.store(began, std::memory_order_release);
+  }
+  const auto& methods = fsm_->methods();
+  const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
+  methods[state.action].run(*core_);
+  const State* next = state.next;
+  for (const Transition& transition : state.transitions) {
+    if (methods[transition.guard].test(*core_)) {
+      next = transition.to;
+      break;
+    }
+  }
+  if (state.max_execution_ns != 0) {
+    execution_began_ns_.store(0, std::memory_order_release);
+    clock_->spend(state.max_execution_ns);
+  }
+  boundary_ns_ = clock_->now_ns();
+  trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
+  state.execution_time->record(boundary_ns_ - began);
+  if (PiMutex::held_by_this_thread() > held_before)
+    throw std::logic_error("a lock is still held at the end of the state");
+  return condemned_.load(std::memory_order_acquire) == 0 ? next : nullptr;
+}
+
+void Task::enter_wait(const State& state) {
+  waiting_ = &state;
+  next_ = state.next;
+  if (state.event == nullptr) {
+    set_clock_ns(clock_ns() + state.duration_ns);
+    trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
+    if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
+    return;
+  }
+  wait_from_ns_ = clock_ns();
+  event_settled_ = false;
+  trace_at(boundary_ns_, TraceKind::wait, state.trace_id, due_ns());
+  settle_event();  // one may have come meanwhile
+  if (!event_settled_ && boundary_ns_ > due_ns()) {
+    set_clock_ns(due_ns());
+    event_settled_ = true;
+    handle_overrun(state, boundary_ns_);
+  }
+}
+
+/// An event fixes the end of the wait: not before min_interarrival has passed since the last release.
+void Task::settle_event() noexcept {
+  // The bit goes first: an event that comes after the look at its time sets it again and is not lost.
+  control_.fetch_and(~kEvent, std::memory_order_acq_rel);
+  const std::optional<time_ns_t> came = waiting_->event->consume();
+  if (!came) return;
+  set_clock_ns(std::max(wait_from_ns_ + waiting_->min_interarrival_ns, *came));
+  event_settled_ = true;
+}
+
+void Task::signal_event() noexcept {
+  const std::uint32_t before = control_.fetch_or(kEvent, std::memory_order_acq_rel);
+  if (simulated_) {
+    if (waiting_ != nullptr && !event_settled_) settle_event();
+  } else if ((before & kEvent) == 0) {
+    futex_wake_all(control_);
+  }
+}
+
+void Task::handle_overrun(const State& state, time_ns_t now_ns) {
+  const time_ns_t missed = clock_ns();
+  const time_ns_t period = grid_.period_ns;
+  statistics_.overruns.fetch_add(1, std::memory_order_relaxed);
+  std::int64_t skipped = 0;
+  if (settings_.overrun == OverrunPolicy::skip) {
+    if (period == 0) {
+      set_clock_ns(now_ns);  // a sporadic component has no grid to keep
+    } else {
+      skipped = (now_ns - missed + period - 1) / period;
+      set_clock_ns(missed + skipped * period);
+    }
+    statistics_.skipped.fetch_add(static_cast<std::uint64_t>(skipped), std::memory_order_relaxed);
+  }
+  trace(TraceKind::overrun, state.trace_id, missed, now_ns, skipped);
+  if (settings_.overrun == OverrunPolicy::fault) throw std::runtime_error("overrun, and its policy is fault");
+  if (settings_.overrun == OverrunPolicy::catch_up && period != 0 &&
+      (now_ns - missed) / period + 1 > settings_.max_backlog) {
+    throw std::runtime_error("overrun: more instants are owed than max_backlog allows");
+  }
+}
+
+void Task::park_stopped() noexcept {
+  write_outputs(false);
+  trace(TraceKind::stop, current_.load(std::memory_order_relaxed), clock_ns());
+  park(ComponentState::stopped);
+}
+
+void Task::park_faulted(const char* what) noexcept {
+  execution_began_ns_.store(0, std::memory_order_release);
+  std::uint32_t nobody = 0;
+  if (condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) {
+    Fault fault{.what = what, .where = current_state(), .when_ns = clock_->now_ns()};
+    const std::lock_guard lock(fault_mutex_);
+    fault_ = std::move(fault);
+  } else {
+    wait_condemned();
+  }
+  end_in_fault();
+}
+
+void Task::park_condemned() noexcept {
+  wait_condemned();
+  end_in_fault();
+}
+
+/// The watchdog was first: it has written, or is writing, the fault and then says FAULTED.
+void Task::wait_condemned() const noexcept {
+  constexpr auto kFaulted = static_cast<std::uint32_t>(ComponentState::faulted);
+  for (;;) {
+    const std::uint32_t state = state_.load(std::memory_order_acquire);
+    if (state == kFaulted) return;
+    futex_wait_until(state_, state, kForever);
+  }
+}
+
+void Task::end_in_fault() noexcept {
+  trace(TraceKind::fault, current_.load(std::memory_order_relaxed), clock_ns());
+  write_outputs(false);
+  const bool stays = (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
+  if (fallback == nullptr) return park(ComponentState::faulted);
+  // Not parked in between: nobody may take parts away that are put in this moment.
+  publish_state(ComponentState::faulted);
+  refuse_commit();
+  fall_back(*fallback);
+}
+
+void Task::fall_back(CommitAction& fallback) noexcept {
+  fallback.take();
+  trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
+  for (const auto& port : shell_->ports()) port->reopen();
+  if (has_thread_ && facts_.policy == "SCHED_FIFO") {  // the watchdog may have taken it away
+    const sched_param own{.sched_priority = facts_.priority};
+    pthread_setschedparam(pthread_self(), SCHED_FIFO, &own);
+  }
+  condemned_.store(0, std::memory_order_release);
+  start_machine(next_instant(std::nullopt));
+}
+
+void Task::park(ComponentState state) noexcept {
+  waiting_ = next_ = nullptr;
+  deferrals_ = 0;
+  left_gate_ = false;
+  control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);
+  parked_.store(1, std::memory_order_release);
+  publish_state(state);
+  refuse_commit();  // last: who is refused finds the state that tells why
+}
+
+void Task::publish_state(ComponentState state) noexcept {
+  state_.store(static_cast<std::uint32_t>(state), std::memory_order_release);
+  futex_wake_all(state_);
+  changes_.bump();
+}
+
+}  // namespace mauve

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What a transaction makes ready before its commit, and throws away when there is none.
+#include <algorithm>
+
+#include "transaction_work.hpp"
+
+namespace mauve {
+
+namespace {
+
+void connect_all(Shell& shell, const std::map<std::string, Wire>& wires) {
+  for (const auto& [name, wire] : wires) {
+    PortBase& port = *shell.find_port(name);
+    PortConnection connection = port.prepare(*wire.service, wire.resource);
+    port.swap(connection);
+  }
+}
+
+void set_all(Shell& shell, const std::map<std::string, DraftProperty>& properties) {
+  for (const auto& [name, property] : properties) {
+    PropertyValue value = property.value;
+    shell.find_property(name)->swap(value);
+  }
+}
+
+}  // namespace
+
+template <typename Action>
+Action& TransactionCommit::Work::keep(std::unique_ptr<Action> action) {
+  Action& kept = *action;
+  actions_.push_back(std::move(action));
+  return kept;
+}
+
+void TransactionCommit::Work::prepare() {
+  for (DraftResource& resource : draft_->resources()) {
+    if (resource.added_step != 0) at_step(resource.added_step, [&] { prepare_resource(resource); });
+  }
+  for (DraftComponent& component : draft_->removed_components())
+    at_step(component.first_step, [&] { prepare_removed(component); });
+  for (DraftComponent& component : draft_->components()) {
+    if (component.first_step == 0) continue;
+    if (component.is_added) {
+      at_step(component.first_step, [&] { prepare_added(component); });
+    } else {
+      prepare_change(component);
+    }
+  }
+}
+
+void TransactionCommit::Work::prepare_resource(DraftResource& added) {
+  prepared_resources_.push_back(added.resource);
+  if (architecture_.is_configured()) added.resource->configure();
+}
+
+void TransactionCommit::Work::prepare_added(DraftComponent& added) {
+  Component& component = *added.component;
+  prepared_added_.push_back(&added);
+  component.set_parts(std::move(added.fresh), added.make_fsm);
+  set_all(component.shell(), added.properties);
+  connect_all(component.shell(), added.wires);
+  if (!architecture_.is_configured()) return;
+  component.configure();
+  if (!host_.deployed || options_.dry_run) return;
+  Task& task = component.task();
+  task.join(architecture_.deployment_epoch_ns());
+  host_.attach(task);
+  if (added.runs) changes_.push_back({.draft = &added});
+}
+
+void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
+  Retreat& retreat = keep(std::make_unique<Retreat>(removed.component->shell()));
+  changes_.push_back({.draft = &removed, .retreat = &retreat});
+}
+
+void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
+  changes_.push_back({.draft = &changed});
+  Change& change = changes_.back();
+  if (changed.has_new_parts()) {
+    const int step = changed.core_step != 0  ? changed.core_step
+                     : changed.fsm_step != 0 ? changed.fsm_step
+                                             : changed.shell_step;
+    at_step(step, [&] { prepare_parts(change); });
+  }
+  if (changed.shell_step != 0) return;
+  at_step(changed.first_step, [&] {
+    prepare_wiring(change);
+    prepare_properties(change);
+  });
+}
+
+void TransactionCommit::Work::prepare_parts(Change& change) {
+  DraftComponent& draft = *change.draft;
+  Component& component = *draft.component;
+  change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh), std::move(draft.make_fsm));
+  if (draft.shell_step != 0) {
+    set_all(change.parts->shell(), draft.properties);
+    connect_all(change.parts->shell(), draft.wires);
+    // The old ports let go in the commit, before the new ones are used.
+    for (const auto& port : component.shell().ports()) {
+      if (port->is_connected()) keep(std::make_unique<WiringChange>(*port, PortConnection{}));
+    }
+  }
+  change.parts->prepare();
+}
+
+void TransactionCommit::Work::prepare_wiring(Change& change) {
+  const DraftComponent& draft = *change.draft;
+  for (const auto& [name, before] : draft.wires_before) {
+    if (draft.wires.contains(name)) continue;
+    keep(std::make_unique<WiringChange>(draft.component->require_port(name), PortConnection{}));
+  }
+  for (const auto& [name, wire] : draft.wires) {
+    const auto before = draft.wires_before.find(name);
+    if (before != draft.wires_before.end() && before->second.service == wire.service) continue;
+    PortBase& port = draft.component->require_port(name);
+    keep(std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
+    prepare_listening(change, port, *wire.service);
+  }
+}
+
+void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
+                                                ServiceBase& service) {
+  if (service.resource() == nullptr) return;
+  const FsmBase& fsm = change.parts != nullptr ? change.parts->fsm() : change.draft->component->fsm();
+  for (const auto& state : fsm.states()) {
+    if (state->event == nullptr || &state->event->port() != &port) continue;
+    listener_changes_.push_back(&keep(std::make_unique<ListenerChange>(*service.resource(), *state->event)));
+  }
+}
+
+void TransactionCommit::Work::prepare_properties(Change& change) {
+  const DraftComponent& draft = *change.draft;
+  for (const auto& [name, property] : draft.properties)
+    keep(std::make_unique<PropertyChange>(draft.component->require_property(name), property.value));
+}
+
+/// Takes a component off its thread and its resources. A thread that is kept from ending (by a more urgent one that
+/// does not wait) is left to be reaped: what is under way goes on without it.
+void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component, bool was_listed) {
+  Task& task = component->task();
+  const bool has_machine = task.has_thread() || task.is_simulated();
+  const bool ended = !has_machine || host_.detach(task);
+  if (task.is_parked()) {
+    for (const auto& port : component->shell().ports()) port->disconnect();
+    if (component->is_configured()) component->update_listening();
+    component->cleanup();
+  }
+  if (!ended) {
+    architecture_.keep_until_ended(component, was_listed);
+  } else if (was_listed) {
+    architecture_.retire_trace(task);
+  }
+}
+
+void TransactionCommit::Work::discard() noexcept {
+  for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
+  for (DraftComponent* added : prepared_added_) let_go(added->component, false);
+  for (const auto& resource : prepared_resources_) resource->cleanup();
+  architecture_.give_back_numbers(numbers_before_);
+}
+
+}  // namespace mauve

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// From the draft to the report; what is prepared stands in transaction_prepare.cpp.
+#include "transaction_work.hpp"
+
+#include <algorithm>
+
+namespace mauve {
+
+TransactionCommit::TransactionCommit(Architecture& architecture, TransactionHost host,
+                                     const TransactionOptions& options)
+    : work_(std::make_unique<Work>(architecture, std::move(host), options)) {}
+TransactionCommit::~TransactionCommit() = default;
+void TransactionCommit::make(Transaction transaction) { work_->make(std::move(transaction)); }
+TransactionReport TransactionCommit::report() { return work_->report(); }
+
+TransactionCommit::Work::Work(Architecture& architecture, TransactionHost host,
+                              const TransactionOptions& options)
+    : architecture_(architecture), host_(std::move(host)), options_(options) {}
+
+void TransactionCommit::Work::make(Transaction transaction) {
+  const time_ns_t began = monotonic_now_ns();
+  transaction_ = std::move(transaction);
+  if (const std::uint64_t epoch = architecture_.epoch();
+      options_.expected_epoch != 0 && options_.expected_epoch != epoch) {
+    throw Error(ErrorCode::wrong_epoch, "the architecture has changed since",
+                {.element = "epoch",
+                 .expected = std::to_string(options_.expected_epoch),
+                 .found = std::to_string(epoch),
+                 .remedy = "look at it again, then decide again"});
+  }
+  architecture_.reap();
+  numbers_before_ = architecture_.numbers();
+  try {
+    draft_steps();
+    prepare();
+    prepare_ns_ = monotonic_now_ns() - began;
+    if (options_.dry_run) return discard();
+    gather();
+    carry_out_commit();
+  } catch (...) {
+    discard();
+    throw;
+  }
+  publish();
+  retire();
+}
+
+void TransactionCommit::Work::draft_steps() {
+  draft_ = std::make_unique<Draft>(architecture_, host_.deployed);
+  reports_.resize(transaction_.steps().size());
+  int number = 0;
+  for (const auto& step : transaction_.steps()) {
+    draft_->begin(++number);
+    StepReport& report = reports_[static_cast<std::size_t>(number - 1)];
+    report.step = step->text();
+    report.component = step->component();
+    at_step(number, [&] { step->draft(*draft_); });
+    for (const DraftComponent& component : draft_->components()) {
+      if (component.core_step != number) continue;
+      if (!component.is_added) report.from_core = component.component->core_implementation();
+      report.to_core = component.fresh.core->implementation();
+    }
+  }
+  try {
+    draft_->finish();
+  } catch (const Error& failure) {
+    rethrow_at(failure.detail().step, failure);
+  }
+}
+
+Afterwards TransactionCommit::Work::afterwards_of(const Change& change) const {
+  const DraftComponent& draft = *change.draft;
+  if (change.retreat != nullptr || (draft.ran && !draft.runs)) return Afterwards::stop;
+  if (!draft.runs) return Afterwards::go_on;
+  const bool anew = draft.restarts || (change.parts != nullptr && change.parts->restarts());
+  return !draft.ran || anew ? Afterwards::restart : Afterwards::go_on;
+}
+
+void TransactionCommit::Work::gather() {
+  // Wiring and properties are in before a new core takes over. adopt(), which may refuse, changes nothing.
+  std::vector<CommitAction*> actions{&guard_};
+  for (const auto& action : actions_) actions.push_back(action.get());
+  for (const Change& change : changes_) {
+    if (change.parts != nullptr) actions.push_back(change.parts.get());
+  }
+  commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
+  auto place = commit_->participants().begin();
+  for (const Change& change : changes_) {
+    place->task = &change.draft->component->task();
+    place->afterwards = afterwards_of(change);
+    if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
+    if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
+    if (change.retreat != nullptr) change.retreat->set_place(*place);
+    guard_.expect(*place, change.draft->state);
+    places_.insert_or_assign(change.draft->name(), &*place);
+    ++place;
+  }
+}
+
+void TransactionCommit::Work::carry_out_commit() {
+  if (changes_.empty()) return;
+  try {
+    if (carry_out(*commit_, options_.timeouts.commit_ns, host_.conductor)) {
+      committed_ = true;
+      return;
+    }
+  } catch (const Error& failure) {
+    if (commit_->refused_by() == nullptr) rethrow_at(step_of(failure.detail().component), failure);
+    throw_refused(failure.what());
+  } catch (const std::exception& failure) {
+    throw_refused(failure.what());
+  }
+  throw_refused("it refused the old core's state");
+}
+
+void TransactionCommit::Work::throw_refused(const std::string& what) const {
+  if (commit_->refused_by() == &guard_) {
+    throw Error(ErrorCode::wrong_epoch, "the component was started or stopped, or it faulted, meanwhile",
+                {.component = guard_.changed()->name(),
+                 .element = "state",
+                 .found = std::string(to_string(guard_.changed()->state())),
+                 .remedy = "look at the architecture again, then decide again",
+                 .step = step_of(guard_.changed()->name()),
+                 .step_name = text_of(step_of(guard_.changed()->name()))});
+  }
+  for (const Change& change : changes_) {
+    if (change.parts.get() != commit_->refused_by()) continue;
+    const DraftComponent& draft = *change.draft;
+    const int step = draft.core_step != 0 ? draft.core_step : draft.first_step;
+    throw Error(ErrorCode::adopt_refused, "adopt refused: " + what,
+                {.component = draft.name(),
+                 .remedy = "nothing was changed; all goes on as before",
+                 .step = step,
+                 .step_name = text_of(step)});
+  }
+  throw Error(ErrorCode::adopt_refused, what);
+}
+
+void TransactionCommit::Work::publish() {
+  ListChange lists;
+  for (const DraftComponent& component : draft_->components()) {
+    if (component.is_added) lists.added_components.push_back(component.component);
+    if (component.first_step != 0) lists.changed.push_back(component.component.get());
+  }
+  for (const DraftComponent& component : draft_->removed_components())
+    lists.removed_components.push_back(component.component);
+  for (const DraftResource& resource : draft_->resources()) {
+    if (resource.added_step != 0) lists.added_resources.push_back(resource.resource);
+  }
+  lists.removed_resources = draft_->removed_resources();
+  architecture_.change_lists(lists);
+}
+
+/// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced.
+void TransactionCommit::Work::renew_fallback(Change& change) {
+  Component& component = *change.draft->component;
+  const bool restarts = change.parts->restarts();
+  std::unique_ptr<CoreBase> out = change.parts->give_back_core();
+  const std::string& fallback = component.fallback_implementation();
+  if (fallback.empty() || !(restarts || (out != nullptr && out->implementation() == fallback))) return;
+  try {
+    component.renew_fallback(std::move(out));
+  } catch (const Error&) {  // it cannot be configured anew; the change itself is in
+  }
+}
+
+void TransactionCommit::Work::retire() {
+  for (ListenerChange* change : listener_changes_) change->hand_over();
+  for (Change& change : changes_) {
+    Component& component = *change.draft->component;
+    if (change.retreat == nullptr && component.is_configured()) component.update_listening();
+    if (change.parts == nullptr) continue;
+    change.parts->retire();
+    renew_fallback(change);
+    change.parts.reset();
+  }
+  for (const DraftComponent& removed : draft_->removed_components()) {
+    try {  // somebody who still held it may have started it again
+      if (!removed.component->task().is_parked()) removed.component->task().stop();
+    } catch (const Error&) {  // it faulted, or is in a state: ending its thread is the answer
+    }
+    let_go(removed.component, true);
+  }
+  for (const auto& resource : draft_->removed_resources()) resource->cleanup();
+}
+
+TransactionReport TransactionCommit::Work::report() {
+  const time_ns_t until = monotonic_now_ns() + options_.timeouts.phase_ns;
+  std::map<std::string, StepReport> measured;
+  for (const auto& [name, place] : places_) {
+    if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
+  }
+  TransactionReport report{
+      .steps = reports_, .epoch = architecture_.epoch(), .prepare_ns = prepare_ns_, .blackout_ns = 0};
+  for (StepReport& step : report.steps) {
+    const auto found = measured.find(step.component);
+    if (found == measured.end()) continue;
+    step.blackout_ns = found->second.blackout_ns;
+    step.missed_releases = found->second.missed_releases;
+    step.phase_nominal_ns = found->second.phase_nominal_ns;
+    step.phase_actual_ns = found->second.phase_actual_ns;
+    report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
+  }
+  return report;
+}
+
+const std::string& TransactionCommit::Work::text_of(int step) const {
+  return reports_[static_cast<std::size_t>(std::max(step, 1) - 1)].step;
+}
+
+int TransactionCommit::Work::step_of(const std::string& component) const {
+  for (const Change& change : changes_) {
+    if (change.draft->name() == component) return change.draft->first_step;
+  }
+  return 0;
+}
+
+void TransactionCommit::Work::rethrow_at(int step, const Error& failure) const {
+  ErrorDetail detail = failure.detail();
+  if (detail.step == 0) detail.step = step;
+  if (detail.step != 0) detail.step_name = text_of(detail.step);
+  throw Error(failure.code(), failure.statement(), detail);
+}
+
+}  // namespace mauve

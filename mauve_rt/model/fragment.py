@@ -1,0 +1,43 @@
+"""A component or a resource more for an architecture that runs, described as in the architecture file."""
+
+from typing import Any
+
+from pydantic import ValidationError
+
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model.architecture_file import ArchitectureModel, Overrides, element_problems
+from mauve_rt.model.schema import FragmentModel
+from mauve_rt.model.schema_errors import schema_problems
+from mauve_rt.model.yaml_file import Location, YamlFile
+
+
+class _Section(YamlFile):
+    """YAML text as if it stood at `place` of a file. It has no lines there."""
+
+    def __init__(self, model: ArchitectureModel, text: str, place: tuple[str, str]) -> None:
+        super().__init__(model.path, text=text)
+        section, name = place
+        self.data = {"mauve": 1, section: {name: self.data}}
+
+    def position(self, _location: Location, *, key: bool = False) -> tuple[int, int]:  # noqa: ARG002
+        return (1, 1)
+
+
+def fragment(model: ArchitectureModel, text: str, *, section: str, name: str) -> ArchitectureModel:
+    """What `text` says below `components: NAME:` or `resources: NAME:`, as a model of that alone.
+
+    Places and relative paths stand for what they stand for in the file of `model`.
+
+    Raises:
+        ArchitectureFileError: no YAML, or it breaks the schema; the problems' text() tells all.
+    """
+    file = _Section(model, text, (section, name))
+    try:
+        content: Any = FragmentModel.model_validate(file.data)
+    except ValidationError as error:
+        raise ArchitectureFileError(file.path, schema_problems(file, error)) from None
+    surroundings = Overrides(namespace=model.namespace, peers=model.peers)
+    found = ArchitectureModel(file, content, surroundings)
+    if problems := [*element_problems(found)]:
+        raise ArchitectureFileError(file.path, problems)
+    return found

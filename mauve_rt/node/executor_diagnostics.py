@@ -1,0 +1,100 @@
+"""What the executor tells of its health: /diagnostics at 1 Hz."""
+
+import resource
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile
+
+from mauve_rt._kernel import ComponentDescription, allocation_counting
+from mauve_rt.node.executor_runtime import Runtime
+
+
+class Diagnostics:
+    """/diagnostics, one status per component and one for the process. On the node's timer only."""
+
+    def __init__(self, node: LifecycleNode, runtime: Runtime) -> None:
+        self._node = node
+        self._runtime = runtime
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
+        self._told: dict[tuple[str, str], int] = {}
+        self._allocation_counting = allocation_counting()
+
+    def publish(self) -> None:
+        """Publish once."""
+        array = DiagnosticArray(status=[self._component(part) for part in self._runtime.components()])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        array.status.append(self._process())
+        self._publisher.publish(array)
+
+    def _component(self, part: ComponentDescription) -> Any:
+        level, message = DiagnosticStatus.OK, part.state.lower()
+        remarks = self._remarks(part)
+        if part.state == "FAULTED":
+            level, message = DiagnosticStatus.ERROR, part.fault
+        elif part.fell_back:
+            words = [f"fallback core {part.core} runs after a fault: {part.fault}", *remarks]
+            level, message = DiagnosticStatus.WARN, "; ".join(words)
+        elif remarks:
+            level, message = DiagnosticStatus.WARN, f"{', '.join(remarks)} since the last status"
+        values: dict[str, object] = {
+            "core": part.core,
+            "state": part.current_state,
+            "releases": part.releases,
+            "overruns": part.overruns,
+            "skipped": part.skipped,
+            "wakeup_p50_ns": part.wakeup_p50_ns,
+            "wakeup_p99_ns": part.wakeup_p99_ns,
+            "wakeup_max_ns": part.wakeup_max_ns,
+            "allocations": part.allocations,
+            "page_faults": part.page_faults,
+        }
+        for time in part.execution_times:
+            values[f"execution_mean_ns[{time.state}]"] = time.mean_ns
+            values[f"execution_max_ns[{time.state}]"] = time.max_ns
+        return self._status(part.name, level, message, values)
+
+    def _remarks(self, part: ComponentDescription) -> list[str]:
+        """What went up that should not have. The interpreter allocates as it runs: that is no remark."""
+        counts = {"overruns": self._more(part.name, "overruns", part.overruns)}
+        allocations = self._more(part.name, "allocations", part.allocations)
+        page_faults = self._more(part.name, "page_faults", part.page_faults)
+        if not self._has_python_parts(part):
+            counts |= {"allocations": allocations, "page faults": page_faults}
+        return [f"{count} {what}" for what, count in counts.items() if count > 0]
+
+    def _more(self, component: str, what: str, count: int) -> int:
+        """How much it grew since it was told last; a start of the component counts anew."""
+        before = self._told.get((component, what), 0)
+        self._told[component, what] = count
+        return count - before if count >= before else count
+
+    def _has_python_parts(self, part: ComponentDescription) -> bool:
+        find = self._runtime.index.find
+        plugins = [find("shell", part.shell), find("core", part.core), find("fsm", part.fsm)]
+        return any(plugin is not None and plugin.is_python for plugin in plugins)
+
+    def _process(self) -> Any:
+        status = self._runtime.realtime_status()
+        missing = list(status.missing) if status is not None else []
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
+        message = "without real-time rights" if missing else "real-time rights granted"
+        values = {
+            "epoch": self._runtime.epoch,
+            "missing": "; ".join(missing),
+            "page_faults_major": usage.ru_majflt,
+            "page_faults_minor": usage.ru_minflt,
+            "allocation_counting": self._allocation_counting,
+        }
+        return self._status("process", level, message, values)
+
+    def _status(self, name: str, level: bytes, message: str, values: dict[str, object]) -> Any:
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self._node.get_fully_qualified_name()}: {name}",
+            message=message,
+            hardware_id=self._node.get_namespace(),
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )

@@ -1,0 +1,233 @@
+"""The steps of a request, checked one after another and made into a transaction. Knows no ROS.
+
+What a step before will have made of the architecture counts: step 3 may connect what step 1 adds. What needs
+the kernel to tell (states, wiring, whether parts fit), the kernel tells at the commit.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from mauve_rt._kernel import ComponentDescription, PropertyDescription, Transaction
+from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
+from mauve_rt.model.architecture_file import ArchitectureModel
+from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
+from mauve_rt.model.checks import Checks, property_mismatch
+from mauve_rt.model.fragment import fragment
+from mauve_rt.model.schema import ComponentModel, PropertyValue
+from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.node.executor_requests import Code, RefusalError, Step, code_of
+from mauve_rt.node.executor_runtime import Runtime
+
+
+@dataclass
+class _Sketch:
+    """A component as the steps so far will have left it."""
+
+    model: ComponentModel
+    properties: dict[str, PropertyDescription] = field(default_factory=dict)
+    fault: str = ""
+    is_new: bool = False
+
+
+class Plan:
+    """The transaction that a request asks for, and what it will have added and removed."""
+
+    def __init__(self, steps: Iterable[Step], runtime: Runtime) -> None:
+        """Check and translate every step; loads the plug-ins that they name.
+
+        Raises:
+            RefusalError: naming the step, where there are several.
+        """
+        self.transaction = Transaction()
+        self.added: dict[str, ComponentModel] = {}
+        self.removed: set[str] = set()
+        self._runtime = runtime
+        self._sketches = {part.name: self._sketch_of(part) for part in runtime.components()}
+        self._resources = set(runtime.resources())
+        all_steps = tuple(steps)
+        for number, step in enumerate(all_steps, start=1):
+            where = f"step {number} ({step}): " if len(all_steps) > 1 else ""
+            try:
+                self._take(step)
+            except RefusalError as refusal:
+                raise RefusalError(refusal.code, f"{where}{refusal}") from None
+            except MauveError as error:
+                raise RefusalError(code_of(error), one_line(f"{where}{_words(error)}")) from None
+
+    def _sketch_of(self, part: ComponentDescription) -> _Sketch:
+        fault = part.fault if part.state == "FAULTED" else ""
+        properties = {item.name: item for item in part.properties}
+        return _Sketch(self._runtime.declared(part.name), properties, fault)
+
+    def _take(self, step: Step) -> None:
+        transaction, name = self.transaction, step.target
+        match step.kind:
+            case "add_component":
+                self._add_component(step)
+            case "add_resource":
+                self._add_resource(step)
+            case "remove_resource":
+                self._remove_resource(step)
+            case "remove_component":
+                self._component(step)
+                transaction.remove_component(name)
+                del self._sketches[name]
+                self.removed.add(name)
+                self.added.pop(name, None)
+            case "start":
+                self._component(step)
+                transaction.start(name)
+            case "stop":
+                self._component(step)
+                transaction.stop(name)
+            case "connect":
+                self._component(step)
+                resource, service = _service(step)
+                transaction.connect(name, step.name, resource, service)
+            case "disconnect":
+                self._component(step)
+                transaction.disconnect(name, step.name)
+            case "set_property":
+                transaction.set_property(name, step.name, _property_value(step, self._component(step)))
+            case _:
+                self._replace(step)
+
+    def _component(self, step: Step) -> _Sketch:
+        """The component that a step is about.
+
+        Raises:
+            RefusalError: UNKNOWN_COMPONENT, NOT_RECONFIGURABLE or FAULTED.
+        """
+        name = step.target
+        sketch = self._sketches.get(name)
+        if sketch is None:
+            remedy = did_you_mean(name, self._sketches)
+            text = f"component {shown(name)} is unknown; the executor has {', '.join(self._sketches)}"
+            raise RefusalError(
+                Code.UNKNOWN_COMPONENT, f"{text}; {remedy}" if remedy.startswith("did") else text
+            )
+        if not sketch.model.reconfigurable and not sketch.is_new:
+            text = f"component '{name}' is protected: it was declared with reconfigurable: false"
+            raise RefusalError(Code.NOT_RECONFIGURABLE, text)
+        if sketch.fault and step.kind != "remove_component":
+            remedy = "remove it, or clean up and configure the executor (lifecycle)"
+            raise RefusalError(
+                Code.FAULTED, one_line(f"component '{name}' is faulted ({sketch.fault}); {remedy}")
+            )
+        return sketch
+
+    def _replace(self, step: Step) -> None:
+        kind = step.kind.removeprefix("replace_")
+        sketch = self._component(step)
+        with self._runtime.loading() as loader:
+            allowed = allowed_parts(sketch.model, kind, loader)
+            if step.name not in allowed:
+                installed = step.name in loader.names(kind)
+                raise _undeclared(step, kind, allowed, installed=installed)
+            loader.require(kind, step.name)
+        match kind:
+            case "core":
+                self.transaction.replace_core(step.target, step.name)
+            case "fsm":
+                self.transaction.replace_fsm(step.target, step.name)
+            case _:
+                self.transaction.replace_shell(step.target, step.name)
+                shell = self._runtime.registry.describe_shell(step.name)
+                sketch.properties = {item.name: item for item in shell.properties}
+
+    def _add_component(self, step: Step) -> None:
+        name = step.target
+        self._check_name(step)
+        model = self._fragment(step, "components")
+        with self._runtime.loading() as loader:
+            if problems := Checks(model, loader).problems():
+                raise ArchitectureFileError(model.path, problems)
+            add_component_step(self.transaction, model, name, loader)
+        component = model.components[name]
+        shell = self._runtime.registry.describe_shell(component.shell)
+        properties = {item.name: item for item in shell.properties}
+        self._sketches[name] = _Sketch(component, properties, is_new=True)
+        self.added[name] = component
+
+    def _add_resource(self, step: Step) -> None:
+        name = step.target
+        self._check_name(step)
+        model = self._fragment(step, "resources")
+        if model.resources[name].topic is not None:
+            text = f"resource '{name}': a topic cannot be bound while the executor runs"
+            raise RefusalError(Code.UNSUPPORTED, f"{text}; leave topic out, or put the resource in the file")
+        with self._runtime.loading() as loader:
+            if problems := Checks(model, loader).problems():
+                raise ArchitectureFileError(model.path, problems)
+        add_resource_step(self.transaction, model, name)
+        self._resources.add(name)
+
+    def _remove_resource(self, step: Step) -> None:
+        described = self._runtime.model.resources.get(step.target)
+        if described is not None and described.topic is not None:
+            text = f"resource '{step.target}' is bound to topic '{described.topic.name}'"
+            raise RefusalError(Code.INVALID, f"{text}; it stays for as long as the executor runs")
+        self.transaction.remove_resource(step.target)
+        self._resources.discard(step.target)
+
+    def _check_name(self, step: Step) -> None:
+        if step.target in self._sketches or step.target in self._resources:
+            what = "component" if step.target in self._sketches else "resource"
+            text = (
+                f"there is a {what} '{step.target}' already; take another name, or remove it in a step before"
+            )
+            raise RefusalError(Code.INVALID, text)
+
+    def _fragment(self, step: Step, section: str) -> ArchitectureModel:
+        return fragment(self._runtime.model, step.value, section=section, name=step.target)
+
+
+def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -> RefusalError:
+    takes = f"component '{step.target}' takes {', '.join(allowed)}"
+    if not installed:
+        return RefusalError(Code.UNKNOWN_CORE, f"{kind} {shown(step.name)} is not installed; {takes}")
+    text = f"{kind} '{step.name}' is installed, but not declared: {takes}"
+    return RefusalError(Code.UNDECLARED_CORE, f"{text}; name it among its alternatives in the file")
+
+
+def _words(error: MauveError) -> str:
+    """An error without the place in a file, where it is about a step's own text."""
+    if isinstance(error, ArchitectureFileError):
+        return "; ".join(problem.text() for problem in error.problems)
+    return str(error)
+
+
+def _yaml(step: Step, subject: str) -> object:
+    try:
+        return YAML(typ="safe", pure=True).load(step.value)
+    except (YAMLError, ValueError, RecursionError):
+        raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
+
+
+def _service(step: Step) -> tuple[str, str]:
+    subject = f"port '{step.name}' of component '{step.target}'"
+    value = _yaml(step, subject)
+    resource, dot, service = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if not (resource and dot and service):
+        text = f"{subject}: expected resource.service as the value, found {shown(step.value)}"
+        raise RefusalError(Code.INVALID, text)
+    return resource, service
+
+
+def _property_value(step: Step, component: _Sketch) -> PropertyValue:
+    known = component.properties
+    subject = f"property '{step.name}' of component '{step.target}'"
+    if step.name not in known:
+        text = f"component '{step.target}' has no property {shown(step.name)}"
+        raise RefusalError(Code.INVALID, f"{text}; {did_you_mean(step.name, known)}")
+    value = _yaml(step, subject)
+    if not isinstance(value, bool | int | float | str):
+        expected = "expected true, false, a number or text in YAML"
+        raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+    if facts := property_mismatch(known[step.name], value):
+        text = f"{subject}: expected {facts['expected']}, found {facts['found']}"
+        raise RefusalError(Code.INVALID, text)
+    return value

@@ -1,0 +1,172 @@
+"""The supervisor node: reconfigures one executor by the rules of a file, and tells every decision.
+
+It listens to the executor's ~/state and to the topics of its rules (raw: nothing is deserialised), checks the
+rules at 50 Hz on the steady clock, asks by ~/reconfigure and publishes ~/decisions. One thread.
+"""
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
+from mauve_msgs.srv import Reconfigure
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model.message_types import message_class
+from mauve_rt.model.rules import Rule, RulesFile
+from mauve_rt.node.process import BAD_INPUT, complain
+from mauve_rt.node.supervisor_conditions import Condition, SilenceCondition
+from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
+from mauve_rt.node.supervisor_messages import architecture_view, decision_message
+
+NODE_NAME = "supervisor"
+CHECK_PERIOD_S = 0.02
+_SPIN_S = 0.2  # how long a stop may go unnoticed
+KEPT_DECISIONS = 100
+
+
+class Supervisor:
+    """The rules of a file at work on a node. Every method runs on the thread that spins the node."""
+
+    def __init__(self, node: Node, rules_file: RulesFile) -> None:
+        """Create subscriptions, client and publisher.
+
+        Raises:
+            ArchitectureFileError: a rule names a message type that is not installed.
+        """
+        self._node = node
+        self._pending: Any = None
+        rules = rules_file.rules
+        conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
+        self._engine = RuleEngine(
+            list(zip(rules.rules, conditions, strict=True)), act=self._act, decide=self._decide
+        )
+        latched = DurabilityPolicy.TRANSIENT_LOCAL
+        self._decisions = node.create_publisher(
+            SupervisorDecision, "~/decisions", QoSProfile(depth=KEPT_DECISIONS, durability=latched)
+        )
+        self._service = node.resolve_service_name(f"{rules.executor}/reconfigure")
+        self._client = node.create_client(Reconfigure, f"{rules.executor}/reconfigure")
+        node.create_subscription(
+            ArchitectureState,
+            f"{rules.executor}/state",
+            self._on_state,
+            QoSProfile(depth=1, durability=latched),
+        )
+        node.create_timer(CHECK_PERIOD_S, self._tick)
+
+    def _condition(self, rules_file: RulesFile, index: int) -> Condition:
+        rule: Rule = rules_file.rules.rules[index]
+        silence = rule.when.silence
+        message = message_class(silence.type)
+        if message is None:
+            raise rules_file.error(
+                ("rules", index, "when", "silence", "type"),
+                f"message type {silence.type} is not installed",
+                remedy="source the workspace that has it, or correct the name",
+            )
+        topic = self._node.resolve_topic_name(silence.topic)
+        condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
+        # Best effort hears reliable writers too; only that something came counts.
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._node.create_subscription(message, topic, _hearer(condition), qos, raw=True)
+        return condition
+
+    def _tick(self) -> None:
+        self._engine.tick(time.monotonic())
+
+    def _on_state(self, state: Any) -> None:
+        self._engine.on_state(time.monotonic(), architecture_view(state))
+
+    def _act(self, request: Request) -> None:
+        if self._pending is not None and not self._pending.done():
+            self._client.remove_pending_request(self._pending)
+        if not self._client.service_is_ready():
+            text = f"service {self._service} is not there"
+            missing = Outcome(success=False, message=text, answered=False)
+            self._engine.on_outcome(time.monotonic(), request.number, missing)
+            return
+        self._pending = self._client.call_async(
+            Reconfigure.Request(
+                request_id=str(uuid.uuid4()),
+                expected_epoch=request.expected_epoch,
+                requested_by=self._node.get_fully_qualified_name(),
+                cause=request.cause,
+                steps=[
+                    ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
+                    for step in request.steps
+                ],
+            )
+        )
+        self._pending.add_done_callback(lambda future: self._on_reply(request.number, future))
+
+    def _on_reply(self, number: int, future: Any) -> None:
+        if future.exception() is not None:
+            outcome = Outcome(success=False, message=str(future.exception()), answered=False)
+        else:
+            reply = future.result()
+            outcome = Outcome(
+                success=reply.success,
+                message=reply.message,
+                epoch=reply.epoch,
+                wrong_epoch=reply.code == Reconfigure.Response.WRONG_EPOCH,
+            )
+        self._engine.on_outcome(time.monotonic(), number, outcome)
+
+    def _decide(self, decision: Decision) -> None:
+        self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
+        reply = f" ({decision.message})" if decision.message else ""
+        self._node.get_logger().info(f"{decision.rule}: {decision.decision}: {decision.reason}{reply}")
+
+
+def run_node(arguments: Sequence[str] | None, stop: threading.Event) -> int:
+    """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
+    try:
+        rclpy.init(
+            args=None if arguments is None else list(arguments),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        node = Node(NODE_NAME)
+    except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
+        complain(f"supervisor: {error}")
+        try_shutdown()
+        return BAD_INPUT
+    executor = SingleThreadedExecutor()
+    try:
+        _ = Supervisor(node, RulesFile(_rules_path(node)))
+        executor.add_node(node)
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=_SPIN_S)
+    except ArchitectureFileError as error:
+        complain(str(error))
+        return BAD_INPUT
+    except ValueError as error:
+        complain(f"supervisor: {error}")
+        return BAD_INPUT
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        try_shutdown()
+    return 0
+
+
+def _rules_path(node: Node) -> str:
+    try:
+        path = str(node.declare_parameter("rules", "").value)
+    except rclpy.exceptions.InvalidParameterTypeException:
+        path = ""
+    if not path:
+        raise ValueError("parameter 'rules' is missing: --ros-args -p rules:=FILE")
+    return path
+
+
+def _hearer(condition: SilenceCondition) -> Callable[[bytes], None]:
+    return lambda _sample: condition.hear(time.monotonic())

@@ -1,0 +1,156 @@
+"""The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from mauve_rt.trace.bag import BagWriter, TopicQos
+from mauve_rt.trace.cdr import Batch, encode_batch, encode_names
+from mauve_rt.trace.errors import TraceError
+
+BATCHES = "trace/batches"
+NAMES = "trace/names"
+DROPPED_MESSAGES = "mauve_dropped_messages"
+"""Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
+_BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
+_NAMES_TYPE = "mauve_msgs/msg/TraceNames"
+_NAMES_QOS = TopicQos(depth=1, transient_local=True)
+
+
+class Drain(Protocol):
+    """What one drain of the kernel's rings yields (`mauve_rt._kernel.TraceDrain`)."""
+
+    @property
+    def records(self) -> bytes:
+        """Records, 48 bytes each."""
+
+    @property
+    def written(self) -> list[int]:
+        """Per component: records ever offered."""
+
+    @property
+    def dropped(self) -> list[int]:
+        """Per component: of these, lost because the ring was full."""
+
+    @property
+    def monotonic_ns(self) -> int:
+        """Time of the drain, CLOCK_MONOTONIC."""
+
+    @property
+    def realtime_ns(self) -> int:
+        """The same instant, CLOCK_REALTIME."""
+
+
+class TraceSource(Protocol):
+    """The part of `mauve_rt._kernel.Deployer` that the recorder uses."""
+
+    def drain_trace(self) -> Drain:
+        """Take everything out of the rings."""
+
+    def trace_components(self) -> list[str]:
+        """Words that `component` of a record refers to."""
+
+    def trace_names(self) -> list[str]:
+        """Words that `name` of a record refers to."""
+
+
+class SentMessage(NamedTuple):
+    """A serialized message: CDR with its header, ns of the clock that the trace is on."""
+
+    topic: str
+    type_name: str
+    data: bytes
+    monotonic_ns: int
+    qos: TopicQos | None
+
+
+class TraceBag:
+    """Writes what a trace source yields, and messages on the same time base.
+
+    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
+    """
+
+    def __init__(
+        self, source: TraceSource, directory: Path, *, node_name: str, on_error: Callable[[str], None]
+    ) -> None:
+        """Create the bag; nothing is drained yet.
+
+        Args:
+            source: the deployer, or a simulation's.
+            directory: the bag's folder, which must not exist yet.
+            node_name: absolute name of the executor's node; the trace is below it.
+            on_error: called at most once for each type that cannot be recorded, with one line.
+
+        Raises:
+            TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
+
+        """
+        self._source = source
+        self._node_name = node_name.rstrip("/")
+        self._on_error = on_error
+        self._bag = BagWriter(directory)
+        try:
+            self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_NAMES_QOS)
+            self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
+            self._bag.flush()
+        except TraceError:
+            self._bag.abort()
+            raise
+        self._names_written: tuple[Sequence[str], Sequence[str]] | None = None
+        self._refused_types: set[tuple[str, str]] = set()
+
+    @property
+    def directory(self) -> Path:
+        """The bag's folder."""
+        return self._bag.directory
+
+    def write(self, messages: Sequence[SentMessage], *, whole: bool) -> int:
+        """Drain the trace and move all into the bag's buffer; returns how many messages were refused.
+
+        A batch without records (it tells of losses) is written if `whole`. No message may be later than now.
+        """
+        drain = self._source.drain_trace()
+        self._write_names(drain.realtime_ns)
+        if drain.records or messages or whole:
+            batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, drain.records)
+            self._bag.write(self._topic(BATCHES), drain.realtime_ns, encode_batch(batch))
+        offset_ns = drain.realtime_ns - drain.monotonic_ns
+        return sum(not self._write_message(message, message.monotonic_ns + offset_ns) for message in messages)
+
+    def tell_dropped(self, messages: int) -> None:
+        """Note with the next flush how many messages did not get into the bag."""
+        self._bag.set_custom_data(DROPPED_MESSAGES, str(messages))
+
+    def flush(self) -> None:
+        """Make the bag a finished one that holds all that was written."""
+        self._bag.flush()
+
+    def close(self) -> None:
+        """Flush a last time."""
+        self._bag.close()
+
+    def abort(self) -> None:
+        """Leave the bag as the last flush left it."""
+        self._bag.abort()
+
+    def _write_names(self, log_time_ns: int) -> None:
+        """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
+        words = (self._source.trace_components(), self._source.trace_names())
+        if words != self._names_written:
+            self._names_written = words
+            self._bag.write(self._topic(NAMES), log_time_ns, encode_names(*words))
+
+    def _write_message(self, message: SentMessage, log_time_ns: int) -> bool:
+        try:
+            self._bag.add_topic(message.topic, message.type_name, qos=message.qos)
+        except TraceError as error:
+            refused = (message.topic, message.type_name)
+            if refused not in self._refused_types:
+                self._refused_types.add(refused)
+                self._on_error(f"topic {message.topic} is not recorded: {error}")
+            return False
+        self._bag.write(message.topic, log_time_ns, message.data)
+        return True
+
+    def _topic(self, name: str) -> str:
+        return f"{self._node_name}/{name}"

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The basic elements allocate on no component thread: counted, in all they do.
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+using types::Float64;
+
+class ElementsHygiene : public Deployed {
+ protected:
+  void SetUp() override {
+    if (allocation_counting() != AllocationCounting::all)
+      GTEST_SKIP() << "a sanitizer's operators new take the place of the counting ones";
+  }
+  template <typename CoreType>
+  void add_element(const std::string& name, const std::string& port) {
+    using ShellType = typename CoreType::shell_type;
+    architecture.add_component<ShellType, CoreType, PeriodicUpdateFsm<ShellType>>(name);
+    architecture.add_resource<SharedData<Float64>>(name + "_out");
+    architecture.connect(name, port, "in", "read");
+    architecture.connect(name, "output", name + "_out", "write");
+  }
+  void wait_releases() {
+    for (const auto& component : architecture.components()) {
+      const auto& releases = component->task().statistics().releases;
+      const std::uint64_t before = releases.load();
+      wait_until([&] { return releases.load() >= before + 3; }, "the elements to run");
+    }
+  }
+};
+
+TEST_F(ElementsHygiene, NoAllocationOnAComponentThread) {
+  auto& in = architecture.add_resource<SharedData<Float64>>("in");
+  add_element<RelayCore<Float64>>("relay", "input");
+  add_element<MultiplexerCore<Float64, 2>>("multiplexer", "input_1");
+  add_element<PriorityMultiplexerCore<Float64, 2>>("priority", "input_1");
+  deploy();
+  in.write.write({1.0}, monotonic_now_ns());
+  wait_releases();
+  deployer.set_property("multiplexer", "select", std::int64_t{1});
+  in.write.write({2.0}, 0);  // too old for the one with a limit
+  wait_releases();
+  deployer.set_property("relay", "only_new", false);
+  wait_releases();
+  deployer.shutdown();
+  for (const auto& component : architecture.components())
+    EXPECT_EQ(0U, component->task().counters().allocations()) << component->name();
+}
+
+}  // namespace
+}  // namespace mauve::testing

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// RingBuffer: a read removes, each element goes to one reader, loss is counted.
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+struct RingFixture : ::testing::Test {
+  RingFixture() {
+    writer.output.connect(ring.write, "ring");
+    first.input.connect(ring.read, "ring");
+    second.input.connect(ring.read, "ring");
+    first.set_context(&context);
+  }
+  Context context;
+  TestShell writer;
+  TestShell first;
+  TestShell second;
+  RingBuffer<Number> ring{2};
+};
+
+TEST_F(RingFixture, EachElementGoesToOneReaderAndAFullRingRefuses) {
+  EXPECT_TRUE(writer.output.write({1.0}));
+  EXPECT_TRUE(writer.output.write({2.0}));
+  EXPECT_FALSE(writer.output.write({3.0}));
+  EXPECT_EQ(1U, ring.lost());
+  EXPECT_EQ(1.0, first.input.read().value.value);
+  EXPECT_EQ(2.0, second.input.read().value.value);
+}
+
+TEST_F(RingFixture, StatusIsPerPort) {
+  EXPECT_EQ(DataStatus::none, first.input.read().status);
+  writer.output.write({1.0});
+  EXPECT_EQ(DataStatus::new_data, first.input.read().status);
+  EXPECT_EQ(DataStatus::old_data, first.input.read().status) << "it has had an element";
+  EXPECT_EQ(DataStatus::none, second.input.read().status) << "it has had none";
+  writer.output.write({2.0});
+  EXPECT_EQ(DataStatus::new_data, second.input.read().status);
+  EXPECT_EQ(DataStatus::old_data, first.input.read().status);
+}
+
+TEST_F(RingFixture, AnEmptyRingLeavesTheLastElementsTimeAndThePlaceAlone) {
+  Context clock;
+  writer.set_context(&clock);
+  clock.clock_ns = 10;
+  writer.output.write({1.0});
+  Number place;
+  EXPECT_EQ(DataStatus::new_data, first.input.read(place));
+  time_ns_t time_ns = 0;
+  EXPECT_EQ(DataStatus::old_data, first.input.read(place, &time_ns));
+  EXPECT_EQ(1.0, place.value);
+  EXPECT_EQ(10, time_ns);
+  const Sample<Number> sample = first.input.read();
+  EXPECT_EQ(10, sample.time_ns);
+  EXPECT_EQ(7.0, sample.value.value) << "an element is given once; without one, the port's default";
+  context.clock_ns = 40;
+  EXPECT_EQ(30, first.input.age_ns());
+  first.input.disconnect();
+  first.input.connect(ring.read, "ring");
+  EXPECT_EQ(DataStatus::none, first.input.read().status);
+}
+
+TEST_F(RingFixture, OverwritingKeepsTheNewestAndCountsTheLost) {
+  RingBuffer<Number> overwriting(2, WhenFull::overwrite);
+  writer.output.connect(overwriting.write, "ring");
+  first.input.connect(overwriting.read, "ring");
+  for (const double value : {1.0, 2.0, 3.0}) EXPECT_TRUE(writer.output.write({value}));
+  EXPECT_EQ(1U, overwriting.lost());
+  EXPECT_EQ(2.0, first.input.read().value.value);
+  EXPECT_EQ(3.0, first.input.read().value.value);
+}
+
+TEST_F(RingFixture, NoElementIsLostOrGivenTwiceBetweenThreads) {
+  constexpr int kElements = 20'000;
+  std::atomic<bool> done{false};
+  std::vector<double> taken[2];
+  const auto take = [&](TestShell& shell, std::vector<double>& into) {
+    for (;;) {
+      const bool last_round = done;
+      const Sample<Number> sample = shell.input.read();
+      if (sample.is_new()) into.push_back(sample.value.value);
+      if (!sample.is_new() && last_round) return;
+      if (!sample.is_new()) std::this_thread::yield();
+    }
+  };
+  std::thread one([&] { take(first, taken[0]); });
+  std::thread two([&] { take(second, taken[1]); });
+  for (int i = 0; i < kElements; ++i) {
+    while (!writer.output.write({static_cast<double>(i)})) std::this_thread::yield();
+  }
+  done = true;
+  one.join();
+  two.join();
+  std::vector<int> times(kElements, 0);
+  for (const auto& list : taken) {
+    EXPECT_TRUE(std::is_sorted(list.begin(), list.end()));
+    for (const double value : list) ++times[static_cast<std::size_t>(value)];
+  }
+  EXPECT_EQ(kElements, std::count(times.begin(), times.end(), 1));
+}
+
+TEST(RingBuffer, WithoutACapacityIsRefused) {
+  try {
+    RingBuffer<Number> ring(0);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(ErrorCode::invalid_argument, error.code());
+    EXPECT_EQ("capacity", error.detail().element);
+  }
+  PluginRegistry registry;
+  registry.type<Number>();
+  EXPECT_THROW(registry.make_resource("ring_buffer", "std_msgs/msg/Float64", {}), Error);
+}
+
+}  // namespace
+}  // namespace mauve::testing

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Rule 13: the same architecture on one thread in virtual time, the same every time.
+#include <random>
+
+#include "simulated.hpp"
+
+namespace mauve::testing {
+namespace {
+
+using ::testing::ElementsAre;
+using Rule13Simulation = Simulated;
+
+TEST_F(Rule13Simulation, ComponentsActAtTheirInstantsAndNoTimePassesByItself) {
+  Component& fast = add("fast", 2);
+  Component& slow = add("slow", 3, 0.0, {.offset_ns = ms_to_ns(1)});
+  deploy();
+  EXPECT_EQ(simulation.now_ns() + ms_to_ns(20), simulation.epoch_ns());
+  run_to(ms_to_ns(6));
+  EXPECT_THAT(instants_ms(fast), ElementsAre(0, 2, 4, 6));
+  EXPECT_THAT(instants_ms(slow), ElementsAre(1, 4));
+  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(6), simulation.now_ns());
+}
+
+TEST_F(Rule13Simulation, EqualInstantsGoByPriorityThenByDeclaration) {
+  std::vector<std::string> order;
+  const auto note = [&order](Component& component) {
+    core(component).work = [&order, &component] { order.push_back(component.name()); };
+  };
+  note(add("first", 1, 0.0, {.priority = 20}));
+  note(add("second", 1, 0.0, {.priority = 20}));
+  note(add("urgent", 1, 0.0, {.priority = 30}));
+  deploy();
+  run_to(0);
+  EXPECT_THAT(order, ElementsAre("urgent", "first", "second"));
+}
+
+TEST_F(Rule13Simulation, ExecutionTakesItsDeclaredTimeAndIsNotPreempted) {
+  Component& slow = add("slow", 10, 3.0, {.priority = 10, .offset_ns = 0});
+  Component& urgent = add("urgent", 10, 0.0, {.priority = 90, .offset_ns = ms_to_ns(1)});
+  deploy();
+  run_to(ms_to_ns(9));
+  const TraceDrain trace = architecture.drain_trace();
+  const auto end = records_of(trace, TraceKind::state_end, slow.task().number());
+  const auto release = records_of(trace, TraceKind::release, urgent.task().number());
+  ASSERT_EQ(1U, end.size());
+  ASSERT_EQ(1U, release.size());
+  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(3), end[0].time_ns);
+  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(1), release[0].a) << "nominal";
+  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(3), release[0].b) << "actual: the processor was taken";
+}
+
+TEST_F(Rule13Simulation, CallbacksComeBeforeTheTasksOfTheirInstant) {
+  std::vector<std::string> order;
+  core(add("c", 2)).work = [&order] { order.emplace_back("task"); };
+  deploy();
+  simulation.every(simulation.epoch_ns(), ms_to_ns(2), [&order] { order.emplace_back("every"); });
+  simulation.at(simulation.epoch_ns() + ms_to_ns(1), [&] {
+    order.emplace_back("once");
+    EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(1), simulation.now_ns());
+  });
+  run_to(ms_to_ns(2));
+  EXPECT_THAT(order, ElementsAre("every", "task", "once", "every", "task"));
+}
+
+TEST_F(Rule13Simulation, StopAndStartKeepTheGrid) {
+  Component& component = add("c", 5);
+  deploy();
+  simulation.at(simulation.epoch_ns() + ms_to_ns(7), [this] { simulation.stop(architecture, "c"); });
+  simulation.at(simulation.epoch_ns() + ms_to_ns(13), [this] { simulation.start(architecture, "c"); });
+  run_to(ms_to_ns(21));
+  EXPECT_THAT(instants_ms(component), ElementsAre(0, 5, 15, 20));
+}
+
+TEST_F(Rule13Simulation, ATransactionTakesEffectWithinTheWaits) {
+  Component& kept = add("kept", 1);
+  add("changed", 4);
+  deploy();
+  TransactionReport report;
+  auto fresh = std::make_unique<TestCore>();
+  fresh->instants.reserve(100);
+  TestCore& now = *fresh;
+  simulation.at(simulation.epoch_ns() + ms_to_ns(6), [&] {
+    Transaction change;
+    change.replace_core("changed", std::move(fresh)).set_property("kept", "gain", 0.0).stop("kept");
+    report = simulation.commit(architecture, std::move(change));
+  });
+  run_to(ms_to_ns(12));
+  EXPECT_EQ(ComponentState::stopped, kept.task().state());
+  EXPECT_THAT(instants_ms(kept), ElementsAre(0, 1, 2, 3, 4, 5));
+  std::vector<double> later;
+  for (const time_ns_t instant : now.instants)
+    later.push_back(static_cast<double>(instant - simulation.epoch_ns()) / 1e6);
+  EXPECT_THAT(later, ElementsAre(8, 12));
+  ASSERT_EQ(3U, report.steps.size());
+  EXPECT_EQ(0, report.blackout_ns) << "no virtual time passes in a commit";
+}
+
+TEST_F(Rule13Simulation, TwoArchitecturesHaveAProcessorEach) {
+  Architecture other;
+  Component& here = add("here", 4, 3.0);
+  Component& there = other.add_component<TestShell, TestCore, BudgetFsm>("there");
+  there.set_property("period_ms", std::int64_t{4});
+  core(there).instants.reserve(10);
+  architecture.configure();
+  other.configure();
+  simulation.add(architecture);
+  simulation.add(other);
+  simulation.deploy();
+  run_to(ms_to_ns(4));
+  const auto released = records_of(other.drain_trace(), TraceKind::release);
+  ASSERT_EQ(2U, released.size());
+  EXPECT_EQ(released[0].a, released[0].b) << "the other's execution does not delay it";
+  EXPECT_EQ(2, core(here).runs);
+  simulation.shutdown();  // before `other` goes
+}
+
+TEST_F(Rule13Simulation, WhatIsAddedMustBeConfiguredAndFree) {
+  add("c");
+  EXPECT_THROW(simulation.add(architecture), Error);
+  architecture.configure();
+  simulation.add(architecture);
+  simulation.deploy();
+  Simulation second;
+  EXPECT_THROW(second.add(architecture), Error);
+  simulation.shutdown();
+  EXPECT_NO_THROW(second.add(architecture));
+  second.shutdown();
+}
+
+/// Eight components that read, write and decide by a seeded generator; the whole trace.
+std::vector<TraceRecord> random_run(std::uint64_t seed) {
+  Architecture architecture;
+  std::mt19937_64 random(seed);
+  architecture.add_resource<SharedData<Number>>("shared");
+  std::vector<TestCore*> cores;
+  for (int i = 0; i < 8; ++i) {
+    Component& component = architecture.add_component<TestShell, TestCore, BudgetFsm>(
+        "c" + std::to_string(i), {.priority = 10 + i % 3, .offset_ns = us_to_ns(100 * (i % 4))});
+    component.set_property("period_ms", std::int64_t{1 + i % 5});
+    component.set_property("gain", 0.05 * i);
+    architecture.connect(component.name(), "input", "shared", "read");
+    architecture.connect(component.name(), "output", "shared", "write");
+    TestCore& core = component.core_as<TestCore>();
+    core.work = [&core, &random] {
+      const double value = core.exposed_shell().input.read().value.value;
+      trace_mark(0, static_cast<std::int64_t>(value));
+      core.exposed_shell().output.write({static_cast<double>(random() % 1000)});
+    };
+  }
+  architecture.configure();
+  Simulation simulation;
+  simulation.add(architecture);
+  simulation.deploy();
+  simulation.every(simulation.epoch_ns() + ms_to_ns(10), ms_to_ns(7), [&] {
+    const std::string name = "c" + std::to_string(random() % 8);
+    Transaction change;
+    if (architecture.component(name).task().state() == ComponentState::running) {
+      change.stop(name);
+    } else {
+      change.start(name);
+    }
+    simulation.commit(architecture, std::move(change));
+  });
+  simulation.run_until(simulation.epoch_ns() + ms_to_ns(300));
+  return architecture.drain_trace().records;
+}
+
+TEST(Rule13SimulationSeeds, EqualSeedsGiveEqualTracesBitForBit) {
+  const auto first = random_run(7);
+  const auto again = random_run(7);
+  const auto other = random_run(8);
+  ASSERT_GT(first.size(), 1000U);
+  ASSERT_EQ(first.size(), again.size());
+  EXPECT_EQ(0, std::memcmp(first.data(), again.data(), first.size() * sizeof(TraceRecord)));
+  EXPECT_TRUE(first.size() != other.size() ||
+              std::memcmp(first.data(), other.data(), first.size() * sizeof(TraceRecord)) != 0);
+}
+
+}  // namespace
+}  // namespace mauve::testing

@@ -1,0 +1,300 @@
+"""Requests to an executor, carried out on real components without ROS."""
+
+import struct
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from mauve_rt._kernel import ComponentDescription
+from mauve_rt.model import load_architecture
+from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request, Step
+from mauve_rt.node.executor_runtime import Runtime
+
+PATIENCE_S = 20.0
+FILE = """\
+mauve: 1
+executor: {namespace: /robot_1}
+components:
+  counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+            alternatives: [executor_tests/Backwards, executor_tests/Reluctant, executor_tests/CalmFsm,
+                           executor_tests/EventFsm, executor_tests/TwinShell, executor_tests/Twin,
+                           executor_tests/TwinFsm]}
+  guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+          reconfigurable: false}
+  brave: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+          fallback: executor_tests/Backwards}
+  free: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+         alternatives: [executor_tests/Backwards]}
+resources:
+  count: {kind: shared_data, type: std_msgs/msg/Float64}
+  poison: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: poison, direction: subscribe}}
+connections:
+  - [counter.count, count.write]
+  - [brave.set, poison.read]
+"""
+COUNTER = (
+    "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm, "
+    "alternatives: [executor_tests/Backwards], properties: {step: 3.0, list_file: a.txt}, priority: 30}"
+)
+POISON = b"\0\1\0\0" + struct.pack("<d", -1e7)  # in CDR; what the core calls unheard of
+NUMBER = "{kind: shared_data, type: std_msgs/msg/Float64}"
+ADD = (
+    Step("add_resource", "sum", "", NUMBER),
+    Step("add_component", "second", "", COUNTER),
+    Step("connect", "second", "count", "sum.write"),
+    Step("connect", "second", "set", "count.read"),
+    Step("start", "second"),
+)
+REMOVE = (Step("stop", "second"), Step("remove_component", "second"), Step("remove_resource", "sum"))
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, plugin_prefix: Path) -> Iterator[Runtime]:
+    path = tmp_path / "robot.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    runtime = Runtime(lambda: load_architecture(path))
+    runtime.configure()
+    runtime.activate()
+    yield runtime
+    runtime.deactivate()
+    runtime.cleanup()
+
+
+@pytest.fixture
+def control(runtime: Runtime) -> Control:
+    return Control(runtime)
+
+
+def _ask(control: Control, *steps: Step, dry_run: bool = False, expected_epoch: int = 0) -> Outcome:
+    return control.handle(Request(steps=steps, dry_run=dry_run, expected_epoch=expected_epoch))
+
+
+def _part(runtime: Runtime, name: str) -> ComponentDescription:
+    return next(part for part in runtime.components() if part.name == name)
+
+
+def _look(runtime: Runtime) -> tuple[object, ...]:
+    parts = [
+        (
+            *(part.name, part.state, part.shell, part.core, part.fsm, part.period_ns),
+            [(port.name, port.resource, port.service) for port in part.ports],
+            [(item.name, item.value) for item in part.properties],
+        )
+        for part in runtime.components()
+    ]
+    return (parts, runtime.resources(), runtime.epoch)
+
+
+def _wait(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_a_transaction_adds_wires_and_starts_and_another_one_removes(
+    runtime: Runtime, control: Control, tmp_path: Path
+) -> None:
+    before = _look(runtime)
+    outcome = _ask(control, *ADD)
+    assert outcome.success, outcome.message
+    assert outcome.message.startswith("5 steps are in force; prepared in ")
+    assert [report.step for report in outcome.report] == [
+        "add_resource sum",
+        "add_component",
+        "connect count sum.write",
+        "connect set count.read",
+        "start",
+    ]
+    assert outcome.epoch > before[2]
+    second = _part(runtime, "second")
+    assert second.state == "RUNNING"
+    assert {port.name: port.resource for port in second.ports} == {"set": "count", "count": "sum"}
+    values = {item.name: item.value for item in second.properties}
+    assert (values["step"], values["list_file"]) == (3.0, str(tmp_path / "a.txt"))
+    assert runtime.cores_of(second) == ["executor_tests/Backwards"]
+    _wait(lambda: runtime.deployer.read_resource("sum")[1] > 0)
+    replaced = _ask(control, Step("replace_core", "second", "executor_tests/Backwards"))
+    assert replaced.success, replaced.message
+    removed = _ask(control, *REMOVE)
+    assert removed.success, removed.message
+    assert _look(runtime)[:2] == before[:2]
+    assert _ask(control, Step("stop", "second")).code is Code.UNKNOWN_COMPONENT
+    assert "second" in runtime.deployer.trace_components()
+
+
+def test_a_dry_run_prepares_everything_and_changes_nothing(runtime: Runtime, control: Control) -> None:
+    before = _look(runtime)
+    outcome = _ask(control, *ADD, dry_run=True)
+    assert outcome.success, outcome.message
+    assert outcome.message.endswith("would be accepted")
+    assert not outcome.report
+    refused = _ask(control, Step("replace_core", "free", "executor_tests/Twin"), dry_run=True)
+    assert refused.code is Code.UNDECLARED_CORE
+    assert _look(runtime) == before
+
+
+REFUSED = {
+    "a third step that fails": (
+        (ADD[0], ADD[1], Step("connect", "second", "count", "sum.read")),
+        Code.INVALID,
+        "step 3 (connect second.count sum.read)",
+    ),
+    "no such port": ((Step("connect", "free", "cuont", "count.write"),), Code.INVALID, "no such port"),
+    "no such resource": (
+        (Step("connect", "free", "count", "cuont.write"),),
+        Code.INVALID,
+        "no such resource",
+    ),
+    "no service": ((Step("connect", "free", "count", "count"),), Code.INVALID, "expected resource.service"),
+    "connected": ((Step("connect", "counter", "count", "count.write"),), Code.INVALID, "connected already"),
+    "not connected": ((Step("disconnect", "free", "count"),), Code.INVALID, "is not connected"),
+    "still connected": ((Step("remove_resource", "count"),), Code.INVALID, "disconnect these"),
+    "topic's resource": ((Step("remove_resource", "poison"),), Code.INVALID, "bound to topic 'poison'"),
+    "topic": (
+        (Step("add_resource", "x", "", NUMBER[:-1] + ", topic: {name: x, direction: publish}}"),),
+        Code.UNSUPPORTED,
+        "a topic cannot be bound while the executor runs; leave topic out",
+    ),
+    "two names": ((ADD[0], ADD[0]), Code.INVALID, "step 2 (add_resource sum {kind"),
+    "a component's name": ((Step("add_resource", "free", "", NUMBER),), Code.INVALID, "there is a component"),
+    "no YAML": ((Step("add_resource", "x", "", "{kind: "),), Code.INVALID, "not YAML"),
+    "no mapping": ((Step("add_component", "x", "", "5"),), Code.INVALID, "expected a mapping, found 5"),
+    "no name": ((Step("add_component", "x y", "", COUNTER),), Code.INVALID, "bad name 'x y'"),
+    "unknown key": (
+        (Step("add_component", "x", "", COUNTER.replace("priority", "prioritty")),),
+        Code.INVALID,
+        "unknown key 'prioritty' of component 'x'; did you mean priority?",
+    ),
+    "core that is not installed": (
+        (Step("add_component", "x", "", COUNTER.replace("/Counter,", "/Countr,")),),
+        Code.UNKNOWN_CORE,
+        "did you mean executor_tests/Counter?",
+    ),
+    "core for another shell": (
+        (Step("add_component", "x", "", COUNTER.replace("/Counter,", "/Twin,")),),
+        Code.INVALID,
+        "'executor_tests/Twin' does not fit component 'x'",
+    ),
+    "fsm": (
+        (Step("replace_fsm", "free", "executor_tests/CalmFsm"),),
+        Code.UNDECLARED_CORE,
+        "declared: component 'free' takes executor_tests/CounterFsm; name it among its alternatives",
+    ),
+    "shell": ((Step("replace_shell", "counter", "os/Shell"),), Code.UNKNOWN_CORE, "shell 'os/Shell' is not"),
+    "shell alone": (
+        (Step("replace_shell", "counter", "executor_tests/TwinShell"),),
+        Code.PREPARE_FAILED,
+        "counter",
+    ),
+    "protected": (
+        (Step("stop", "free"), Step("disconnect", "guard", "count")),
+        Code.NOT_RECONFIGURABLE,
+        "step 2 (disconnect guard count): component 'guard' is protected",
+    ),
+    "protected from removal": ((Step("remove_component", "guard"),), Code.NOT_RECONFIGURABLE, "is protected"),
+    "running": (
+        (Step("stop", "free"), Step("start", "counter")),
+        Code.ALREADY_RUNNING,
+        "step 2 (start counter)",
+    ),
+    "stopped": ((Step("stop", "free"), Step("stop", "free")), Code.NOT_RUNNING, "step 2 (stop free)"),
+    "adopt": (
+        (*ADD, Step("replace_core", "counter", "executor_tests/Reluctant")),
+        Code.ADOPT_REFUSED,
+        "step 6 (replace_core counter executor_tests/Reluctant)",
+    ),
+    "property of an added one": (
+        (ADD[1], Step("set_property", "second", "step", "11")),
+        Code.INVALID,
+        "step 2 (set_property second step 11): property 'step' of component 'second': expected at least 0",
+    ),
+}
+
+
+def test_a_refusal_names_the_step_and_changes_nothing(runtime: Runtime, control: Control) -> None:
+    before = _look(runtime)
+    for name, (steps, code, words) in REFUSED.items():
+        outcome = _ask(control, *steps)
+        assert words in outcome.message, name
+        assert outcome.code is code, f"{name}: {outcome.message}"
+        assert not outcome.report, name
+        assert _look(runtime) == before, name
+
+
+def test_expected_epoch(runtime: Runtime, control: Control) -> None:
+    epoch = runtime.epoch
+    assert _ask(control, *ADD, expected_epoch=epoch + 1).code is Code.WRONG_EPOCH
+    outcome = _ask(control, *ADD, expected_epoch=epoch)
+    assert outcome.success, outcome.message
+    assert _ask(control, *REMOVE, expected_epoch=epoch).code is Code.WRONG_EPOCH
+    assert _ask(control, *REMOVE, expected_epoch=outcome.epoch).success
+
+
+def test_an_fsm_is_replaced_with_its_grid(runtime: Runtime, control: Control) -> None:
+    outcome = _ask(control, Step("replace_fsm", "counter", "executor_tests/CalmFsm"))
+    assert outcome.success, outcome.message
+    counter = _part(runtime, "counter")
+    assert (counter.fsm, counter.period_ns) == ("executor_tests/CalmFsm", 30_000_000)
+    (report,) = outcome.report
+    assert report.step == "replace_fsm executor_tests/CalmFsm"
+    assert report.blackout_ns > 0
+    assert report.phase_nominal_ns == 0
+    assert report.phase_actual_ns != NOT_MEASURED
+    assert _ask(control, Step("replace_fsm", "counter", "executor_tests/EventFsm")).success
+    assert _part(runtime, "counter").period_ns == 0, "it waits for events"
+    assert _ask(control, Step("replace_fsm", "counter", "executor_tests/CounterFsm")).success, "its own"
+
+
+def test_all_parts_are_replaced_as_one(runtime: Runtime, control: Control) -> None:
+    outcome = _ask(
+        control,
+        Step("replace_shell", "counter", "executor_tests/TwinShell"),
+        Step("replace_core", "counter", "executor_tests/Twin"),
+        Step("replace_fsm", "counter", "executor_tests/TwinFsm"),
+        Step("set_property", "counter", "factor", "4.0"),
+    )
+    assert outcome.success, outcome.message
+    assert (outcome.from_core, outcome.to_core) == ("executor_tests/Counter", "executor_tests/Twin")
+    counter = _part(runtime, "counter")
+    assert (counter.shell, counter.core) == ("executor_tests/TwinShell", "executor_tests/Twin")
+    assert {item.name: item.value for item in counter.properties} == {"step": 1.0, "factor": 4.0}
+    assert runtime.cores_of(counter) == [], "cores for the other shell fit no more"
+
+
+def test_a_core_replaced_by_its_like_counts_as_a_change(runtime: Runtime, control: Control) -> None:
+    before = runtime.epoch
+    outcome = _ask(control, Step("replace_core", "counter", "executor_tests/Counter"))
+    assert (outcome.success, outcome.epoch) == (True, before + 1)
+
+
+def test_a_fallback_core_takes_over_and_tells_the_fault(runtime: Runtime, control: Control) -> None:
+    before = runtime.epoch
+    assert runtime.deployer.write_resource("poison", POISON)
+    _wait(lambda: _part(runtime, "brave").fell_back)
+    brave = _part(runtime, "brave")
+    assert (brave.state, brave.core, brave.fallback) == ("RUNNING", *["executor_tests/Backwards"] * 2)
+    assert "set to something unheard of (in state Count" in brave.fault
+    assert runtime.observe() or runtime.epoch > before
+    outcome = _ask(control, Step("replace_core", "brave", "executor_tests/Counter"))
+    assert outcome.success, outcome.message
+    brave = _part(runtime, "brave")
+    assert (brave.core, brave.fell_back, brave.fault) == ("executor_tests/Counter", False, "")
+
+
+def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) -> None:
+    steps = (
+        Step("add_component", "weak", "", COUNTER),
+        Step("connect", "weak", "set", "poison.read"),
+        Step("start", "weak"),
+    )
+    assert _ask(control, *steps).success
+    runtime.deployer.write_resource("poison", POISON)
+    _wait(lambda: _part(runtime, "weak").state == "FAULTED")
+    refused = _ask(control, Step("set_property", "weak", "step", "2.0"))
+    assert (refused.code, "remove it" in refused.message) == (Code.FAULTED, True)
+    assert _ask(control, Step("remove_component", "weak")).success
+    assert "weak" not in [part.name for part in runtime.components()]

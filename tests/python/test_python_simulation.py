@@ -1,0 +1,85 @@
+"""Components in Python in virtual time (rule 13)."""
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+from python_parts import ActFsm, CountCore, CountShell, HearCore, HearShell, Stage
+
+from mauve_rt.api import MauveError, SharedData, Simulation, Transaction, s_to_ns
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def pair(built: Stage) -> Stage:
+    built.add("count", CountShell, CountCore)
+    built.add("hear", HearShell, HearCore)
+    built.share("pose", SharedData(PoseStamped), "count.out.write", "hear.heard.read")
+    built.architecture.configure()
+    return built
+
+
+def test_rule_13_every_instant_is_run_and_the_trace_is_the_same_every_time():
+    traces = []
+    for _ in range(2):
+        with Stage() as stage:
+            stage.add("count", CountShell, CountCore)
+            stage.architecture.configure()
+            simulation = Simulation()
+            simulation.add(stage.architecture)
+            simulation.deploy()
+            simulation.run_until(simulation.epoch_ns() + s_to_ns(2))
+            assert stage.architecture.component("count").core.count == 1001, "t = 0, 2 ms, ... 2 s"
+            traces.append(simulation.drain_trace(stage.architecture).records)
+            simulation.shutdown()
+    assert traces[0] == traces[1] != b""
+
+
+def test_rule_13_transactions_and_callbacks_act_at_their_instants(pair: Stage):
+    simulation = Simulation()
+    simulation.add(pair.architecture)
+    simulation.deploy()
+    epoch_ns = simulation.epoch_ns()
+    seen: list[int] = []
+    steps = Transaction().set_property("count", "step", 10)
+    simulation.at(epoch_ns + 9 * MS, lambda: simulation.commit(pair.architecture, steps))
+    simulation.every(epoch_ns, 5 * MS, lambda: seen.append(simulation.now_ns() - epoch_ns))
+    simulation.run_until(epoch_ns + 12 * MS)
+    assert seen == [0, 5 * MS, 10 * MS]
+    assert pair.architecture.component("count").core.count == 5 + 2 * 10, "0 to 8 ms by 1, 10 and 12 by 10"
+    heard = pair.architecture.component("hear").core.samples
+    assert [(int(s.value.pose.position.x), s.time_ns - epoch_ns) for s in heard] == [
+        (1, 0), (2, 2 * MS), (3, 4 * MS), (4, 6 * MS), (5, 8 * MS), (15, 10 * MS), (25, 12 * MS)
+    ]  # fmt: skip
+    simulation.stop(pair.architecture, "count")
+    assert pair.architecture.component("count").state == "STOPPED"
+    with pytest.raises(MauveError, match="nobody"):
+        simulation.get_time(pair.architecture, "nobody")
+
+
+def test_what_a_callback_raises_is_raised_by_run_until(pair: Stage):
+    simulation = Simulation()
+    simulation.add(pair.architecture)
+    simulation.deploy()
+    simulation.at(simulation.epoch_ns(), lambda: 1 // 0)
+    with pytest.raises(ZeroDivisionError):
+        simulation.run_until(simulation.epoch_ns() + 10 * MS)
+    simulation.run_until(simulation.epoch_ns() + 10 * MS)
+    assert pair.architecture.component("count").core.count == 6
+
+
+def test_what_a_core_raises_is_a_fault_in_virtual_time_too(built: Stage):
+    class Breaks(CountCore):
+        def act(self) -> None:
+            super().act()
+            if self.count == 3:
+                raise RuntimeError("worn out")
+
+    component = built.add("count", CountShell, Breaks, ActFsm)
+    built.architecture.configure()
+    simulation = Simulation()
+    simulation.add(built.architecture)
+    simulation.deploy()
+    simulation.run_until(simulation.epoch_ns() + 20 * MS)
+    assert component.state == "FAULTED"
+    assert "worn out" in component.describe().fault
+    assert component.core.count == 3

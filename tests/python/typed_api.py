@@ -1,0 +1,245 @@
+"""Uses the public API with every type said aloud; checked by mypy --strict, never run.
+
+A line with `type: ignore[code]` is a mistake that mypy must find: strict checking refuses an ignore that
+hides nothing.
+"""
+
+from collections.abc import Callable
+from typing import assert_type
+
+from mauve_rt.api import (
+    NOT_MEASURED,
+    AnyResource,
+    Architecture,
+    ArchitectureDescription,
+    CallPort,
+    Component,
+    ComponentDescription,
+    Core,
+    Deployer,
+    EventCounter,
+    EventPort,
+    Fsm,
+    LatestValue,
+    MauveError,
+    PluginRegistry,
+    Property,
+    ReadPort,
+    RealtimeStatus,
+    Resource,
+    RingBuffer,
+    Sample,
+    SharedData,
+    Shell,
+    Simulation,
+    State,
+    StepReport,
+    TraceDrain,
+    Transaction,
+    TransactionReport,
+    WritePort,
+    call_port,
+    event_port,
+    monotonic_ns,
+    ms_to_ns,
+    property,  # noqa: A004
+    read_port,
+    s_to_ns,
+    service,
+    us_to_ns,
+    write_port,
+)
+
+
+class Pose:
+    """Stands for a message class that has types."""
+
+    x: float = 0.0
+
+
+class Map(Resource):
+    def configure(self) -> bool | None:
+        self.cells = [0]
+        return True
+
+    @service
+    def get(self, cell: int, *, default: float = 0.0) -> float:
+        return float(self.cells[cell]) or default
+
+    @service("package/Visitor")
+    def visit(self, visitor: Callable[[list[int]], None]) -> None:
+        visitor(self.cells)
+
+
+class HoverShell(Shell):
+    pose = read_port(Pose)
+    start = read_port(Pose, default=Pose())
+    target = write_port(Pose, on_commit="hold", on_stop="set_zero")
+    get = call_port(Map.get)
+    visit = call_port("package/Visitor")
+    reached = event_port()
+    height = property(1.0, unit="m", description="above ground", minimum=0.0, maximum=9.0)
+    tries = property(3)
+    eager = property(initial=True)
+    frame = property("map")
+    wrong = write_port(Pose, on_commit="default")  # type: ignore[arg-type]
+
+
+class HoverCore(Core[HoverShell]):
+    def configure(self) -> None:
+        self.height = self.shell.height.value
+        assert_type(self.shell.height, Property[float])
+        assert_type(self.shell.tries.value, int)
+        assert_type(self.shell.eager.value, bool)
+        assert_type(self.shell.frame.value, str)
+
+    def adopt(self, old: object) -> bool:
+        return isinstance(old, HoverCore)
+
+    def take(self, old: "HoverCore") -> None:
+        self.height = old.height
+
+    def follow(self) -> None:
+        assert_type(self.shell.pose, ReadPort[Pose])
+        sample = self.shell.pose.read()
+        assert_type(sample, Sample[Pose])
+        assert_type(sample.age_ns(self.shell.clock_ns + self.shell.period_ns), int)
+        if sample.is_new and sample.status == "new":
+            assert_type(self.shell.target.write(sample.value), bool)
+        assert_type(self.shell.get(3, default=1.0), float)
+        self.shell.visit(print)
+        self.shell.reached.raise_()
+        self.shell.target.write(3)  # type: ignore[arg-type]
+        self.shell.get("three")  # type: ignore[arg-type]
+        self.shell.poze  # type: ignore[attr-defined]  # noqa: B018
+
+    def is_high(self) -> bool:
+        return self.height > 1.0
+
+
+class OtherCore(Core[HoverShell]):
+    def act(self) -> None: ...
+
+
+class HoverFsm(Fsm[HoverShell, HoverCore]):
+    def define(self) -> None:
+        follow = self.execution("Follow", HoverCore.follow, max_execution_ns=us_to_ns(500))
+        again = self.execution("Again", "follow")
+        rest = self.wait("Rest", ms_to_ns(20) if self.shell.eager.value else s_to_ns(1))
+        assert_type(follow, State)
+        self.set_initial(follow)
+        self.transition(follow, HoverCore.is_high, rest)
+        self.transition(follow, "is_high", rest)
+        self.next(follow, again)
+        self.next(again, rest)
+        self.next(rest, follow)
+        self.execution("Other", OtherCore.act)  # type: ignore[arg-type]
+        self.transition(follow, HoverCore.follow, rest)  # type: ignore[arg-type]
+        self.next(follow, "Rest")  # type: ignore[arg-type]
+
+
+class NativeCore(Core):
+    """For a shell in C++, whose members only the kernel knows."""
+
+    def tick(self) -> None:
+        self.shell.beat.write(None)
+
+
+def members(shell: HoverShell) -> tuple[WritePort[Pose], CallPort[[int], float], EventPort]:
+    return shell.target, shell.get, shell.reached
+
+
+class EventFsm(Fsm[HoverShell, HoverCore]):
+    def define(self) -> None:
+        heard = self.wait_event("Heard", self.shell.pose, ms_to_ns(100), ms_to_ns(1))
+        also = self.wait_event("Also", "pose", timeout_ns=s_to_ns(1), min_interarrival_ns=1)
+        self.set_initial(heard)
+        self.next(heard, also)
+        self.next(also, heard)
+        self.wait_event("Wrong", self.shell.target, 1, 1)  # type: ignore[arg-type]
+
+
+def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
+    before = architecture.describe()
+    assert_type(before, ArchitectureDescription)
+    transaction = (
+        Transaction()
+        .add_resource("extra", SharedData(Pose))
+        .add_resource("named", kind="event")
+        .add_component("new", HoverShell, HoverCore, "package/Fsm", priority=3, properties={"height": 2.0})
+        .connect("new", "pose", "extra", "read")
+        .start("new")
+        .replace_core("hover", OtherCore)
+        .replace_fsm("hover", EventFsm)
+        .replace_shell("hover", "package/HoverShell")
+        .set_property("hover", "tries", 4)
+        .disconnect("hover", "pose")
+        .stop("mixed")
+        .remove_component("mixed")
+        .remove_resource("count")
+    )
+    deployer.commit(transaction, dry_run=True)
+    assert_type(str(architecture.describe()), str)
+    return deployer.commit(transaction, expected_epoch=architecture.epoch(), commit_timeout_ns=ms_to_ns(50))
+
+
+def simulate(architecture: Architecture) -> TraceDrain:
+    simulation = Simulation(trace=True, begin_ns=s_to_ns(1))
+    simulation.add(architecture)
+    simulation.deploy()
+    simulation.at(simulation.epoch_ns() + ms_to_ns(10), lambda: simulation.stop(architecture, "hover"))
+    simulation.every(simulation.now_ns(), ms_to_ns(1), lambda: simulation.get_time(architecture, "hover"))
+    simulation.run_until(s_to_ns(2))
+    simulation.start(architecture, "hover")
+    simulation.commit(architecture, Transaction().stop("hover"))
+    simulation.shutdown()
+    return simulation.drain_trace(architecture)
+
+
+def run(registry: PluginRegistry) -> StepReport:
+    registry.load_library("libplugins.so")
+    registry.shell("package/HoverShell", HoverShell)
+    registry.core("package/HoverCore", HoverCore, "package/HoverShell")
+    registry.fsm("package/HoverFsm", HoverFsm, "package/HoverShell")
+    registry.resource("package/Map", Map)
+    architecture = Architecture(registry)
+    resources: dict[str, AnyResource] = {
+        "pose": SharedData(Pose),
+        "queue": RingBuffer(Pose, 8, overwrite=True, max_bytes=100),
+        "latest": LatestValue("geometry_msgs/msg/Pose2D", max_readers=2),
+        "count": EventCounter(),
+        "map": Map(),
+    }
+    for name, resource in resources.items():
+        architecture.add_resource(name, resource)
+    architecture.add_resource("named", kind="ring_buffer", type="std_msgs/msg/Bool", capacity=3)
+    hover = architecture.add_component("hover", HoverShell, HoverCore, HoverFsm, priority=40, cpus=[0])
+    architecture.add_component("mixed", "package/Shell", NativeCore, "package/Fsm", overrun="catch_up")
+    architecture.add_component("bad", HoverCore, HoverCore, HoverFsm)  # type: ignore[arg-type]
+    assert_type(hover, Component)
+    architecture.connect("hover", "pose", "pose", "read")
+    architecture.set_property("hover", "height", 2.0)
+    architecture.publish("pose")
+    architecture.configure()
+    deployer = Deployer(architecture, require_realtime=False, trace=True)
+    deployer.deploy()
+    assert_type(deployer.realtime_status(), RealtimeStatus)
+    clock = deployer.get_time("hover")
+    deployer.stop("hover")
+    hover.cleanup_core()
+    hover.replace_core(OtherCore)
+    hover.configure_core()
+    deployer.start("hover", clock)
+    assert_type(hover.describe(), ComponentDescription)
+    assert_type(deployer.drain_trace(), TraceDrain)
+    try:
+        report = deployer.replace_core("hover", HoverCore, commit_timeout_ns=ms_to_ns(100))
+    except MauveError as error:
+        assert_type((error.code, error.component, error.remedy), tuple[str, str, str])
+        raise
+    finally:
+        deployer.shutdown()
+        architecture.cleanup()
+    assert_type(report.phase_actual_ns != NOT_MEASURED, bool)
+    assert_type(monotonic_ns(), int)
+    return report

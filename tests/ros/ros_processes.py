@@ -1,0 +1,72 @@
+"""Processes of the tests: an executor, and when any of ours has begun."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+PATIENCE_S = 20.0
+
+
+def wait_for_signals(process_id: int) -> None:
+    """Until a process of ours handles signals: a thread blocks SIGINT and SIGTERM alone.
+
+    Threads of libraries that block every signal come sooner than that.
+    """
+    deadline = time.monotonic() + PATIENCE_S
+    ours = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
+    while ours not in _blocked_signals(process_id):
+        assert time.monotonic() < deadline, "it never did"
+        time.sleep(0.002)
+
+
+def _blocked_signals(process_id: int) -> set[int]:
+    blocked = set()
+    for status in Path(f"/proc/{process_id}/task").glob("*/status"):
+        with contextlib.suppress(OSError):  # a thread that has just ended
+            blocked.add(int(status.read_text("ascii").partition("SigBlk:")[2].split()[0], 16))
+    return blocked
+
+
+class ExecutorProcess:
+    """`ros2 run mauve_rt executor --ros-args ...`, as a process of its own."""
+
+    def __init__(
+        self,
+        folder: Path,
+        environment: dict[str, str],
+        arguments: Sequence[str],
+        *,
+        wrapper: Sequence[str] = (),
+    ) -> None:
+        self._log = folder / f"executor_{time.monotonic_ns()}.log"
+        with self._log.open("w", encoding="utf-8") as log:
+            self.process = subprocess.Popen(
+                [*wrapper, sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
+                env={**os.environ, **environment},
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def output(self) -> str:
+        """Everything it printed."""
+        return self._log.read_text(encoding="utf-8")
+
+    def wait_begun(self) -> None:
+        """Until it handles signals: loading takes a while."""
+        wait_for_signals(self.process.pid)
+
+    def wait(self, timeout_s: float = PATIENCE_S) -> int:
+        """Its exit status."""
+        return self.process.wait(timeout_s)
+
+    def end(self, number: signal.Signals) -> tuple[int, float]:
+        """Send a signal; exit status and the seconds it took to go."""
+        began = time.monotonic()
+        self.process.send_signal(number)
+        return self.wait(), time.monotonic() - began

@@ -1,0 +1,93 @@
+"""/diagnostics: what each component did, allocated and how long its states took."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from mauve_msgs.srv import ReplaceCore
+from mauve_rt._kernel import allocation_counting
+from mauve_rt.node.executor_requests import Code
+
+NODE = "/robot_1/executor"
+PARTS = ("counter", "guard", "sleepy")
+FIGURES = {"releases", "overruns", "skipped", "wakeup_p99_ns", "wakeup_max_ns", "allocations", "page_faults"}
+
+
+class Health:
+    """The statuses that were heard, by component, and the values of the newest."""
+
+    def __init__(self, graph: Any) -> None:
+        self._graph = graph
+        self._heard = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def of(self, part: str) -> list[Any]:
+        """Every status of a component, or of the process."""
+        return [
+            status for array in self._heard for status in array.status if status.name == f"{NODE}: {part}"
+        ]
+
+    def values(self, part: str) -> dict[str, str]:
+        """Of the newest status; none before the first."""
+        told = self.of(part)
+        return {item.key: item.value for item in told[-1].values} if told else {}
+
+    def await_releases(self, part: str, count: int) -> None:
+        self._graph.spin_until(
+            lambda: int(self.values(part).get("releases", "0")) >= count, f"{count} releases of {part}"
+        )
+
+    def remarks(self, part: str, what: str) -> list[str]:
+        """Warnings about it."""
+        return [
+            status.message
+            for status in self.of(part)
+            if status.level == DiagnosticStatus.WARN and what in status.message
+        ]
+
+
+def test_each_component_s_figures_are_told(executor: Any, graph: Any) -> None:
+    health = Health(graph)
+    health.await_releases("counter", 20)
+    for part in PARTS:
+        values = health.values(part)
+        assert values.keys() >= FIGURES
+        assert all(int(values[figure]) >= 0 for figure in FIGURES)
+    assert health.values("counter")["allocations"] == "0"
+    assert int(health.values("counter")["execution_mean_ns[Count]"]) > 0
+    assert "execution_max_ns[Count]" in health.values("counter")
+    assert not any("Pause" in key for key in health.values("counter"))
+    # The executor loads the kernel before anything that loads the C++ library.
+    assert health.values("process")["allocation_counting"] in ("all", "none")
+    assert (health.values("process")["allocation_counting"] == "none") == (allocation_counting() == "none")
+
+
+def test_a_component_that_allocates_is_told_of(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8")
+    text = text.replace(
+        "guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter",
+        "guard: {shell: executor_tests/CounterShell, core: executor_tests/Wasteful",
+    )
+    architecture.write_text(text, encoding="utf-8")
+    start_executor("-p", f"architecture:={architecture}")
+    health = Health(graph)
+    health.await_releases("guard", 20)
+    assert int(health.values("guard")["allocations"]) >= 4 * 19
+    graph.spin_until(lambda: bool(health.remarks("guard", "allocations")), "a warning")
+    assert not health.remarks("counter", "allocations")
+
+
+def test_the_interpreter_s_allocations_are_no_warning(executor: Any, graph: Any) -> None:
+    reply = graph.ask(
+        ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/PyCounter"
+    )
+    assert (reply.success, reply.code) == (True, Code.OK)
+    health = Health(graph)
+    health.await_releases("counter", 20)
+    graph.spin_until(lambda: health.values("counter").get("core") == "executor_tests/PyCounter", "the core")
+    health.await_releases("counter", int(health.values("counter")["releases"]) + 100)
+    told = [status for status in health.of("counter") if status.level == DiagnosticStatus.WARN]
+    assert not [status.message for status in told if "allocations" in status.message]

@@ -1,0 +1,51 @@
+"""An executor in virtual time tells what a real one tells."""
+
+from pathlib import Path
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float64
+
+from mauve_rt._kernel import Simulation
+from mauve_rt.node.simulated_executor import SimulatedExecutor
+from mauve_rt.node.simulated_topics import Sample, SimulatedTopics
+
+FALLBACK = "executor_tests/Backwards"
+S = 1_000_000_000
+
+
+@pytest.fixture
+def guarded(architecture: Path) -> Path:
+    """`ARCHITECTURE`, its counter with a fallback core."""
+    text = architecture.read_text(encoding="utf-8")
+    architecture.write_text(
+        text.replace("priority: 40", f"priority: 40, fallback: {FALLBACK}"), encoding="utf-8"
+    )
+    return architecture
+
+
+def test_a_fallback_core_that_took_over_is_an_event(guarded: Path, tmp_path: Path) -> None:
+    simulation, topics = Simulation(), SimulatedTopics()
+    heard: list[Sample] = []
+    executor = SimulatedExecutor(simulation, topics, guarded, tmp_path / "bag", complain=pytest.fail)
+    topics.listen("/robot_1/executor/events", heard.append)
+    simulation.deploy()
+    executor.activate()
+    simulation.run_until(simulation.epoch_ns() + S)
+    executor.refresh()
+    assert heard == []
+    topics.say(
+        "/robot_1/set",
+        "std_msgs/msg/Float64",
+        Float64(data=-1e7),
+        time_ns=simulation.now_ns(),
+        qos=QoSProfile(depth=1),
+    )
+    simulation.run_until(simulation.epoch_ns() + 2 * S)
+    executor.refresh()
+    executor.refresh()
+    (event,) = [sample.message() for sample in heard]
+    assert (event.requested_by, event.success) == ("kernel", True)
+    assert "set to something unheard of (in state Count" in event.cause
+    assert (event.from_core, event.to_core) == ("executor_tests/Counter", FALLBACK)
+    executor.close()
