@@ -1,6 +1,7 @@
 """Reads a recorded trace back by rosbags and the definitions stored in the bag; needs no message package."""
 
 import struct
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from heapq import merge
@@ -21,14 +22,21 @@ from mauve_rt.trace.trace import Loss, Message, Trace
 
 _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
-_UNREADABLE = (ReaderError, OSError, AssertionError, TypeError, ValueError, KeyError, struct.error)
+_UNREADABLE = (
+    ReaderError, OSError, AssertionError, TypeError, ValueError, KeyError, IndexError, OverflowError,
+    MemoryError, EOFError, struct.error,
+)  # fmt: skip
 """What rosbags raises for damaged files."""
+
+_LONGER_THAN_A_WRITE_S = 0.02
+_PATIENCE_S = 10.0  # with a file that always changes
 
 
 def read_bag(path: str | Path) -> Trace:
     """Read the trace in a bag: a rosbag2 folder with MCAP files, or one such file.
 
-    metadata.yaml is not consulted: the files tell the same, and are never older.
+    metadata.yaml is not consulted: the files tell the same, and are never older. A bag that is being
+    recorded gives what was flushed when its files were opened.
 
     Raises:
         TraceError: not a bag, a bag without a trace or with several executors', or one that cannot be read.
@@ -68,11 +76,7 @@ class _OpenFile:
         self._store: Typestore = get_typestore(Stores.EMPTY)
 
     def __enter__(self) -> Self:
-        try:
-            self._reader.open()
-        except _UNREADABLE as error:
-            msg = f"bag file {self._path}: cannot be read ({error})"
-            raise TraceError(msg) from error
+        self._open()
         types: dict[str, Any] = {}
         for connection in self._reader.connections:
             if connection.msgdef.format == MessageDefinitionFormat.MSG:
@@ -82,6 +86,22 @@ class _OpenFile:
 
     def __exit__(self, *_: object) -> None:
         self._reader.close()
+
+    def _open(self) -> None:
+        """Open; once more while the file grows: its end, where the index lies, moves with every flush."""
+        deadline = time.monotonic() + _PATIENCE_S
+        while True:
+            before = _version(self._path)
+            try:
+                self._reader.open()
+            except _UNREADABLE as error:
+                time.sleep(_LONGER_THAN_A_WRITE_S)
+                if time.monotonic() < deadline and before != _version(self._path):
+                    self._reader = Reader(self._path)
+                    continue
+                msg = f"bag file {self._path}: cannot be read ({error})"
+                raise TraceError(msg) from error
+            return
 
     def topics(self, type_name: str) -> set[str]:
         """Topics of one type."""
@@ -114,6 +134,12 @@ class _OpenFile:
     def decoded(self, connection: Connection, data: bytes) -> Any:
         """Return the message as an object of a class that rosbags made from the bag's definition."""
         return self._store.deserialize_cdr(data, connection.msgtype)
+
+
+def _version(path: Path) -> tuple[int, int]:
+    """Size and time: who finds the same twice has found the same bytes, as flushes make the file longer."""
+    found = path.stat() if path.exists() else None
+    return (found.st_size, found.st_mtime_ns) if found else (0, 0)
 
 
 def _files(path: Path) -> list[Path]:
