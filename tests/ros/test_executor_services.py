@@ -267,6 +267,10 @@ def test_a_stop_that_waits_delays_neither_listing_nor_reception(graph: Any) -> N
     for _ in range(5):
         graph.ask(ListComponents, f"{NODE}/list_components")
     assert not waiting.done(), waiting.result()
-    voice.publish(Float64(data=1.0))  # is received while the stop waits, and ends the execution
-    graph.spin_until(waiting.done, "the stop")
+
+    def told() -> bool:
+        voice.publish(Float64(data=1.0))  # is received while the stop waits, and ends the execution
+        return waiting.done()
+
+    graph.spin_until(told, "the stop")
     assert waiting.result().success, waiting.result().message
