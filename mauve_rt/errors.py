@@ -33,6 +33,16 @@ class ParameterError(MauveError):
         _describe(self, code="invalid_argument", element=element)
 
 
+class TopicError(MauveError):
+    """A topic that a resource cannot be bound to, because of another message type on it."""
+
+    def __init__(self, topic: str, resource: str, *, expected: str, found: str) -> None:
+        what = f"resource '{resource}': topic {topic} carries another type already"
+        remedy = "bind the resource to another topic, or give it that type"
+        super().__init__(f"{what}: expected {expected}, found {found}; {remedy}")
+        _describe(self, code="type_mismatch", element=topic, expected=expected, found=found, remedy=remedy)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Problem:
     """One thing wrong in an architecture file. Lines and columns count from 1."""

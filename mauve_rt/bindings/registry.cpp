@@ -170,6 +170,12 @@ void bind_registry(py::module_& module) {
             return describe_resource(*self.make_resource(kind, type, {.capacity = 1}));
           },
           py::arg("kind"), py::arg("type"))
+      .def(
+          "describe_resource",
+          [](const PluginRegistry& self, const py::object& resource) {
+            return describe_resource(*make_resource(resource, self));
+          },
+          py::arg("resource"))
       .def("core_shell", &PluginRegistry::core_shell, py::arg("name"))
       .def("fsm_shell", &PluginRegistry::fsm_shell, py::arg("name"));
 }

@@ -9,7 +9,8 @@ from mauve_rt.errors import ArchitectureFileError, MauveError
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.checks import Checks
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
-from mauve_rt.model.schema import ComponentModel, ResourceModel
+from mauve_rt.model.resource_parts import resource_part
+from mauve_rt.model.schema import ComponentModel
 from mauve_rt.model.yaml_file import Location
 
 
@@ -30,7 +31,7 @@ def build(
             _add_component(architecture, model, name=name, loader=loader)
     for name, resource in model.resources.items():
         with _errors_at(model, ("resources", name)):
-            architecture.add_resource(name, **_kind_of(resource))
+            architecture.add_resource(name, **resource_part(resource, registry))
             if resource.topic is not None and resource.topic.direction == "publish":
                 architecture.publish(name)
             elif resource.topic is not None:
@@ -83,9 +84,11 @@ def add_component_step(
     )
 
 
-def add_resource_step(transaction: Transaction, model: ArchitectureModel, name: str) -> None:
+def add_resource_step(
+    transaction: Transaction, model: ArchitectureModel, name: str, registry: PluginRegistry
+) -> None:
     """Let a transaction add a resource that `model` describes."""
-    transaction.add_resource(name, **_kind_of(model.resources[name]))
+    transaction.add_resource(name, **resource_part(model.resources[name], registry))
 
 
 def _add_component(
@@ -103,17 +106,6 @@ def _add_component(
     for key, value in model.properties(name).items():
         with _errors_at(model, model.property_place(name, key)):
             architecture.set_property(name, key, value)
-
-
-def _kind_of(resource: ResourceModel) -> dict[str, Any]:
-    """What adding a resource by file and by transaction have in common."""
-    return {
-        "kind": resource.kind,
-        "type": resource.type,
-        "capacity": resource.capacity or 0,
-        "overwrite": resource.overwrite,
-        "max_readers": resource.max_readers,
-    }
 
 
 def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]:

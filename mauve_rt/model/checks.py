@@ -7,6 +7,7 @@ from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Prob
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.message_types import message_class
 from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import GIVEN_RESOURCES, PropertyValue
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.model.yaml_file import Location
@@ -117,7 +118,7 @@ class Checks:
                     return
             if resource.type:
                 self._loader.require_type(resource.type)
-            self._resources[name] = self._loader.registry.describe_resource(resource.kind, resource.type)
+            self._resources[name] = describe_resource(resource, self._loader.registry)
         except MauveError as error:
             what = f"bad type '{resource.type}' of resource '{name}': {error}"
             remedy = (

@@ -9,6 +9,8 @@
                     priority: 40, cpus: [1], offset_ms: 0, overrun: skip, properties: {range: 5.0}}
     resources:
       target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
+      scan: {kind: shared_data, type: sensor_msgs/msg/LaserScan,
+             topic: {name: scan, direction: subscribe, qos: {profile: sensor_data, deadline_ms: 200}}}
     connections:
       - [exploration.goal, goal.write]
 
@@ -27,12 +29,15 @@ from pydantic_core import PydanticCustomError
 
 PropertyValue = bool | int | float | str
 
+QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
 GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event")
 EVENT_TYPE = "std_msgs/msg/UInt64"  # what an event's topic carries: how often it was raised
 MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
 MIN_STACK_BYTES = 16_384
 MAX_CAPACITY = 1_000_000
 DEFAULT_READERS = 14
+DEFAULT_MESSAGE_BYTES = 65_536
+MAX_MESSAGE_BYTES = 2**28
 MAX_READERS = 1000
 MAX_TRACE_RECORDS = 1_048_576
 
@@ -89,12 +94,22 @@ def _plugin_names_or_installed(value: Any) -> Any:
     )
 
 
+def _qos(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value not in QOS_NAMES:
+        text = f"{', '.join(QOS_NAMES)}, or a mapping with profile, reliability, depth, deadline_ms, ..."
+        raise PydanticCustomError("expected", "{text}", {"text": text})
+    return {"profile": value}
+
+
 PluginName = Annotated[str, AfterValidator(_plugin_name)]
 Identifier = Annotated[str, AfterValidator(_identifier)]
 RosName = Annotated[str, AfterValidator(_ros_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Cpu = Annotated[int, Field(ge=0, le=65535)]
 Int64 = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Milliseconds = Annotated[float, Field(ge=0, le=1e9)]
 
 
 class _Section(BaseModel):
@@ -109,12 +124,25 @@ class ExecutorModel(_Section):
     require_realtime: bool = False
 
 
+class QosModel(_Section):
+    """Quality of service: a profile by name, and fields that say otherwise. Durations in ms, 0: none."""
+
+    profile: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = "reliable"
+    reliability: Literal["reliable", "best_effort"] | None = None
+    durability: Literal["volatile", "transient_local"] | None = None
+    depth: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None
+    deadline_ms: Milliseconds = 0
+    lifespan_ms: Milliseconds = 0
+    liveliness: Literal["automatic", "manual_by_topic"] = "automatic"
+    lease_ms: Milliseconds = 0  # a publisher silent for longer counts as gone
+
+
 class TopicModel(_Section):
     """The ROS topic that a resource is bound to; the name is relative to the executor's namespace."""
 
     name: RosName
     direction: Literal["publish", "subscribe"]
-    qos: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = "reliable"
+    qos: Annotated[QosModel, BeforeValidator(_qos)] = QosModel()
 
 
 class ResourceModel(_Section):
@@ -126,6 +154,8 @@ class ResourceModel(_Section):
     overwrite: bool = False  # a full ring_buffer drops its oldest element rather than the new one
     topic: TopicModel | None = None
     max_readers: Annotated[int, Field(ge=1, le=MAX_READERS)] = DEFAULT_READERS  # ports; latest_value only
+    # of one message, where no plug-in registered its type: what is larger is refused and counted
+    max_bytes: Annotated[int, Field(ge=1, le=MAX_MESSAGE_BYTES)] = DEFAULT_MESSAGE_BYTES
 
     @property
     def topic_type(self) -> str:

@@ -7,7 +7,14 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from mauve_rt.errors import Problem
-from mauve_rt.model.schema import ComponentModel, ExecutorModel, FileModel, ResourceModel, TopicModel
+from mauve_rt.model.schema import (
+    ComponentModel,
+    ExecutorModel,
+    FileModel,
+    QosModel,
+    ResourceModel,
+    TopicModel,
+)
 from mauve_rt.model.words import did_you_mean, listed, shown
 from mauve_rt.model.yaml_file import Location, YamlFile
 
@@ -119,6 +126,8 @@ def _section(location: Location) -> type[BaseModel]:
             return ResourceModel
         case ("resources", _, "topic"):
             return TopicModel
+        case ("resources", _, "topic", "qos"):
+            return QosModel
         case _:
             return FileModel
 

@@ -1,22 +1,26 @@
 """What the executor tells of its health: /diagnostics at 1 Hz."""
 
 import resource
+from collections.abc import Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSPolicyKind, QoSProfile
 
+from mauve_rt._bridge import TopicReport
 from mauve_rt._kernel import ComponentDescription, allocation_counting
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_topics import BoundTopics
 
 
 class Diagnostics:
-    """/diagnostics, one status per component and one for the process. On the node's timer only."""
+    """/diagnostics: a status per component, per bound topic, and the process's. On the node's timer only."""
 
-    def __init__(self, node: LifecycleNode, runtime: Runtime) -> None:
+    def __init__(self, node: LifecycleNode, runtime: Runtime, topics: BoundTopics) -> None:
         self._node = node
         self._runtime = runtime
+        self._topics = topics
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -25,6 +29,8 @@ class Diagnostics:
         """Publish once."""
         array = DiagnosticArray(status=[self._component(part) for part in self._runtime.components()])
         array.header.stamp = self._node.get_clock().now().to_msg()
+        others = self._topics.other_types()
+        array.status += [self._topic(report, others.get(report.topic)) for report in self._topics.reports()]
         array.status.append(self._process())
         self._publisher.publish(array)
 
@@ -63,6 +69,34 @@ class Diagnostics:
         if not self._has_python_parts(part):
             counts |= {"allocations": allocations, "page faults": page_faults}
         return [f"{count} {what}" for what, count in counts.items() if count > 0]
+
+    def _topic(self, report: TopicReport, other_types: Sequence[str] | None) -> Any:
+        troubles = report.troubles
+        counts = {
+            "messages refused": report.refused,
+            "deadlines missed": troubles.deadlines_missed,
+            "publishers lost": troubles.liveliness_lost,
+        }
+        remarks = [
+            f"{more} {what} since the last status"
+            for what, count in counts.items()
+            if (more := self._more(f"topic {report.topic}", what, count)) > 0
+        ]
+        if other_types:
+            remarks.append(f"other nodes use {' and '.join(other_types)} on it, with whom it does not talk")
+        if troubles.incompatible_qos:
+            policy = QoSPolicyKind(troubles.policy).name.lower()
+            remarks.append(f"another node's quality of service does not fit, in {policy}: they do not talk")
+        values: dict[str, object] = {
+            "resource": report.resource,
+            "messages": report.passed,
+            "refused": report.refused,
+            "deadlines_missed": troubles.deadlines_missed,
+            "liveliness_lost": troubles.liveliness_lost,
+            "incompatible_qos": troubles.incompatible_qos,
+        }
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        return self._status(f"topic {report.topic}", level, "; ".join(remarks) or "no trouble", values)
 
     def _more(self, component: str, what: str, count: int) -> int:
         """How much it grew since it was told last; a start of the component counts anew."""

@@ -15,7 +15,7 @@ from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_state import StatePublisher
-from mauve_rt.node.executor_topics import TopicBridge
+from mauve_rt.node.executor_topics import BoundTopics
 from mauve_rt.trace import TraceError
 
 NODE_NAME = "executor"
@@ -33,8 +33,9 @@ _PARAMETERS: dict[str, tuple[Any, str]] = {
 class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
-    Requests, lifecycle transitions, listing and received messages have a callback group each, so that a stop
-    that waits for a component delays none of the others (given a thread for each: `THREADS`).
+    Requests, lifecycle transitions, listing and recorded topics have a callback group each, so that a stop
+    that waits for a component delays none of the others (given a thread for each: `THREADS`). Messages of
+    bound topics do not come by here: they have threads of their own, in C++.
     """
 
     THREADS = 4
@@ -51,9 +52,9 @@ class ExecutorNode(LifecycleNode):
         self._runtime = runtime
         self._settings = self._declared()
         self._recording = Recording()
-        self._topics = TopicBridge(self, self._recording)
+        self._topics = BoundTopics(self)
         self._state = StatePublisher(self, runtime, self._recording)
-        self._diagnostics = Diagnostics(self, runtime)
+        self._diagnostics = Diagnostics(self, runtime, self._topics)
         control = Control(runtime, phase_timeout_s=self._settings["report_phase_timeout_s"])
         Services(
             self,
@@ -72,10 +73,11 @@ class ExecutorNode(LifecycleNode):
         """Load and check the file, build the architecture, open topics and bag."""
         try:
             self._runtime.configure()
-            self._topics.open(self._runtime.model, self._data_group)
+            self._topics.open(self._runtime.model, self._runtime.architecture)
             bag = str(self.get_parameter("bag").value)
             if bag:
-                self._recording.start(self, self._runtime.deployer, Path(bag))
+                self._topics.keep_messages()
+                self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._topics)
                 self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
         except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
             self._release()
@@ -90,9 +92,8 @@ class ExecutorNode(LifecycleNode):
             self._runtime.activate()
         except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
             return self._failed(error)
-        deployer = self._runtime.deployer
-        self._topics.start(deployer)
-        self._state.start(deployer)
+        self._topics.start()
+        self._state.start(self._runtime.deployer)
         self._state.refresh()
         return TransitionCallbackReturn.SUCCESS
 

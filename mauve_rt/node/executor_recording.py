@@ -11,8 +11,9 @@ from rclpy.qos import QoSProfile
 from mauve_rt._kernel import Deployer, monotonic_ns
 from mauve_rt.errors import ParameterError
 from mauve_rt.model import message_class
-from mauve_rt.node.qos import QOS_NAMES, qos_profile, recorded_qos
-from mauve_rt.trace.recorder import Recorder
+from mauve_rt.model.schema import QOS_NAMES
+from mauve_rt.node.qos import qos_profile, recorded_qos
+from mauve_rt.trace.recorder import MessageSource, Recorder
 
 _DEPTH = 100  # of the topics recorded beside the executor's own
 
@@ -24,8 +25,10 @@ class Recording:
         self._recorder: Recorder | None = None
         self._subscriptions: list[Any] = []
 
-    def start(self, node: LifecycleNode, deployer: Deployer, directory: Path) -> None:
-        """Create the bag and start to record the trace.
+    def start(
+        self, node: LifecycleNode, deployer: Deployer, directory: Path, *, messages: MessageSource
+    ) -> None:
+        """Create the bag and start to record the trace and the messages of the bound topics.
 
         Raises:
             TraceError: the folder exists already or cannot be written.
@@ -35,6 +38,7 @@ class Recording:
             directory,
             node_name=node.get_fully_qualified_name(),
             on_error=lambda text: node.get_logger().error(text),
+            messages=messages,
         )
         self._recorder.start()
 

@@ -154,6 +154,13 @@ class Runtime:
             raise RuntimeError("not configured")
         return self._deployer
 
+    @property
+    def architecture(self) -> Architecture:
+        """The architecture, between configure() and cleanup()."""
+        if self._architecture is None:
+            raise RuntimeError("not configured")
+        return self._architecture
+
     # ---- what it looks like now
 
     def components(self) -> list[ComponentDescription]:

@@ -162,7 +162,7 @@ class Plan:
         with self._runtime.loading() as loader:
             if problems := Checks(model, loader).problems():
                 raise ArchitectureFileError(model.path, problems)
-        add_resource_step(self.transaction, model, name)
+            add_resource_step(self.transaction, model, name, loader.registry)
         self._resources.add(name)
 
     def _remove_resource(self, step: Step) -> None:

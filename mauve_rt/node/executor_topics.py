@@ -1,118 +1,108 @@
-"""Resources bound to ROS topics, by way of rclpy: what is written is published, what arrives is written."""
+"""Resources bound to ROS topics. The messages go by the native bridge; this opens it and tells of it."""
 
-import threading
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import QoSProfile
 
-from mauve_rt._kernel import Deployer
-from mauve_rt.model import ArchitectureModel, message_class
-from mauve_rt.model.schema import ResourceModel
-from mauve_rt.node.executor_recording import Recording
-from mauve_rt.node.qos import qos_profile
-
-_WAIT_NS = 200_000_000  # how long a publishing thread that should end may go on waiting
+from mauve_rt._bridge import Bridge, TopicReport
+from mauve_rt._kernel import Architecture
+from mauve_rt.errors import MauveError, TopicError
+from mauve_rt.model import ArchitectureModel
+from mauve_rt.model.schema import ResourceModel, TopicModel
+from mauve_rt.node.qos import native_qos, qos_profile, recorded_qos
+from mauve_rt.trace.bag import TopicQos
+from mauve_rt.trace.trace_bag import SentMessage
 
 
 @dataclass(frozen=True)
-class _Outgoing:
-    publisher: Any
+class _Bound:
     topic: str
     type_name: str
-    qos: QoSProfile
+    qos: TopicQos
+
+    def message(self, time_ns: int, data: bytes) -> SentMessage:
+        """A message on it."""
+        return SentMessage(self.topic, self.type_name, data, time_ns, self.qos)
 
 
-class TopicBridge:
-    """Publishers and subscriptions of one architecture, and the thread that publishes.
+class BoundTopics:
+    """Publishers and subscriptions of one architecture, from open() to close()."""
 
-    | member       | written by                        | read by               |
-    | ------------ | --------------------------------- | --------------------- |
-    | `_outgoing`  | open(), close(): no thread runs   | the publishing thread |
-    | `_deployer`  | start(), stop()                   | subscriptions         |
-    | `refused`    | subscriptions, one at a time      | diagnostics           |
-    """
-
-    def __init__(self, node: LifecycleNode, recording: Recording) -> None:
+    def __init__(self, node: LifecycleNode) -> None:
         self._node = node
-        self._recording = recording
-        self._outgoing: dict[str, _Outgoing] = {}
-        self._subscriptions: list[Any] = []
-        self._deployer: Deployer | None = None
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
-        self.refused = 0  # messages that a resource did not take: a full ring_buffer, or malformed
+        self._bridge: Bridge | None = None
+        self._bound: list[_Bound] = []  # by their numbers in the bridge's log
 
-    def open(self, model: ArchitectureModel, group: CallbackGroup) -> None:
-        """Create the publishers and, in `group`, the subscriptions; nothing flows before start()."""
-        for name, resource in model.resources.items():
-            if resource.topic is not None:
-                self._open_one(name, resource, group)
+    def open(self, model: ArchitectureModel, architecture: Architecture) -> None:
+        """Create publishers and subscriptions; nothing flows before start().
 
-    def _open_one(self, name: str, resource: ResourceModel, group: CallbackGroup) -> None:
-        assert resource.topic is not None  # noqa: S101 - open() asks
-        found = message_class(resource.topic_type)
-        qos = qos_profile(resource.topic.qos, capacity=resource.capacity or 0)
-        topic = self._node.resolve_topic_name(resource.topic.name)
-        if resource.topic.direction == "publish":
-            publisher = self._node.create_publisher(found, topic, qos)
-            self._outgoing[name] = _Outgoing(publisher, topic, resource.topic_type, qos)
-        else:
-            receive = self._receiver(name, topic, resource.topic_type, qos)
-            subscription = self._node.create_subscription(
-                found, topic, receive, qos, raw=True, callback_group=group
-            )
-            self._subscriptions.append(subscription)
+        Raises:
+            MauveError: a message type is not installed, or the middleware refuses; nothing is open then.
+        """
+        self._bridge = Bridge(self._node.handle.pointer, architecture.pointer)
+        try:
+            for name, resource in model.resources.items():
+                if resource.topic is not None:
+                    self._open_one(self._bridge, name, resource, resource.topic)
+        except MauveError:
+            self.close()
+            raise
 
-    def start(self, deployer: Deployer) -> None:
+    def _open_one(self, bridge: Bridge, name: str, resource: ResourceModel, topic: TopicModel) -> None:
+        full_name = self._node.resolve_topic_name(topic.name)
+        known = dict(self._node.get_topic_names_and_types()).get(full_name, ())
+        if others := _others(known, resource.topic_type):
+            raise TopicError(full_name, name, expected=resource.topic_type, found=" and ".join(others))
+        qos = qos_profile(topic.qos, capacity=resource.capacity or 0)
+        bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
+        number = bind(name, topic.name, resource.topic_type, native_qos(qos))
+        assert number == len(self._bound)  # noqa: S101 - the bridge counts from 0
+        self._bound.append(_Bound(full_name, resource.topic_type, recorded_qos(qos)))
+
+    def start(self) -> None:
         """Let messages flow, both ways."""
-        self._deployer = deployer
-        self._ending.clear()
-        if self._outgoing:
-            self._thread = threading.Thread(
-                target=self._publish, args=(deployer,), name="topics", daemon=True
-            )
-            self._thread.start()
+        if self._bridge is not None:
+            self._bridge.start()
 
     def stop(self) -> None:
-        """End the flow; returns when the publishing thread, having sent what was written, is gone."""
-        self._deployer = None
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        """End the flow; returns when what was written before is sent. May be called again."""
+        if self._bridge is not None:
+            self._bridge.stop()
 
     def close(self) -> None:
-        """Destroy publishers and subscriptions."""
-        for outgoing in self._outgoing.values():
-            self._node.destroy_publisher(outgoing.publisher)
-        for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
-        self._outgoing.clear()
-        self._subscriptions.clear()
+        """Destroy publishers and subscriptions. May be called again."""
+        bridge, self._bridge = self._bridge, None
+        if bridge is not None:
+            bridge.close()
+        self._bound.clear()
 
-    def _publish(self, deployer: Deployer) -> None:
-        ending = False
-        while not ending:
-            ending = self._ending.is_set()  # one more round then: outputs written at the stop are sent too
-            for resource, data, _ in deployer.wait_published(0 if ending else _WAIT_NS):
-                outgoing = self._outgoing.get(resource)
-                if outgoing is not None:
-                    outgoing.publisher.publish(data)
-                    self._recording.record(outgoing.topic, outgoing.type_name, data, qos=outgoing.qos)
+    def reports(self) -> list[TopicReport]:
+        """How each bound topic fares."""
+        return self._bridge.reports() if self._bridge is not None else []
 
-    def _receiver(
-        self, resource: str, topic: str, type_name: str, qos: QoSProfile
-    ) -> Callable[[bytes], None]:
-        def receive(data: bytes) -> None:
-            deployer = self._deployer
-            if deployer is None:
-                return
-            if not deployer.write_resource(resource, data):
-                self.refused += 1
-            self._recording.record(topic, type_name, data, qos=qos)
+    def other_types(self) -> dict[str, list[str]]:
+        """Types that other nodes use on the bound topics: by the graph, as the middleware need not tell."""
+        known = dict(self._node.get_topic_names_and_types())
+        found = {bound.topic: _others(known.get(bound.topic, ()), bound.type_name) for bound in self._bound}
+        return {topic: others for topic, others in found.items() if others}
 
-        return receive
+    # ---- as a MessageSource of the recorder, which is stopped before close()
+
+    def keep_messages(self) -> None:
+        """Keep every message from now on until take_messages()."""
+        if self._bridge is not None:
+            self._bridge.log(on=True)
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        """What was sent or received since the last call."""
+        taken = self._bridge.take_log() if self._bridge is not None else []
+        return [self._bound[number].message(time_ns, data) for number, time_ns, data in taken]
+
+    def dropped_messages(self) -> int:
+        """Messages that found no room to wait."""
+        return self._bridge.log_dropped if self._bridge is not None else 0
+
+
+def _others(types: Sequence[str], type_name: str) -> list[str]:
+    return [name for name in types if name != type_name]

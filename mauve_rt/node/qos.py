@@ -1,25 +1,54 @@
 """Quality of service by the names that architecture files and parameters use."""
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
+from mauve_rt._bridge import Qos
+from mauve_rt.model.schema import QosModel
 from mauve_rt.trace.bag import TopicQos
 
-QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
+_PROFILES = {
+    "reliable": QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
+    "best_effort": QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
+    "sensor_data": QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT),
+    "transient_local": QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    ),
+}
 
 
-def qos_profile(name: str, *, capacity: int = 0) -> QoSProfile:
-    """The profile that an architecture file names; `capacity` is that of the ring_buffer behind it."""
-    reliable, best_effort = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
-    match name:
-        case "best_effort":
-            return QoSProfile(depth=max(10, capacity), reliability=best_effort)
-        case "sensor_data":
-            return QoSProfile(depth=max(5, capacity), reliability=best_effort)
-        case "transient_local":
-            latched = DurabilityPolicy.TRANSIENT_LOCAL
-            return QoSProfile(depth=max(1, capacity), reliability=reliable, durability=latched)
-        case _:
-            return QoSProfile(depth=max(10, capacity), reliability=reliable)
+def qos_profile(asked: str | QosModel, *, capacity: int = 0) -> QoSProfile:
+    """The profile that an architecture file asks for; `capacity` is that of the ring_buffer behind it."""
+    fields = QosModel.model_validate({"profile": asked}) if isinstance(asked, str) else asked
+    profile = _PROFILES[fields.profile]
+    reliability = ReliabilityPolicy[(fields.reliability or profile.reliability.name).upper()]
+    durability = DurabilityPolicy[(fields.durability or profile.durability.name).upper()]
+    return QoSProfile(
+        depth=fields.depth or max(profile.depth, capacity),
+        reliability=reliability,
+        durability=durability,
+        deadline=_duration(fields.deadline_ms),
+        lifespan=_duration(fields.lifespan_ms),
+        liveliness=LivelinessPolicy[fields.liveliness.upper()],
+        liveliness_lease_duration=_duration(fields.lease_ms),
+    )
+
+
+def _duration(ms: float) -> Duration:
+    return Duration(nanoseconds=round(ms * 1e6))
+
+
+def native_qos(qos: QoSProfile) -> Qos:
+    """A profile as the bridge takes it."""
+    return Qos(
+        reliability=int(qos.reliability),
+        durability=int(qos.durability),
+        depth=qos.depth,
+        deadline_ns=qos.deadline.nanoseconds,
+        lifespan_ns=qos.lifespan.nanoseconds,
+        liveliness=int(qos.liveliness),
+        lease_ns=qos.liveliness_lease_duration.nanoseconds,
+    )
 
 
 def recorded_qos(qos: QoSProfile) -> TopicQos:

@@ -11,12 +11,13 @@ from mauve_rt.trace.trace_bag import (
     DROPPED_MESSAGES,
     NAMES,
     Drain,
+    MessageSource,
     SentMessage,
     TraceBag,
     TraceSource,
 )
 
-__all__ = ["BATCHES", "DROPPED_MESSAGES", "NAMES", "Drain", "Recorder", "TraceSource"]
+__all__ = ["BATCHES", "DROPPED_MESSAGES", "NAMES", "Drain", "MessageSource", "Recorder", "TraceSource"]
 
 
 _JOIN_TIMEOUT_S = 2.0
@@ -47,6 +48,7 @@ class Recorder:
         drain_period_s: float = 0.04,
         queue_bytes: int = 64 * 1024 * 1024,
         on_error: Callable[[str], None] | None = None,
+        messages: MessageSource | None = None,
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -58,6 +60,7 @@ class Recorder:
             drain_period_s: the rings (4,096 records each) must not fill up within it.
             queue_bytes: messages that may wait for a flush; what exceeds it is dropped and counted.
             on_error: called at most once for each cause, with one line, on the recorder thread.
+            messages: asked, on the recorder thread, for messages beside those given to record().
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -67,6 +70,7 @@ class Recorder:
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
+        self._messages = messages
         self._bag = TraceBag(source, directory, node_name=node_name, on_error=self._report)
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
@@ -89,9 +93,10 @@ class Recorder:
 
     @property
     def dropped_messages(self) -> int:
-        """Messages given to record() that did not get into the bag."""
+        """Messages that were to be recorded and did not get into the bag."""
+        elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
         with self._lock:
-            return self._dropped
+            return self._dropped + elsewhere
 
     def start(self) -> None:
         """Start the thread. Once only."""
@@ -154,11 +159,12 @@ class Recorder:
     def _drain(self, *, whole: bool) -> None:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
+        if self._messages is not None:
+            waiting += self._messages.take_messages()
         refused = self._bag.write(waiting, whole=whole)
         with self._lock:
             self._dropped += refused
-            dropped = self._dropped
-        self._bag.tell_dropped(dropped)
+        self._bag.tell_dropped(self.dropped_messages)
 
     def _report(self, text: str) -> None:
         if self._on_error is not None:

@@ -64,6 +64,16 @@ class SentMessage(NamedTuple):
     qos: TopicQos | None
 
 
+class MessageSource(Protocol):
+    """Messages kept elsewhere until the recorder takes them."""
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        """What was sent or received since the last call."""
+
+    def dropped_messages(self) -> int:
+        """Messages that found no room to wait, ever."""
+
+
 class TraceBag:
     """Writes what a trace source yields, and messages on the same time base.
 

@@ -103,9 +103,9 @@ class Graph:
         events.clear()
         return events
 
-    def voice(self, message_type: Any, topic: str) -> Any:
+    def voice(self, message_type: Any, topic: str, qos: QoSProfile | int = 10) -> Any:
         """A publisher that already has a subscriber."""
-        publisher = self.node.create_publisher(message_type, topic, 10)
+        publisher = self.node.create_publisher(message_type, topic, qos)
         self.spin_until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
         return publisher
 

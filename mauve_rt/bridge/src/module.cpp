@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// mauve_rt._bridge; its interface with docs is _bridge.pyi.
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <bit>
+
+#include "bridge.hpp"
+
+namespace py = pybind11;
+
+namespace {
+
+using namespace mauve;
+using namespace mauve::bridge;
+
+rmw_time_t duration(time_ns_t time_ns) {
+  return {.sec = static_cast<std::uint64_t>(time_ns / s_to_ns(1)),
+          .nsec = static_cast<std::uint64_t>(time_ns % s_to_ns(1))};
+}
+
+rmw_qos_profile_t make_qos(int reliability, int durability, std::size_t depth, time_ns_t deadline_ns,
+                           time_ns_t lifespan_ns, int liveliness, time_ns_t lease_ns) {
+  rmw_qos_profile_t qos{};
+  qos.history = RMW_QOS_POLICY_HISTORY_KEEP_LAST;
+  qos.depth = depth;
+  qos.reliability = static_cast<rmw_qos_reliability_policy_t>(reliability);
+  qos.durability = static_cast<rmw_qos_durability_policy_t>(durability);
+  qos.deadline = duration(deadline_ns);
+  qos.lifespan = duration(lifespan_ns);
+  qos.liveliness = static_cast<rmw_qos_liveliness_policy_t>(liveliness);
+  qos.liveliness_lease_duration = duration(lease_ns);
+  return qos;
+}
+
+py::list take_log(Bridge& self) {
+  py::list all;
+  for (const LoggedMessage& message : self.log().take()) {
+    const py::bytes data(reinterpret_cast<const char*>(message.data.data()), message.data.size());
+    all.append(py::make_tuple(message.topic, message.time_ns, data));
+  }
+  return all;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_bridge, module) {
+  module.doc() = "Resources on ROS topics, natively, on a node of rclpy's.";
+  // What the threads wait for may want the interpreter's lock: never wait for them under it.
+  using Unlocked = py::call_guard<py::gil_scoped_release>;
+  py::class_<rmw_qos_profile_t>(module, "Qos")
+      .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
+           py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,
+           py::arg("liveliness") = 0, py::arg("lease_ns") = 0);
+  py::class_<TopicTroubles>(module, "TopicTroubles")
+      .def_readonly("deadlines_missed", &TopicTroubles::deadlines_missed)
+      .def_readonly("liveliness_lost", &TopicTroubles::liveliness_lost)
+      .def_readonly("incompatible_qos", &TopicTroubles::incompatible_qos)
+      .def_readonly("policy", &TopicTroubles::policy);
+  py::class_<TopicReport>(module, "TopicReport")
+      .def_readonly("resource", &TopicReport::resource)
+      .def_readonly("topic", &TopicReport::topic)
+      .def_property_readonly("passed", [](const TopicReport& self) { return self.counts.passed; })
+      .def_property_readonly("refused", [](const TopicReport& self) { return self.counts.refused; })
+      .def_property_readonly("troubles", [](const TopicReport& self) { return self.troubles; });
+  py::class_<Bridge>(module, "Bridge")
+      .def(py::init([](std::uintptr_t node, std::uintptr_t architecture) {
+             return std::make_unique<Bridge>(*std::bit_cast<rcl_node_t*>(node),
+                                             *std::bit_cast<Architecture*>(architecture));
+           }),
+           py::arg("node"), py::arg("architecture"))
+      .def("publish", &Bridge::publish, py::arg("resource"), py::arg("topic"), py::arg("type"),
+           py::arg("qos"))
+      .def("subscribe", &Bridge::subscribe, py::arg("resource"), py::arg("topic"), py::arg("type"),
+           py::arg("qos"), Unlocked())
+      .def("start", &Bridge::start)
+      .def("stop", &Bridge::stop, Unlocked())
+      .def("close", &Bridge::close, Unlocked())
+      .def("reports", &Bridge::reports, Unlocked())
+      .def(
+          "log", [](Bridge& self, bool on) { self.log().enable(on); }, py::arg("on"))
+      .def("take_log", &take_log)
+      .def_property_readonly("log_dropped", [](Bridge& self) { return self.log().dropped(); });
+}

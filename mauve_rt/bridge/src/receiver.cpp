@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "receiver.hpp"
+
+#include <rcl/error_handling.h>
+
+#include "rcl_error.hpp"
+#include "thread.hpp"
+
+namespace mauve::bridge {
+
+Receiver::Receiver(const rcl_node_t& node, const char* name) : context_(*node.context), name_(name) {
+  check(rcl_guard_condition_init(&wake_, &context_, rcl_guard_condition_get_default_options()),
+        "the bridge cannot receive", "guard condition");
+}
+
+Receiver::~Receiver() {
+  stop();
+  if (rcl_guard_condition_fini(&wake_) != RCL_RET_OK) rcl_reset_error();
+}
+
+void Receiver::start(std::vector<Arrival*> arrivals) {
+  arrivals_ = std::move(arrivals);
+  ending_.store(false, std::memory_order_release);
+  if (!arrivals_.empty()) thread_ = start_thread(name_, [this] { run(); });
+}
+
+void Receiver::stop() {
+  if (!thread_.joinable()) return;
+  ending_.store(true, std::memory_order_release);
+  if (rcl_trigger_guard_condition(&wake_) != RCL_RET_OK) rcl_reset_error();
+  thread_.join();
+}
+
+void Receiver::run() {
+  rcl_wait_set_t set = rcl_get_zero_initialized_wait_set();
+  const std::size_t count = arrivals_.size();  // room for as many of each kind
+  if (rcl_wait_set_init(&set, count, 1, 0, count, count, count, &context_, rcl_get_default_allocator()) !=
+      RCL_RET_OK) {
+    rcl_reset_error();
+    return;
+  }
+  while (!ending_.load(std::memory_order_acquire) && wait(set)) {
+    for (Arrival* arrival : arrivals_) {
+      if (arrival->has_arrived(set)) arrival->take();
+    }
+  }
+  if (rcl_wait_set_fini(&set) != RCL_RET_OK) rcl_reset_error();
+}
+
+bool Receiver::wait(rcl_wait_set_t& set) {
+  if (rcl_wait_set_clear(&set) != RCL_RET_OK) return false;
+  if (rcl_wait_set_add_guard_condition(&set, &wake_, nullptr) != RCL_RET_OK) return false;
+  for (Arrival* arrival : arrivals_) arrival->join(set);
+  const rcl_ret_t outcome = rcl_wait(&set, -1);
+  if (outcome != RCL_RET_OK) rcl_reset_error();
+  return outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT;  // else the context was shut down
+}
+
+}  // namespace mauve::bridge

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Type supports of installed interface packages, found by name as rclcpp's generic publishers find them.
+#pragma once
+
+#include <rosidl_runtime_c/message_type_support_struct.h>
+
+#include <string>
+
+namespace mauve::bridge {
+
+/// The type support of `package/msg/Type`; its library stays loaded. [non-rt]
+/// Throws Error (unknown_type) naming what is not installed.
+const rosidl_message_type_support_t& message_type_support(const std::string& type);
+
+}  // namespace mauve::bridge
