@@ -1,7 +1,6 @@
 """Reads a recorded trace back by rosbags and the definitions stored in the bag; needs no message package."""
 
 import struct
-import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from heapq import merge
@@ -28,15 +27,12 @@ _UNREADABLE = (
 )  # fmt: skip
 """What rosbags raises for damaged files."""
 
-_LONGER_THAN_A_WRITE_S = 0.02
-_PATIENCE_S = 10.0  # with a file that always changes
-
 
 def read_bag(path: str | Path) -> Trace:
     """Read the trace in a bag: a rosbag2 folder with MCAP files, or one such file.
 
-    metadata.yaml is not consulted: the files tell the same, and are never older. A bag that is being
-    recorded gives what was flushed when its files were opened.
+    metadata.yaml is not consulted: the files tell the same, and are never older. The bag of a running
+    recorder is whole between two flushes; who meets one finds it damaged, and may try again.
 
     Raises:
         TraceError: not a bag, a bag without a trace or with several executors', or one that cannot be read.
@@ -76,7 +72,11 @@ class _OpenFile:
         self._store: Typestore = get_typestore(Stores.EMPTY)
 
     def __enter__(self) -> Self:
-        self._open()
+        try:
+            self._reader.open()
+        except _UNREADABLE as error:
+            msg = f"bag file {self._path}: cannot be read ({error})"
+            raise TraceError(msg) from error
         types: dict[str, Any] = {}
         for connection in self._reader.connections:
             if connection.msgdef.format == MessageDefinitionFormat.MSG:
@@ -86,22 +86,6 @@ class _OpenFile:
 
     def __exit__(self, *_: object) -> None:
         self._reader.close()
-
-    def _open(self) -> None:
-        """Open; once more while the file grows: its end, where the index lies, moves with every flush."""
-        deadline = time.monotonic() + _PATIENCE_S
-        while True:
-            before = _version(self._path)
-            try:
-                self._reader.open()
-            except _UNREADABLE as error:
-                time.sleep(_LONGER_THAN_A_WRITE_S)
-                if time.monotonic() < deadline and before != _version(self._path):
-                    self._reader = Reader(self._path)
-                    continue
-                msg = f"bag file {self._path}: cannot be read ({error})"
-                raise TraceError(msg) from error
-            return
 
     def topics(self, type_name: str) -> set[str]:
         """Topics of one type."""
@@ -134,12 +118,6 @@ class _OpenFile:
     def decoded(self, connection: Connection, data: bytes) -> Any:
         """Return the message as an object of a class that rosbags made from the bag's definition."""
         return self._store.deserialize_cdr(data, connection.msgtype)
-
-
-def _version(path: Path) -> tuple[int, int]:
-    """Size and time: who finds the same twice has found the same bytes, as flushes make the file longer."""
-    found = path.stat() if path.exists() else None
-    return (found.st_size, found.st_mtime_ns) if found else (0, 0)
 
 
 def _files(path: Path) -> list[Path]:

@@ -1,8 +1,6 @@
 """Reading a bag back: what is in it, what is missing from it, and what is not a bag with a trace."""
 
 import shutil
-import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -38,34 +36,6 @@ def test_a_bag_moved_elsewhere_needs_nothing_installed(tmp_path: Path, monkeypat
     monkeypatch.setenv("AMENT_PREFIX_PATH", "")
     (row,) = read_bag(shutil.move(tmp_path / "bag", tmp_path / "else")).of("a", Kind.MARK)
     assert [int(row[key]) for key in ("time_ns", "a", "b", "c")] == [7, 1, -2, 3]
-
-
-def test_a_bag_is_read_while_it_is_written(tmp_path: Path):
-    source = SyntheticSource(["a"])
-    recorder = Recorder(source, tmp_path / "bag", node_name="/robot/executor", flush_period_s=0.0005)
-    recorder.start()
-    ending = threading.Event()
-
-    def write() -> None:
-        number = 0
-        while not ending.is_set():
-            source.add("a", Kind.MARK, number, a=number)
-            number += 1
-            time.sleep(0)
-
-    writer = threading.Thread(target=write)
-    writer.start()
-    try:
-        known = 0
-        for _ in range(100):
-            rows = read_bag(tmp_path / "bag").of("a", Kind.MARK)
-            assert len(rows) >= known
-            assert list(rows["a"]) == list(range(len(rows)))
-            known = len(rows)
-    finally:
-        ending.set()
-        writer.join()
-        recorder.stop()
 
 
 def test_deployments_tell_the_grid_in_force(tmp_path: Path):
