@@ -93,10 +93,9 @@ void bind_architecture(py::module_& module) {
             self.architecture.component(component).set_property(name, value);
           },
           py::arg("component"), py::arg("name"), py::arg("value"), Unlocked())
-      .def_property_readonly("pointer",
-                             [](PyArchitecture& self) {
-                               return reinterpret_cast<std::uintptr_t>(&self.architecture);
-                             })
+      .def_property_readonly(
+          "pointer",
+          [](PyArchitecture& self) { return reinterpret_cast<std::uintptr_t>(&self.architecture); })
       .def(
           "publish",
           [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },

@@ -8,7 +8,14 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.schema import GIVEN_RESOURCES, ComponentModel, FileModel, PropertyValue, ResourceModel
+from mauve_rt.model.schema import (
+    EVENT_TYPES,
+    GIVEN_RESOURCES,
+    ComponentModel,
+    FileModel,
+    PropertyValue,
+    ResourceModel,
+)
 from mauve_rt.model.schema_errors import owner, schema_problems
 from mauve_rt.model.substitution import substituted_property
 from mauve_rt.model.words import did_you_mean
@@ -182,9 +189,10 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
         if resource.kind == "ring_buffer" and resource.capacity is None:
             what = f"resource '{name}' has no capacity"
             yield model.problem(location, what, expected="capacity: how many elements the ring_buffer holds")
-        if resource.kind == "event" and resource.type:
-            what, remedy = f"resource '{name}' of kind event has no type", "leave it out"
-            yield model.key_problem((*location, "type"), what, remedy=remedy)
+        if resource.kind == "event" and resource.type not in ("", *EVENT_TYPES):
+            what = f"resource '{name}' of kind event cannot be said by that message"
+            expected = f"{', '.join(EVENT_TYPES)}, or none, which is the last"
+            yield model.problem((*location, "type"), what, expected=expected, found=resource.type)
         if resource.kind in GIVEN_RESOURCES and resource.kind != "event" and not resource.type:
             yield model.problem(
                 location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point"

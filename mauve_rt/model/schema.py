@@ -31,7 +31,8 @@ PropertyValue = bool | int | float | str
 
 QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
 GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event")
-EVENT_TYPE = "std_msgs/msg/UInt64"  # what an event's topic carries: how often it was raised
+# What an event's topic carries: a message a raise, true a raise, or how often it was raised (the default).
+EVENT_TYPES = ("std_msgs/msg/Empty", "std_msgs/msg/Bool", "std_msgs/msg/UInt64")
 MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
 MIN_STACK_BYTES = 16_384
 MAX_CAPACITY = 1_000_000
@@ -160,7 +161,7 @@ class ResourceModel(_Section):
     @property
     def topic_type(self) -> str:
         """The message type of its topic."""
-        return EVENT_TYPE if self.kind == "event" else self.type
+        return self.type or (EVENT_TYPES[-1] if self.kind == "event" else "")
 
 
 class ComponentModel(_Section):

@@ -42,6 +42,45 @@ TEST_F(EventsFixture, RaisesAreCountedWithTheTimeOfTheLast) {
   EXPECT_EQ(2U, count.read().value.data);
 }
 
+TEST(EventMessages, EmptySaysEveryRaiseAndEveryMessageRaises) {
+  EventCounter event(EventMessage::empty);
+  EXPECT_EQ("std_msgs/msg/Empty", event.type());
+  std::vector<std::byte> message;
+  time_ns_t time_ns = 0;
+  std::uint64_t seen = 0;
+  EXPECT_FALSE(event.next_sample(message, time_ns, seen));
+  event.raise.raise(10);
+  event.raise.raise(20);
+  ASSERT_TRUE(event.next_sample(message, time_ns, seen));
+  ASSERT_TRUE(event.next_sample(message, time_ns, seen));
+  EXPECT_FALSE(event.next_sample(message, time_ns, seen));
+  EXPECT_TRUE(event.write_sample(message, 30));
+  EXPECT_TRUE(event.write_sample(kCdrHeader, 30));  // some send no byte for a message without members
+  EXPECT_FALSE(event.write_sample({}, 30));
+  ASSERT_TRUE(event.next_sample(message, time_ns, seen));
+  ASSERT_TRUE(event.next_sample(message, time_ns, seen));
+  EXPECT_FALSE(event.next_sample(message, time_ns, seen));
+}
+
+TEST(EventMessages, BoolSaysTrueAndAFalseOneRaisesNothing) {
+  EventCounter event(EventMessage::truth);
+  EXPECT_EQ("std_msgs/msg/Bool", event.type());
+  std::vector<std::byte> message;
+  CdrWriter(message).put(std::uint8_t{0});
+  EXPECT_TRUE(event.write_sample(message, 10));
+  time_ns_t time_ns = 0;
+  std::uint64_t seen = 0;
+  EXPECT_FALSE(event.next_sample(message, time_ns, seen));
+  event.raise.raise(20);
+  ASSERT_TRUE(event.next_sample(message, time_ns, seen));
+  std::uint8_t truth = 0;
+  EXPECT_TRUE(CdrReader(message).get(truth));
+  EXPECT_EQ(1, truth);
+  EXPECT_TRUE(event.write_sample(message, 30));
+  EXPECT_TRUE(event.next_sample(message, time_ns, seen));
+  EXPECT_FALSE(event.write_sample(kCdrHeader, 30));
+}
+
 TEST_F(EventsFixture, ATopicCarriesTheCountAndAMessageRaises) {
   port.connect(event.raise, "event");
   std::vector<std::byte> message;

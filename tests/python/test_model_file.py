@@ -292,9 +292,9 @@ BAD = {
     ),
     "type of an event": (
         "queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",
-        "queue: {kind: event, type: std_msgs/msg/UInt64}",
-        "type: std_msgs/msg/UInt64",
-        "resource 'queue' of kind event has no type; leave it out",
+        "queue: {kind: event, type: std_msgs/msg/Int32}",
+        "std_msgs/msg/Int32",
+        "resource 'queue' of kind event cannot be said by that message: expected std_msgs/msg/Empty",
     ),
     "unknown type": (
         "Float64, capacity",

@@ -22,7 +22,7 @@ from rclpy.qos import (
 )
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Bool, Empty, Float64, String
 
 from mauve_rt._bridge import TopicReport
 from mauve_rt.errors import MauveError
@@ -54,6 +54,10 @@ class Bound:
     def received(self, resource: str, message_type: Any) -> Any:
         """What a resource holds."""
         return deserialize_message(self.runtime.deployer.read_resource(resource)[0], message_type)
+
+    def raised(self, resource: str) -> int:
+        """How often an event was raised."""
+        return self.runtime.deployer.read_resource(resource)[1]
 
     def write(self, resource: str, message: Any) -> bool:
         """Write a message to a resource, as a component would."""
@@ -154,6 +158,37 @@ def test_a_message_that_is_too_large_is_refused_and_counted(bind: Bind, graph: A
     told("short", lambda: bound.report("/robot/word").passed)
     told("x" * 100_000, lambda: bound.report("/robot/word").refused)
     assert bound.received("word", String).data == "short"
+
+
+def test_an_event_is_an_empty_message_or_a_true_one(bind: Bind, graph: Any) -> None:
+    bound = bind("""\
+  bump: {kind: event, type: std_msgs/msg/Empty, topic: {name: bump, direction: publish}}
+  alarm: {kind: event, type: std_msgs/msg/Bool, topic: {name: alarm, direction: subscribe}}
+""")
+    bumps = graph.hear(Empty, "/robot/bump")
+    alarms = graph.voice(Bool, "/robot/alarm")
+
+    def matched() -> bool:
+        bound.write("bump", Empty())
+        return bool(bumps)
+
+    graph.spin_until(matched, "a first bump")
+    raised = 1
+    while raised < 20:
+        raised += bound.write("bump", Empty())
+    graph.spin_until(lambda: len(bumps) >= 20, "a message a raise")
+
+    def told(*, data: bool, passed: int) -> None:
+        def is_told() -> bool:
+            alarms.publish(Bool(data=data))
+            return bound.report("/robot/alarm").passed >= passed
+
+        graph.spin_until(is_told, "the alarm")
+
+    told(data=False, passed=3)
+    assert bound.raised("alarm") == 0
+    told(data=True, passed=bound.report("/robot/alarm").passed + 20)
+    assert bound.raised("alarm") > 0
 
 
 def test_qualities_of_service_by_field_are_those_of_the_topic(bind: Bind, graph: Any) -> None:

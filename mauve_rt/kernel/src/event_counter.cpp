@@ -5,7 +5,27 @@
 
 namespace mauve {
 
-EventCounter::EventCounter() : Resource("event", type_name<EventCount>()) {
+namespace {
+
+const char* type_of(EventMessage said) {
+  switch (said) {
+    case EventMessage::empty:
+      return "std_msgs/msg/Empty";
+    case EventMessage::truth:
+      return "std_msgs/msg/Bool";
+    default:
+      return "std_msgs/msg/UInt64";
+  }
+}
+
+/// Empty has a byte too, as no message may be without a member.
+void put_signal(std::vector<std::byte>& message, EventMessage said) {
+  CdrWriter(message).put(std::uint8_t{said == EventMessage::truth});
+}
+
+}  // namespace
+
+EventCounter::EventCounter(EventMessage said) : Resource("event", type_of(said)), said_(said) {
   offer(read);
   offer(raise);
 }
@@ -36,8 +56,13 @@ bool EventCounter::next_sample(std::vector<std::byte>& message, time_ns_t& time_
   EventCount count;
   ReaderState reader{.seen = seen};
   if (read.read(count, time_ns, reader) != DataStatus::new_data) return false;
-  seen = reader.seen;
-  CdrWriter(message).put(count);
+  if (said_ == EventMessage::count) {
+    seen = count.data;
+    CdrWriter(message).put(count);
+  } else {
+    ++seen;
+    put_signal(message, said_);
+  }
   return true;
 }
 
@@ -46,13 +71,29 @@ bool EventCounter::peek_sample(std::vector<std::byte>& message, time_ns_t& time_
   ReaderState reader;
   const DataStatus status = read.read(count, time_ns, reader);
   sequence = reader.seen;
-  CdrWriter(message).put(count);
+  if (said_ == EventMessage::count)
+    CdrWriter(message).put(count);
+  else
+    put_signal(message, said_);
   return status != DataStatus::none;
 }
 
 bool EventCounter::write_sample(std::span<const std::byte> message, time_ns_t time_ns) {
+  CdrReader reader(message);
   EventCount ignored;
-  if (!CdrReader(message).get(ignored)) return false;
+  std::uint8_t truth{};
+  switch (said_) {
+    case EventMessage::count:
+      if (!reader.get(ignored)) return false;
+      break;
+    case EventMessage::truth:
+      if (!reader.get(truth)) return false;
+      if (truth == 0) return true;
+      break;
+    case EventMessage::empty:  // with its byte or without
+      if (message.size() < kCdrHeader.size()) return false;
+      break;
+  }
   raise.raise(time_ns);
   return true;
 }

@@ -34,7 +34,14 @@ void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry
 }  // namespace
 
 PluginRegistry::PluginRegistry() {
-  add_resource("event", "", [](const ResourceParameters&) { return std::make_unique<EventCounter>(); });
+  const auto add_event = [this](const std::string& type, EventMessage said) {
+    add_resource("event", type,
+                 [said](const ResourceParameters&) { return std::make_unique<EventCounter>(said); });
+  };
+  add_event("", EventMessage::count);
+  add_event("std_msgs/msg/UInt64", EventMessage::count);
+  add_event("std_msgs/msg/Empty", EventMessage::empty);
+  add_event("std_msgs/msg/Bool", EventMessage::truth);
   ports_.emplace(type_name<EventCount>(), data_ports<EventCount>());
 }
 
@@ -92,8 +99,11 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
   if (const auto found = resources_.find({kind, type}); found != resources_.end())
     return found->second(parameters);
   if (kind == "event") {
-    throw Error(ErrorCode::invalid_argument, "an event resource has no type",
-                {.element = "type", .expected = "none", .found = type, .remedy = "leave the type out"});
+    throw Error(
+        ErrorCode::invalid_argument, "an event cannot be said by that message",
+        {.element = "type",
+         .expected = "std_msgs/msg/Empty, std_msgs/msg/Bool, std_msgs/msg/UInt64, or none, which is the last",
+         .found = type});
   }
   if (kind == "latest_value" && resources_.contains({"shared_data", type})) {
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",

@@ -21,6 +21,13 @@ MAUVE_TYPE(mauve::EventCount, "std_msgs/msg/UInt64", data)
 
 namespace mauve {
 
+/// What an event says on its topic.
+enum class EventMessage : std::uint8_t {
+  count,  // std_msgs/msg/UInt64: how often it was raised; says it once for several raises at a time
+  empty,  // std_msgs/msg/Empty, for every raise
+  truth,  // std_msgs/msg/Bool, true for every raise; a false one that arrives raises nothing
+};
+
 /// Services `raise` (event) and `read` (the count, with the time of the last raise), any number of each.
 /// Raises between two reads are not lost: the count says how many there were.
 ///
@@ -29,14 +36,14 @@ namespace mauve {
 /// | count_, time_ns_  | raise service | mutex_ | yes |
 class EventCounter final : public Resource {
  public:
-  EventCounter();
+  explicit EventCounter(EventMessage said = EventMessage::count);
   void set_name(const std::string& name) override;
 
   bool is_serializable() const noexcept override { return true; }
-  /// The count as std_msgs/msg/UInt64, if it grew. [non-rt]
+  /// What is said of raises not told of yet. [non-rt]
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override;
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override;
-  /// A message that arrives raises the event once, whatever number it carries; false when malformed. [non-rt]
+  /// A message that arrives raises the event once, whatever count it carries; false when malformed. [non-rt]
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override;
 
  private:
@@ -57,6 +64,7 @@ class EventCounter final : public Resource {
     EventCounter& owner_;
   };
 
+  EventMessage said_;
   PiMutex mutex_;
   EventCount count_;
   time_ns_t time_ns_{0};
