@@ -60,8 +60,9 @@ class Recording:
             full_name = node.resolve_topic_name(name)
             profile = qos_profile(qos, capacity=_DEPTH)
             receive = self._callback(full_name, type_name, profile)
+            # Not by its full name: resolved twice, it might be another.
             subscription = node.create_subscription(
-                found, full_name, receive, profile, raw=True, callback_group=group
+                found, name, receive, profile, raw=True, callback_group=group
             )
             self._subscriptions.append(subscription)
 

@@ -9,6 +9,11 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from mauve_rt.errors import ParameterError
+
+_REMAP, _PARAMETER = ("-r", "--remap"), ("-p", "--param")
+_NAME = r"[A-Za-z_]\w*"
+
 
 @dataclass(frozen=True, kw_only=True)
 class RosArguments:
@@ -19,26 +24,41 @@ class RosArguments:
 
 
 def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
-    """Parameters (`-p`, `--params-file`) and remappings that apply to the node named `node`.
+    """Parameters (`-p`, `--params-file`) and remappings that apply to the node named `node` unless remapped.
 
-    What rcl would refuse is left out: rcl says so itself when the node is made.
+    What else rcl would refuse is left out: rcl says so itself when the node is made.
+
+    Raises:
+        ParameterError: the node's name or namespace is remapped to what is none.
     """
+    options = list(_options(arguments))
+    rules = [value for option, value in options if option in _REMAP]
+    node = _remapped(rules, ("__node", "__name"), node=node) or node
+    namespace = _remapped(rules, ("__ns",), node=node)
+    if not re.fullmatch(_NAME, node, re.ASCII):
+        raise ParameterError(f"remapping __node: expected a name such as boss, found {node}")
+    if not re.fullmatch(f"/|(/{_NAME})+|", namespace, re.ASCII):
+        raise ParameterError(f"remapping __ns: expected a full namespace such as /robot_1, found {namespace}")
     parameters: dict[str, Any] = {}
-    namespace = ""
-    for option, value in _options(arguments):
-        if option in ("-r", "--remap"):
-            source, _, target = value.partition(":=")
-            scope, _, rule = source.rpartition(":")
-            if rule == "__ns" and scope in ("", node):
-                namespace = target
-        elif option in ("-p", "--param"):
+    for option, value in options:
+        if option in _PARAMETER:
             source, separator, text = value.partition(":=")
             scope, _, name = source.rpartition(":")
             if separator and scope in ("", node):
                 parameters[name] = _parse(text)
-        else:
+        elif option not in _REMAP:
             parameters.update(_of_file(value, node))
     return RosArguments(parameters=parameters, namespace=namespace)
+
+
+def _remapped(rules: Sequence[str], sources: Sequence[str], *, node: str) -> str:
+    """The target of the first rule for one of `sources`, which is the one rcl takes; empty: there is none."""
+    for rule in rules:
+        source, _, target = rule.partition(":=")
+        scope, _, name = source.rpartition(":")
+        if name in sources and scope in ("", node):
+            return target
+    return ""
 
 
 def _options(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -50,7 +70,7 @@ def _options(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
             inside = True
         elif word == "--":
             inside = False
-        elif inside and word in ("-p", "--param", "-r", "--remap", "--params-file"):
+        elif inside and word in (*_REMAP, *_PARAMETER, "--params-file"):
             value = next(words, None)
             if value is not None:
                 yield word, value

@@ -53,11 +53,12 @@ class Supervisor:
         self._decisions = node.create_publisher(
             SupervisorDecision, "~/decisions", QoSProfile(depth=KEPT_DECISIONS, durability=latched)
         )
-        self._service = node.resolve_service_name(f"{rules.executor}/reconfigure")
-        self._client = node.create_client(Reconfigure, f"{rules.executor}/reconfigure")
+        executor = node.resolve_topic_name(rules.executor)  # so `-r executor:=boss` names another one
+        self._service = node.resolve_service_name(f"{executor}/reconfigure")
+        self._client = node.create_client(Reconfigure, f"{executor}/reconfigure")
         node.create_subscription(
             ArchitectureState,
-            f"{rules.executor}/state",
+            f"{executor}/state",
             self._on_state,
             QoSProfile(depth=1, durability=latched),
         )
@@ -73,11 +74,13 @@ class Supervisor:
                 f"message type {silence.type} is not installed",
                 remedy="source the workspace that has it, or correct the name",
             )
-        topic = self._node.resolve_topic_name(silence.topic)
+        topic = self._node.resolve_topic_name(
+            silence.topic
+        )  # to be told; resolved twice, it might be another
         condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
         # Best effort hears reliable writers too; only that something came counts.
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(message, topic, _hearer(condition), qos, raw=True)
+        self._node.create_subscription(message, silence.topic, _hearer(condition), qos, raw=True)
         return condition
 
     def _tick(self) -> None:

@@ -42,9 +42,36 @@ def test_parameter_files_and_their_wildcards(tmp_path: Path) -> None:
     assert _parse("--ros-args", "--params-file", str(tmp_path / "none.yaml")) == {}
 
 
-def test_namespace() -> None:
-    words = ["--ros-args", "-r", "__ns:=/robot_7", "--remap", "__node:=boss", "-r", "other:__ns:=/elsewhere"]
-    assert parse_ros_arguments(words, node="executor").namespace == "/robot_7"
+@pytest.mark.parametrize(
+    ("rules", "namespace"),
+    [
+        (("__ns:=/robot_7", "other:__ns:=/elsewhere"), "/robot_7"),
+        (("__ns:=/first", "__ns:=/second"), "/first"),
+        (("executor:__ns:=/old", "__node:=boss", "boss:__ns:=/new"), "/new"),
+        (("other:__node:=boss", "executor:__ns:=/old"), "/old"),
+        (("count:=__ns",), ""),
+    ],
+)
+def test_namespace(rules: tuple[str, ...], namespace: str) -> None:
+    words = [word for rule in rules for word in ("--remap", rule)]
+    assert parse_ros_arguments(["--ros-args", *words], node="executor").namespace == namespace
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        ("__ns:=robot_7", "remapping __ns: expected a full namespace such as /robot_1, found robot_7"),
+        ("__ns:=/robot 7", "found /robot 7"),
+        ("__node:=7up", "remapping __node: expected a name such as boss, found 7up"),
+    ],
+)
+def test_names_that_are_none(rule: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        Settings.of(["--ros-args", "-r", rule])
+
+
+def test_parameters_of_a_node_that_is_renamed() -> None:
+    assert _parse("--ros-args", "-p", "boss:a:=1", "-p", "executor:b:=2", "-r", "__node:=boss") == {"a": 1}
 
 
 def test_settings() -> None:
