@@ -1,7 +1,5 @@
 """The radio between the robots: carries what one says to every other one; can be cut, or lose a share.
 
-    python -m mauve_examples.mission.radio --ros-args -p robots:="[robot_1,robot_2]" -p drop_share:=0.1
-
 It forwards /robot_i/radio/out to every other /robot_j/radio/in as the bytes they are. `~/set_link`
 (std_srvs/SetBool) cuts and restores the link, `~/link` (std_msgs/Bool, transient local) tells which; the
 parameter `drop_share` may be changed at any time, `seed` makes losses repeatable. `~/connected` (transient
@@ -9,7 +7,6 @@ local) is true once every robot both speaks and listens here. What was forwarded
 /diagnostics, once a second.
 """
 
-import sys
 import threading
 from typing import Any
 
@@ -27,7 +24,7 @@ from std_srvs.srv import SetBool
 
 from mauve_examples.mission.medium import Counts, Medium
 from mauve_msgs.msg import PeerMessage
-from mauve_rt.node.process import BAD_INPUT, complain, run_until_signalled
+from mauve_rt.node.process import BAD_INPUT, complain
 
 DEPTH = 50
 CONNECTION_CHECK_S = 0.1
@@ -131,12 +128,8 @@ class Radio(Node):
         self._diagnostics.publish(array)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; returns 0, or 2 for bad parameters (one line on stderr)."""
-    return run_until_signalled(lambda stop: _work(arguments, stop))
-
-
-def _work(arguments: list[str] | None, stop: threading.Event) -> int:
+def run_node(arguments: list[str] | None, stop: threading.Event) -> int:
+    """Run the node until `stop` is set; returns 0, or 2 for bad parameters (one line on stderr)."""
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Radio()
@@ -152,7 +145,3 @@ def _work(arguments: list[str] | None, stop: threading.Event) -> int:
     node.destroy_node()
     try_shutdown()
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

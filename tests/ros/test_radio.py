@@ -1,6 +1,10 @@
 """The radio between the robots: real topics, in the test's process."""
 
+import os
 import random
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -12,11 +16,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_processes import wait_for_signals
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from mauve_examples.mission.medium import Medium
-from mauve_examples.mission.radio import Radio
+from mauve_examples.mission.radio_node import Radio
 from mauve_msgs.msg import PeerMessage
 
 ROBOTS = ["robot_1", "robot_2", "robot_3"]
@@ -138,3 +143,19 @@ def test_bad_robots_are_refused(overrides: list[Any]):
             Radio(context=context, parameter_overrides=overrides)
     finally:
         rclpy.shutdown(context=context)
+
+
+def test_a_second_ctrl_c_changes_nothing():
+    """As `ros2 launch` sends one after that of the terminal."""
+    radio = subprocess.Popen(
+        [sys.executable, "-m", "mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[a, b]"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 100))},  # noqa: S311
+    )
+    wait_for_signals(radio.pid)
+    for _ in range(2):
+        radio.send_signal(signal.SIGINT)
+        time.sleep(0.01)
+    _, errors = radio.communicate(timeout=PATIENCE_S)
+    assert (radio.returncode, errors) == (0, "")

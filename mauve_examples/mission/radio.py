@@ -1,0 +1,27 @@
+"""The radio process of a mission.
+
+    ros2 run mauve_examples radio --ros-args -p robots:="[robot_1,robot_2]" [-p drop_share:=0.1] [-p seed:=1]
+
+Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr).
+"""
+
+import sys
+import threading
+
+from mauve_rt.node.process import run_until_signalled
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until signalled; returns the exit status."""
+    return run_until_signalled(lambda stop: _work(arguments, stop))
+
+
+def _work(arguments: list[str] | None, stop: threading.Event) -> int:
+    # Imported here: a signal while modules load is handled already, and threads they start block signals too.
+    from mauve_examples.mission.radio_node import run_node  # noqa: PLC0415
+
+    return 0 if stop.is_set() else run_node(arguments, stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
