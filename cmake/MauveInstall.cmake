@@ -16,3 +16,9 @@ endfunction()
 mauve_install_program(executor mauve_rt.node.executor lib/mauve_rt)
 mauve_install_program(supervisor mauve_rt.node.supervisor lib/mauve_rt)
 mauve_install_program(mauve mauve_rt.cli.main bin)
+
+# What pip writes beside a package it installs: by it `ros2` finds the entry points, and with them `ros2 mauve`.
+set(_metadata "${CMAKE_CURRENT_BINARY_DIR}/metadata/mauve_rt-${PROJECT_VERSION}.dist-info")
+configure_file(cmake/METADATA.in "${_metadata}/METADATA" @ONLY)
+configure_file(mauve_rt/cli/entry_points.txt "${_metadata}/entry_points.txt" COPYONLY)
+install(DIRECTORY "${_metadata}" DESTINATION "${PYTHON_INSTALL_DIR}")

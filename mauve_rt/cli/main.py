@@ -1,4 +1,4 @@
-"""`mauve VERB ...`, for machines without the ros2 command line.
+"""`mauve VERB ...`, for machines without the ros2 command line; with it, also `ros2 mauve VERB ...`.
 
     mauve list /robot_1/executor
     mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration
@@ -15,10 +15,7 @@ from collections.abc import Sequence
 import argcomplete
 
 from mauve_rt import __version__
-from mauve_rt.cli.verbs import BAD_USAGE, VERBS
-from mauve_rt.errors import MauveError, one_line
-
-_INTERRUPTED = 130
+from mauve_rt.cli.verbs import VERBS, run
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,13 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = build_parser()
     argcomplete.autocomplete(parser)
     args = parser.parse_args(arguments)
-    try:
-        return int(args.run(args))
-    except MauveError as error:
-        print(f"mauve: {one_line(str(error))}", file=sys.stderr)
-        return BAD_USAGE
-    except KeyboardInterrupt:
-        return _INTERRUPTED
+    return run(args.verb, args)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -44,7 +35,7 @@ def build_parser() -> argparse.ArgumentParser:
     for verb in VERBS:
         subparser = verbs.add_parser(verb.name, help=verb.help, description=verb.help)
         verb.add_arguments(subparser)
-        subparser.set_defaults(run=verb.main)
+        subparser.set_defaults(verb=verb)
     return parser
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.errors import ArchitectureFileError, one_line
+from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 
-OK, REFUSED, BAD_USAGE = 0, 1, 2
+OK, REFUSED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,17 @@ class Verb:
     help: str
     add_arguments: Callable[[argparse.ArgumentParser], None]
     main: Callable[[argparse.Namespace], int]
+
+
+def run(verb: Verb, args: argparse.Namespace) -> int:
+    """Run a verb, under `mauve` or `ros2 mauve`; returns the exit status, errors are told on stderr."""
+    try:
+        return verb.main(args)
+    except MauveError as error:
+        print(f"mauve: {one_line(str(error))}", file=sys.stderr)
+        return BAD_USAGE
+    except KeyboardInterrupt:
+        return INTERRUPTED
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:

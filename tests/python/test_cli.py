@@ -31,7 +31,7 @@ def test_arguments_of_the_verbs() -> None:
     assert (args.executor, args.component, args.core) == ("/robot_1/executor", "exploration", "p/Core")
     assert (args.timeout, args.expected_epoch, args.cause, args.json) == (0.5, 0, "", False)
     for words in (["list", "/e"], ["stop", "/e", "c"], ["start", "/e", "c"], ["events", "/e"], ["nodes"]):
-        assert callable(parser.parse_args(words).run)
+        assert parser.parse_args(words).verb.name == words[0]
 
 
 def test_a_transaction_s_steps_are_read_from_yaml() -> None:
