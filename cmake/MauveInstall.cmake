@@ -3,15 +3,9 @@
 mauve_install_python_package(mauve_rt)
 mauve_register_package(mauve_rt)
 install(FILES package.xml DESTINATION share/mauve_rt)
+install(DIRECTORY mauve_rt/launch DESTINATION share/mauve_rt PATTERN "__pycache__" EXCLUDE)
 # Named in colcon.pkg: a workspace's setup files then put this prefix on AMENT_PREFIX_PATH, as for any ament package.
 install(FILES cmake/ament_prefix_path.dsv cmake/ament_prefix_path.sh DESTINATION share/mauve_rt/hook)
-
-# mauve_install_program(<name> <module> <folder>): a program that calls <module>:main.
-function(mauve_install_program name module folder)
-  set(MAUVE_PROGRAM_MODULE ${module})
-  configure_file(cmake/program.py.in "${CMAKE_CURRENT_BINARY_DIR}/programs/${name}" @ONLY)
-  install(PROGRAMS "${CMAKE_CURRENT_BINARY_DIR}/programs/${name}" DESTINATION ${folder})
-endfunction()
 
 mauve_install_program(executor mauve_rt.node.executor lib/mauve_rt)
 mauve_install_program(supervisor mauve_rt.node.supervisor lib/mauve_rt)

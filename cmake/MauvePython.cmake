@@ -49,3 +49,10 @@ function(mauve_register_package name)
   install(FILES "${CMAKE_CURRENT_BINARY_DIR}/ament_index/${name}"
     DESTINATION share/ament_index/resource_index/packages)
 endfunction()
+
+# mauve_install_program(<name> <module> <folder>): a program that calls <module>:main.
+function(mauve_install_program name module folder)
+  set(MAUVE_PROGRAM_MODULE ${module})
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/program.py.in" "${CMAKE_CURRENT_BINARY_DIR}/programs/${name}" @ONLY)
+  install(PROGRAMS "${CMAKE_CURRENT_BINARY_DIR}/programs/${name}" DESTINATION ${folder})
+endfunction()

@@ -1,76 +1,103 @@
-"""The exploration mission on an installed Jazzy: radio, executors and supervisors.
+"""The exploration mission on an installed Jazzy: radio, executors and supervisors, until Ctrl-C.
 
-    ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office seed:=1 supervisor:=true
+    ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office link_loss_at:=20 link_back_at:=45
 
-Robots start at once. The demo (`scripts/demo`) runs the same mission with a timeline, a report and a verdict.
+Arguments are the options of the demo (`scripts/demo --help`), which runs the same mission with an end, a
+report and a verdict. Robots start at once; times are seconds after the launch.
 """
 
-from pathlib import Path
+import json
 
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
-from launch.substitutions import LaunchConfiguration
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    GroupAction,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    TimerAction,
+)
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
 
-from mauve_examples.mission.architecture import load_world, map_file, write_setups
+from mauve_examples.mission.architecture import load_world, write_setups
+from mauve_examples.mission.demo_options import parse_options
+from mauve_examples.mission.demo_run import RECORDED
+
+# Arguments that the demo's command line has too, there with hyphens; the empty ones are left to its defaults.
+_OPTIONS = ("map", "robots", "link_loss_at", "link_back_at", "drop_share", "seed", "out")
+_UNTIL_CTRL_C_S = "1e9"
 
 
 def generate_launch_description() -> LaunchDescription:
     """Arguments, and the mission they describe."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument("robots", default_value="2", description="how many"),
-            DeclareLaunchArgument("map", default_value="office", description="YAML file, or a map of ours"),
-            DeclareLaunchArgument("seed", default_value="1", description="of starts and lost messages"),
-            DeclareLaunchArgument("drop_share", default_value="0.0", description="of messages lost, 0 to 1"),
-            DeclareLaunchArgument("supervisor", default_value="true", choices=["true", "false"]),
-            DeclareLaunchArgument("out", default_value="mission", description="architectures and bags"),
+            _optional("map", "YAML file, or a map of ours (default: office)"),
+            _optional("robots", "how many (default: 2)"),
+            _optional("link_loss_at", "s until the radio link is lost, or never (default: 20)"),
+            _optional("link_back_at", "s until it is back (default: 45)"),
+            _optional("drop_share", "share of messages lost, 0 to 1 (default: 0)"),
+            _optional("seed", "of starts and lost messages (default: 1)"),
+            _optional("out", "folder for architectures and bags (default: out/mission_DATE_TIME)"),
+            DeclareLaunchArgument(
+                "supervisor",
+                default_value="true",
+                choices=["true", "false"],
+                description="false: nobody swaps",
+            ),
             OpaqueFunction(function=_mission),
         ]
     )
 
 
+def _optional(name: str, description: str) -> DeclareLaunchArgument:
+    return DeclareLaunchArgument(name, default_value="", description=description)
+
+
 def _mission(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     def given(name: str) -> str:
-        return LaunchConfiguration(name).perform(context)
+        return str(LaunchConfiguration(name).perform(context))
 
-    names = [f"robot_{number}" for number in range(1, int(given("robots")) + 1)]
-    seed, out = int(given("seed")), Path(given("out")).absolute()
-    world = load_world(map_file(given("map")), names, seed=seed)
-    supervised = given("supervisor") == "true" and len(names) > 1
-    setups = write_setups(world, out, seed=seed, supervisor=supervised)
-    parameters = ["-p", f"robots:=[{','.join(names)}]", "-p", f"drop_share:={float(given('drop_share'))!r}"]
-    radio = [
-        "python3",
-        "-m",
-        "mauve_examples.mission.radio",
-        "--ros-args",
-        *parameters,
-        "-p",
-        f"seed:={seed}",
+    link_stays = given("link_loss_at") == "never"
+    words = [
+        f"--{name.replace('_', '-')}={given(name)}"
+        for name in _OPTIONS
+        if given(name) and not (link_stays and name.startswith("link_"))
     ]
-    actions: list[LaunchDescriptionEntity] = [ExecuteProcess(cmd=radio, name="radio", output="screen")]
-    for setup in setups:
-        bag = out / "bag" / setup.name
-        executor = {"architecture": str(setup.architecture), "bag": str(bag)}
-        actions.append(
-            Node(
-                package="mauve_rt",
-                executable="executor",
-                namespace=setup.name,
-                parameters=[executor],
-                output="screen",
-            )
+    words += ["--no-supervisor"] if given("supervisor") == "false" else []
+    options = parse_options([f"--duration={_UNTIL_CTRL_C_S}", *words])
+    world = load_world(options.map_file, options.names, seed=options.seed)
+    setups = write_setups(world, options.out, seed=options.seed, supervisor=options.supervisor)
+    radio = Node(
+        package="mauve_examples",
+        executable="radio",
+        parameters=[{"robots": options.names, "drop_share": options.drop_share, "seed": options.seed}],
+        output="screen",
+    )
+    robots = [
+        _robot(
+            architecture=str(setup.architecture),
+            bag=str(options.out / "bag" / setup.name),
+            rules=str(setup.rules or ""),
+            record_topics=json.dumps(RECORDED),
         )
-        if setup.rules is not None:
-            rules = {"rules": str(setup.rules)}
-            actions.append(
-                Node(
-                    package="mauve_rt",
-                    executable="supervisor",
-                    namespace=setup.name,
-                    parameters=[rules],
-                    output="screen",
-                )
-            )
-    return actions
+        for setup in setups
+    ]
+    changes = () if link_stays else ((options.link_loss_at_s, "false"), (options.link_back_at_s, "true"))
+    return [radio, *robots, *(_set_link(at_s, up) for at_s, up in changes if at_s is not None)]
+
+
+def _robot(**arguments: str) -> LaunchDescriptionEntity:
+    """An executor and its supervisor, in a scope of their own."""
+    file = PathJoinSubstitution([FindPackageShare("mauve_rt"), "launch", "executor.launch.py"])
+    source = PythonLaunchDescriptionSource(file)
+    return GroupAction([IncludeLaunchDescription(source, launch_arguments=arguments.items())])
+
+
+def _set_link(at_s: float, up: str) -> LaunchDescriptionEntity:
+    service = ["/radio/set_link", "std_srvs/srv/SetBool", f"{{data: {up}}}"]
+    call = ExecuteProcess(cmd=["ros2", "service", "call", *service], output="log")
+    return TimerAction(period=at_s, actions=[call])
