@@ -19,6 +19,7 @@ from native import BenchmarkError
 from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
 from rows import Row, markdown, not_available
 from scale import scale_rows
+from service_calls import service_rows
 from settings import FULL, QUICK, Settings
 from transactions import soak_rows, transaction_rows
 from wakeup import wakeup_rows
@@ -39,6 +40,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "inversion": inversion_rows,
     "scale": scale_rows,
     "soak": soak_rows,
+    "service": service_rows,
 }
 
 

@@ -19,6 +19,7 @@ class Settings:
     scale_s: float
     transactions: int
     soak: int
+    service_calls: int
     priority: int = 80
     cpu: int = 0
 
@@ -36,6 +37,7 @@ QUICK = Settings(
     scale_s=0.3,
     transactions=100,
     soak=500,
+    service_calls=50,
 )
 FULL = Settings(
     mode="full",
@@ -50,4 +52,5 @@ FULL = Settings(
     scale_s=1.0,
     transactions=300,
     soak=10_000,
+    service_calls=100,
 )

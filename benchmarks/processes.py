@@ -1,0 +1,78 @@
+"""Processes that a measurement needs beside it: started, watched and ended, their output in files."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from native import BenchmarkError
+
+_START_S = 30.0
+_END_S = 10.0
+
+
+class Processes:
+    """A context: whatever was spawned inside it is gone after it."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> Self:
+        # A domain of our own where none is set: other nodes' traffic is no part of the measurement.
+        os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+        with ExitStack() as stack:
+            self.folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mauve_bench_")))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, error, traceback)
+
+    def spawn(self, name: str, *words: str) -> None:
+        """Start a Python program: a file, or -m and a module, and its arguments."""
+        log = self._stack.enter_context((self.folder / f"{name}.log").open("wb"))
+        process = subprocess.Popen([sys.executable, "-P", *words], stdout=log, stderr=log)
+        self._stack.callback(process.wait)
+        self._stack.callback(process.kill)  # first: unless it ended well by then
+        self._running[name] = process
+
+    def output(self, name: str) -> str:
+        """Everything that a process printed."""
+        return (self.folder / f"{name}.log").read_text(encoding="utf-8", errors="replace")
+
+    def await_output(self, name: str, word: str) -> None:
+        """Until a process has printed a word.
+
+        Raises:
+            BenchmarkError: it does not, or a process ended.
+        """
+        until = time.monotonic() + _START_S
+        while word not in self.output(name):
+            for other, process in self._running.items():
+                if process.poll() is not None:
+                    raise BenchmarkError(f"{other} ended at its start: {self.output(other)}")
+            if time.monotonic() > until:
+                raise BenchmarkError(f"no '{word}' of {name} within {_START_S:g} s: {self.output(name)}")
+            time.sleep(0.1)
+
+    def end(self, name: str) -> None:
+        """Ask a process to end, as Ctrl-C does.
+
+        Raises:
+            BenchmarkError: it does not.
+        """
+        process = self._running.pop(name)
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            raise BenchmarkError(f"{name} did not end within {_END_S:g} s of SIGINT") from None

@@ -1,0 +1,118 @@
+"""replace_core asked for over its ROS service, beside a bare Trigger call of the same client."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Self
+
+import native
+import numpy as np
+import rclpy
+from busy_executor import ARCHITECTURE, COMPONENT
+from native import BenchmarkError
+from processes import Processes
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rows import Row, compared
+from settings import Settings
+from std_srvs.srv import Trigger
+
+from mauve_msgs.srv import ReplaceCore
+
+_CORES = ("mauve_examples/Accelerando", "mauve_examples/Metronome")
+_REPLY_S = 10.0
+_DISCOVERY_S = 20.0
+
+
+def service_rows(settings: Settings) -> Iterator[Row]:
+    """Rounds of calls, one after the other, of a 1 kHz component's replacement and of Trigger."""
+    namespace = f"/bench_{os.getpid()}"
+    with ExitStack() as stack:
+        processes = stack.enter_context(Processes())
+        processes.spawn(
+            "executor",
+            *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={namespace}"),
+            *("-p", f"architecture:={ARCHITECTURE}"),
+        )
+        trigger_name = f"{namespace}/trigger"
+        processes.spawn("trigger", str(Path(__file__).with_name("trigger_server.py")), trigger_name)
+        processes.await_output("trigger", "ready")
+        calls = stack.enter_context(_SpunClient())
+        trigger = calls.client(Trigger, trigger_name)
+        replace = calls.client(ReplaceCore, f"{namespace}/executor/replace_core")
+
+        def replacements(number: int) -> list[float]:
+            cores = (_CORES[(number + index) % 2] for index in range(settings.service_calls))
+            requests = (ReplaceCore.Request(component=COMPONENT, core=core) for core in cores)
+            return [calls.duration_ns(replace, request) for request in requests]
+
+        def triggers(_: int) -> list[float]:
+            return [calls.duration_ns(trigger, Trigger.Request()) for _ in range(settings.service_calls)]
+
+        rounds = native.interleaved(settings.rounds, replacements, triggers)
+    for percent in (50, 99):
+        pairs = [tuple(float(np.percentile(part, percent)) / 1e3 for part in found) for found in rounds]
+        yield compared(
+            f"replace_core of a 1 kHz component over its service, p{percent}",
+            [(pair[0], pair[1]) for pair in pairs],
+            unit="us",
+            beside="a bare std_srvs/Trigger call",
+            ratio_limit=2.0,
+            note="the reply tells the phase of the release after the commit, for which it waits",
+        )
+
+
+class _SpunClient:
+    """A context: a node that a thread spins, which calls services."""
+
+    def __enter__(self) -> Self:
+        self._context = Context()
+        rclpy.init(context=self._context, args=[])
+        self._node = rclpy.create_node("bench_client", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ending.set()
+        self._thread.join()
+        self._executor.shutdown(timeout_sec=0)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _spin(self) -> None:
+        while not self._ending.is_set():
+            self._executor.spin_once(timeout_sec=0.2)
+
+    def client(self, service_type: Any, name: str) -> Any:
+        """A client of a service that is there and has answered once."""
+        client = self._node.create_client(service_type, name)
+        if not client.wait_for_service(_DISCOVERY_S):
+            raise BenchmarkError(f"no service {name} within {_DISCOVERY_S:g} s")
+        until = time.monotonic() + _DISCOVERY_S
+        while time.monotonic() < until:  # a first reply may be lost: the service may not know its client yet
+            answered = threading.Event()
+            client.call_async(service_type.Request()).add_done_callback(lambda _: answered.set())  # noqa: B023
+            if answered.wait(1.0):
+                return client
+        raise BenchmarkError(f"no reply of {name} within {_DISCOVERY_S:g} s")
+
+    def duration_ns(self, client: Any, request: Any) -> float:
+        """How long a call takes that succeeds."""
+        answered = threading.Event()
+        begin_ns = time.monotonic_ns()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _: answered.set())
+        if not answered.wait(_REPLY_S):
+            raise BenchmarkError(f"no reply of {client.srv_name} within {_REPLY_S:g} s")
+        duration_ns = time.monotonic_ns() - begin_ns
+        reply = future.result()
+        if not reply.success:
+            raise BenchmarkError(f"{client.srv_name} refused: {reply.message}")
+        return float(duration_ns)
