@@ -43,7 +43,7 @@ def generate_launch_description() -> LaunchDescription:
             _optional("namespace", "of both nodes (default: as in the architecture file)"),
             _optional("rules", "rules file of a supervisor (default: none)"),
             _optional("bag", "folder of the bag to record, which must not exist yet (default: none)"),
-            _optional("record_topics", "further topics to record, as in [scan:sensor_msgs/msg/LaserScan]"),
+            _optional("record_topics", "further topics to record, as in [chatter:std_msgs/msg/String]"),
             _optional("autostart", "false: wait for lifecycle transitions"),
             _optional("require_realtime", "true: refuse to start without real-time rights"),
             _optional("trace", "false: component threads write no traces"),
