@@ -59,8 +59,8 @@ StepReport commit_one(PySimulation& self, PyArchitecture& architecture, Transact
   return self.simulation.commit(architecture.architecture, std::move(transaction)).steps.front();
 }
 
-TransactionReport commit(PySimulation& self, PyArchitecture& architecture, const PyTransaction& steps,
-                         bool dry_run, std::uint64_t expected_epoch) {
+TransactionReport commit_simulated(PySimulation& self, PyArchitecture& architecture,
+                                   const PyTransaction& steps, bool dry_run, std::uint64_t expected_epoch) {
   Transaction transaction = steps.build(architecture.registry);
   const py::gil_scoped_release release;
   return self.simulation.commit(architecture.architecture, std::move(transaction),
@@ -120,7 +120,7 @@ void bind_simulation(py::module_& module) {
             return self.simulation.get_time(architecture.architecture, component);
           },
           py::arg("architecture"), py::arg("component"), Unlocked())
-      .def("commit", &commit, py::arg("architecture"), py::arg("transaction"), py::kw_only(),
+      .def("commit", &commit_simulated, py::arg("architecture"), py::arg("transaction"), py::kw_only(),
            py::arg("dry_run") = false, py::arg("expected_epoch") = 0)
       .def(
           "replace_core",
