@@ -5,4 +5,6 @@ and reads what happened, `mauve_rt.cores` is for who writes a core in Python, `m
 command.
 """
 
-__version__ = "0.1.0"
+from mauve_rt._kernel import __version__
+
+__all__ = ["__version__"]

@@ -8,6 +8,8 @@ from mauve_rt.fsms import Fsm
 from mauve_rt.resources import AnyResource, Resource
 from mauve_rt.shells import Shell
 
+__version__: Final[str]
+
 PropertyValue: TypeAlias = bool | int | float | str
 
 class MauveError(Exception):

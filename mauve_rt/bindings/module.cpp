@@ -14,6 +14,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_transaction(module);
   bind_deployer(module);
   bind_simulation(module);
+  module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;
   module.attr("DEFAULT_MAX_READERS") = mauve::kDefaultMaxReaders;
   module.def("monotonic_ns", &mauve::monotonic_now_ns);
