@@ -5,14 +5,19 @@ The wheels name the folders of the machine that built them: the interpreter's he
 system library. Run once after `pip install`, with the environment's own python; a second run changes nothing.
 
     .venv/bin/python scripts/patch_wheels.py
+
+setup.py, which may not change the environment it builds in, patches a copy: `private_prefix`.
 """
 
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 import sysconfig
 from pathlib import Path
+
+CMAKE_FOLDERS = (Path("share"), Path("lib", "cmake"))
 
 
 def patched(text: str, *, prefix: str, include: str) -> str:
@@ -22,22 +27,39 @@ def patched(text: str, *, prefix: str, include: str) -> str:
     return text.replace("/usr/lib64/libtinyxml2.so;", "")
 
 
+def patch(prefix: Path) -> int:
+    """Patch the CMake files of a prefix; returns how many files changed."""
+    include = sysconfig.get_paths()["include"]
+    changed = 0
+    for folder in CMAKE_FOLDERS:
+        for path in (prefix / folder).rglob("*.cmake"):
+            before = path.read_text(encoding="utf-8")
+            after = patched(before, prefix=str(prefix), include=include)
+            if after != before:
+                path.write_text(after, encoding="utf-8")
+                changed += 1
+    return changed
+
+
+def private_prefix(wheels: Path, prefix: Path) -> None:
+    """Make `prefix` a patched prefix of the wheels in `wheels`: CMake files are copied, all else linked."""
+    (prefix / "lib").mkdir(parents=True)
+    for entry in [*wheels.iterdir(), *(wheels / "lib").iterdir()]:
+        relative = entry.relative_to(wheels)
+        if relative in CMAKE_FOLDERS:
+            shutil.copytree(entry, prefix / relative)
+        elif entry.name not in ("lib", "lib64"):  # lib64 is another name of lib
+            (prefix / relative).symlink_to(entry)
+    patch(prefix)
+
+
 def main() -> int:
     """Patch the environment of the running interpreter and say how many files changed."""
     prefix = Path(sys.prefix)
     if not (prefix / "pyvenv.cfg").is_file():
         sys.stderr.write(f"patch_wheels: {prefix} is no virtual environment; use its own python\n")
         return 2
-    include = sysconfig.get_paths()["include"]
-    changed = 0
-    for folder in (prefix / "share", prefix / "lib" / "cmake"):
-        for path in folder.rglob("*.cmake"):
-            before = path.read_text(encoding="utf-8")
-            after = patched(before, prefix=str(prefix), include=include)
-            if after != before:
-                path.write_text(after, encoding="utf-8")
-                changed += 1
-    sys.stdout.write(f"patch_wheels: {changed} files changed\n")
+    sys.stdout.write(f"patch_wheels: {patch(prefix)} files changed\n")
     return 0
 
 
