@@ -80,8 +80,9 @@ def _autostart(node: Any, stop: threading.Event) -> int:
     from rclpy.lifecycle import TransitionCallbackReturn  # noqa: PLC0415
 
     for transition, status in ((node.trigger_configure, BAD_INPUT), (node.trigger_activate, FAILED)):
-        if not stop.is_set() and transition() != TransitionCallbackReturn.SUCCESS:
-            return status
+        result = TransitionCallbackReturn.SUCCESS if stop.is_set() else transition()
+        if result != TransitionCallbackReturn.SUCCESS:
+            return FAILED if result == TransitionCallbackReturn.ERROR else status
     return 0
 
 

@@ -59,8 +59,8 @@ def realtime_status(runtime: Runtime) -> Any:
     return RealtimeStatus(granted=status.granted, missing=list(status.missing))
 
 
-def architecture_state(runtime: Runtime, stamp: Any) -> Any:
-    """ArchitectureState as it is now."""
+def architecture_state(runtime: Runtime, stamp: Any, *, error: str = "") -> Any:
+    """ArchitectureState as it is now; `error`: why the last lifecycle transition failed."""
     epoch = (
         runtime.epoch
     )  # before the components: a change in between is published again, under its own epoch
@@ -79,6 +79,7 @@ def architecture_state(runtime: Runtime, stamp: Any) -> Any:
             for component in runtime.components()
         ],
         realtime=realtime_status(runtime),
+        error=error,
     )
 
 

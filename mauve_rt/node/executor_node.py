@@ -1,5 +1,6 @@
 """The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ class ExecutorNode(LifecycleNode):
             ParameterError: a parameter of the wrong type, or `use_sim_time`.
         """
         super().__init__(NODE_NAME, namespace=namespace)  # transitions are in the node's default group
+        self._answer_every_transition()
         control_group, query_group = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self._data_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
@@ -68,57 +70,89 @@ class ExecutorNode(LifecycleNode):
         self.add_on_set_parameters_callback(_refuse_sim_time)
 
     # ---- transitions
+    #
+    # What a user can correct (a bad file, rights that are missing) is a FAILURE: everything is as before, and
+    # can be tried again. Whatever else goes wrong is an ERROR: on_error() releases all. ~/state says why.
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load and check the file, build the architecture, open topics and bag."""
-        try:
-            self._runtime.configure()
-            self._topics.open(self._runtime.model, self._runtime.architecture)
-            bag = str(self.get_parameter("bag").value)
-            if bag:
-                self._topics.keep_messages()
-                self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._topics)
-                self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
-        except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
-            self._release()
-            return self._failed(error)
-        self._state.refresh(again=True)
-        self._log_realtime()
-        return TransitionCallbackReturn.SUCCESS
+        return self._transition(self._configure, undo=self._release)
 
     def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Deploy: all components start on one grid."""
-        try:
-            self._runtime.activate()
-        except Exception as error:  # noqa: BLE001 - rclpy would swallow it without a word
-            return self._failed(error)
-        self._topics.start()
-        self._state.start(self._runtime.deployer)
-        self._state.refresh()
-        return TransitionCallbackReturn.SUCCESS
+        return self._transition(self._activate, undo=self.quiesce)
 
     def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Write safe outputs, park the components, end the threads."""
-        self.quiesce()
-        return TransitionCallbackReturn.SUCCESS
+        """Write safe outputs, park the components, the last one first, end the threads."""
+        return self._transition(self.quiesce)
 
     def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Seal the bag, release the architecture; refused while a component's state still executes."""
-        try:
-            self._release()
-        except MauveError as error:
-            return self._failed(error)
-        self._state.refresh()
-        return TransitionCallbackReturn.SUCCESS
+        return self._transition(self._release)
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+    def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """As deactivate and cleanup."""
-        self.quiesce()
-        return self.on_cleanup(state)
+        return self._transition(self._end)
 
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Release everything: back to unconfigured."""
-        return self.on_shutdown(state)
+    def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Release everything: back to unconfigured, or finalized where a component's state still executes."""
+        return self._transition(self._end, error=self._state.error)
+
+    def _configure(self) -> None:
+        self._runtime.configure()
+        self._topics.open(self._runtime.model, self._runtime.architecture)
+        bag = str(self.get_parameter("bag").value)
+        if bag:
+            self._topics.keep_messages()
+            self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._topics)
+            self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
+        self._log_realtime()
+
+    def _activate(self) -> None:
+        self._runtime.activate()
+        self._topics.start()
+        self._state.start(self._runtime.deployer)
+
+    def _end(self) -> None:
+        self.quiesce()
+        self._release()
+
+    def _transition(
+        self, work: Callable[[], None], *, undo: Callable[[], None] | None = None, error: str = ""
+    ) -> TransitionCallbackReturn:
+        """What came of a transition's work, told in ~/state; `error`: what led to it."""
+        result, reason = TransitionCallbackReturn.SUCCESS, error
+        try:
+            try:
+                work()
+            except (MauveError, TraceError) as failure:
+                result, reason = TransitionCallbackReturn.FAILURE, str(failure)
+                if undo is not None:
+                    undo()
+        except Exception as failure:  # noqa: BLE001 - rclpy would swallow it without a word
+            result = TransitionCallbackReturn.ERROR
+            reason = f"{type(failure).__name__}: {failure}"
+        if result != TransitionCallbackReturn.SUCCESS:
+            reason = one_line(f"{reason}; after {error}" if error else reason)
+            self.get_logger().error(reason)
+        self._state.error = reason
+        self._state.refresh(again=True)
+        return result
+
+    def _answer_every_transition(self) -> None:
+        """Say no to a transition that the present state does not have: rclpy would say nothing."""
+        service = self._service_change_state
+        change_state = service.callback
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change_state(request, response)
+            except Exception as error:  # noqa: BLE001 - RCLError, of which rclpy publishes no name
+                self.get_logger().warning(one_line(f"transition refused: {error}"))
+                response.success = False
+                return response
+
+        service.callback = answer
 
     def quiesce(self) -> None:
         """Outputs safe, components parked, last words published, threads joined. May be called again."""
@@ -138,17 +172,15 @@ class ExecutorNode(LifecycleNode):
             self._release()
         except MauveError as error:
             self.get_logger().error(str(error))
+            self._recording.stop(self)
+            self._topics.close()
         self.destroy_node()
 
     def _release(self) -> None:
+        self._runtime.require_parked()
         self._recording.stop(self)
         self._topics.close()
         self._runtime.cleanup()
-
-    def _failed(self, error: Exception) -> TransitionCallbackReturn:
-        known = isinstance(error, MauveError | TraceError)
-        self.get_logger().error(one_line(str(error) if known else f"{type(error).__name__}: {error}"))
-        return TransitionCallbackReturn.FAILURE
 
     def _log_realtime(self) -> None:
         status = self._runtime.realtime_status()

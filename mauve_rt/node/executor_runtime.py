@@ -6,7 +6,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from mauve_rt._kernel import Architecture, ComponentDescription, Deployer, PluginRegistry, RealtimeStatus
+from mauve_rt._kernel import (
+    Architecture,
+    ComponentDescription,
+    Deployer,
+    PluginRegistry,
+    RealtimeStatus,
+)
 from mauve_rt.errors import MauveError
 from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
 from mauve_rt.model.schema import ComponentModel
@@ -127,12 +133,20 @@ class Runtime:
         Raises:
             MauveError: a component's state still executes, so that nothing it uses may be taken away.
         """
-        if busy := self.busy():
-            raise StillRunningError(busy)
+        self.require_parked()
         self._model = None
         architecture, self._architecture, self._deployer = self._architecture, None, None
         if architecture is not None:
             architecture.cleanup()
+
+    def require_parked(self) -> None:
+        """Whether cleanup() may be called.
+
+        Raises:
+            MauveError: a component's state still executes.
+        """
+        if busy := self.busy():
+            raise StillRunningError(busy)
 
     def busy(self) -> list[ComponentDescription]:
         """After deactivate(): the components whose present state has not come to its end yet."""

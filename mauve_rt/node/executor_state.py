@@ -30,6 +30,7 @@ class StatePublisher:
         self._event_qos = QoSProfile(depth=_EVENT_DEPTH)
         self._states = node.create_publisher(ArchitectureState, "~/state", self._state_qos)
         self._events = node.create_publisher(ReconfigurationEvent, "~/events", self._event_qos)
+        self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
         self._published_epoch = -1
         self._ending = threading.Event()
@@ -40,7 +41,8 @@ class StatePublisher:
         with self._lock:
             self._runtime.observe()
             if again or self._runtime.epoch != self._published_epoch:
-                state = architecture_state(self._runtime, self._node.get_clock().now().to_msg())
+                stamp = self._node.get_clock().now().to_msg()
+                state = architecture_state(self._runtime, stamp, error=self.error)
                 self._published_epoch = state.epoch
                 self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
 
