@@ -113,6 +113,14 @@ class ComponentDescription:
     execution_times: Final[list[ExecutionTimeDescription]]  # one for each execution state
 
 @final
+class RecentMaxima:
+    """The largest figures of a component since they were taken last; 0 where nothing happened."""
+
+    component: Final[str]
+    wakeup_ns: Final[int]
+    execution_ns: Final[dict[str, int]]  # by execution state
+
+@final
 class StepReport:
     """Fields as mauve_msgs/msg/StepReport."""
 
@@ -416,6 +424,8 @@ class Architecture:
     def epoch(self) -> int:
         """Grows with every committed change and every start, stop and fault; never 0."""
     def components(self) -> list[ComponentDescription]: ...
+    def take_recent_maxima(self) -> list[RecentMaxima]:
+        """Of every component, and counted anew from here on: for one caller only."""
     def resources(self) -> list[ResourceDescription]: ...
 
 @final

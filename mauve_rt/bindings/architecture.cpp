@@ -17,6 +17,14 @@ std::vector<ComponentDescription> describe_components(PyArchitecture& self) {
   return all;
 }
 
+std::vector<RecentMaxima> take_all_recent_maxima(PyArchitecture& self) {
+  const py::gil_scoped_release release;
+  const std::lock_guard lock(self.describing);
+  std::vector<RecentMaxima> all;
+  for (const auto& component : self.architecture.components()) all.push_back(take_recent_maxima(*component));
+  return all;
+}
+
 std::vector<ResourceDescription> describe_resources(PyArchitecture& self) {
   std::vector<ResourceDescription> all;
   for (const auto& resource : self.architecture.resources()) all.push_back(describe_resource(*resource));
@@ -120,6 +128,7 @@ void bind_architecture(py::module_& module) {
       .def("epoch", [](PyArchitecture& self) { return self.architecture.epoch(); })
       .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
       .def("components", &describe_components)
+      .def("take_recent_maxima", &take_all_recent_maxima)
       .def("resources", &describe_resources);
 }
 

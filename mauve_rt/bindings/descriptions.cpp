@@ -102,6 +102,13 @@ ComponentDescription describe_component(Component& component) {
           .execution_times = describe_execution_times(*component.state_times())};
 }
 
+RecentMaxima take_recent_maxima(const Component& component) {
+  RecentMaxima maxima{component.name(), component.task().statistics().wakeup.maximum().take_recent_ns(), {}};
+  for (const auto& [state, time] : *component.state_times())
+    maxima.execution_ns[state] = time.maximum().take_recent_ns();
+  return maxima;
+}
+
 void bind_descriptions(py::module_& module) {
   py::class_<PortDescription>(module, "PortDescription")
       .def_readonly("name", &PortDescription::name)
@@ -166,6 +173,10 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("allocations", &C::allocations)
       .def_readonly("page_faults", &C::page_faults)
       .def_readonly("execution_times", &C::execution_times);
+  py::class_<RecentMaxima>(module, "RecentMaxima")
+      .def_readonly("component", &RecentMaxima::component)
+      .def_readonly("wakeup_ns", &RecentMaxima::wakeup_ns)
+      .def_readonly("execution_ns", &RecentMaxima::execution_ns);
   module.def("allocation_counting", [] { return std::string(to_string(allocation_counting())); });
 }
 

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <map>
 #include <mutex>
 
 #include "mauve_rt/mauve_rt.hpp"
@@ -149,5 +150,13 @@ struct ComponentDescription {
   std::vector<ExecutionTimeDescription> execution_times;
 };
 ComponentDescription describe_component(Component& component);
+
+/// The largest figures of a component since they were taken last.
+struct RecentMaxima {
+  std::string component;
+  time_ns_t wakeup_ns;
+  std::map<std::string, time_ns_t> execution_ns;  // by state
+};
+RecentMaxima take_recent_maxima(const Component& component);
 
 }  // namespace mauve::bindings

@@ -42,6 +42,7 @@ class ArchitectureModel:
         self.namespace = overrides.namespace or content.executor.namespace
         self.peers = list(content.executor.peers if overrides.peers is None else overrides.peers)
         self.require_realtime = content.executor.require_realtime
+        self.diagnostics = content.executor.diagnostics
         self.components: dict[str, ComponentModel] = dict(content.components)
         self.resources: dict[str, ResourceModel] = dict(content.resources)
         self.connections = [

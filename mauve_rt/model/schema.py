@@ -18,13 +18,22 @@
 `installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
 `trace_records` is the room for its trace until it is drained; what does not fit is counted as lost.
 
+From which figures on /diagnostics warns, for all components and for each one:
+
+    executor: {diagnostics: {overruns: {warn: 1, error: 10}}}
+    components:
+      control: {..., diagnostics: {wakeup_max_us: {warn: 500, error: 2000}, execution_max_us: {error: 900}}}
+
+Figures are those since the last status, a second before. A key of a component takes the place of the
+executor's, `null` switches it off.
+
 Nothing here looks at plug-ins, so a file can be read where none is installed.
 """
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 PropertyValue = bool | int | float | str
@@ -109,6 +118,7 @@ Identifier = Annotated[str, AfterValidator(_identifier)]
 RosName = Annotated[str, AfterValidator(_ros_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Cpu = Annotated[int, Field(ge=0, le=65535)]
+Threshold = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Int64 = Annotated[int, Field(ge=0, le=2**63 - 1)]
 Milliseconds = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -117,12 +127,43 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+class ThresholdModel(_Section):
+    """From which figure on a status is a warning, and from which an error."""
+
+    warn: Threshold | None = None
+    error: Threshold | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.warn is None and self.error is None:
+            raise PydanticCustomError("expected", "{text}", {"text": "warn or error or both of them"})
+        if self.warn is not None and self.error is not None and self.warn > self.error:
+            raise PydanticCustomError("expected", "{text}", {"text": "an error that is no less than warn"})
+        return self
+
+
+class DiagnosticsModel(_Section):
+    """Thresholds of what /diagnostics tells of a component; figures since the last status."""
+
+    wakeup_max_us: ThresholdModel | None = None  # the largest wake-up latency
+    execution_max_us: ThresholdModel | None = None  # the longest execution of a state
+    overruns: ThresholdModel | None = None
+    skipped: ThresholdModel | None = None  # instants
+    allocations: ThresholdModel | None = None  # of its thread
+    page_faults: ThresholdModel | None = None
+
+    def overridden_by(self, other: Self) -> Self:
+        """These thresholds, but those that `other` sets, or switches off, in their place."""
+        return self.model_copy(update={key: getattr(other, key) for key in other.model_fields_set})
+
+
 class ExecutorModel(_Section):
     """The process as a whole."""
 
     namespace: Annotated[str, AfterValidator(_namespace)] = "/"
     peers: list[Identifier] = []
     require_realtime: bool = False
+    diagnostics: DiagnosticsModel = DiagnosticsModel()  # of every component
 
 
 class QosModel(_Section):
@@ -184,6 +225,7 @@ class ComponentModel(_Section):
     trace_records: Annotated[int, Field(ge=2, le=MAX_TRACE_RECORDS)] = 2048
     reconfigurable: bool = True
     properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
+    diagnostics: DiagnosticsModel = DiagnosticsModel()
 
     @property
     def offset_ns(self) -> int:

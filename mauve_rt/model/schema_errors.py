@@ -9,10 +9,12 @@ from pydantic_core import ErrorDetails
 from mauve_rt.errors import Problem
 from mauve_rt.model.schema import (
     ComponentModel,
+    DiagnosticsModel,
     ExecutorModel,
     FileModel,
     QosModel,
     ResourceModel,
+    ThresholdModel,
     TopicModel,
 )
 from mauve_rt.model.words import did_you_mean, listed, shown
@@ -84,6 +86,7 @@ _PLAIN_WORDS: Mapping[str, str] = {
 _CONTEXT_WORDS: Mapping[str, str] = {
     "expected": "{text}",  # our own validators
     "literal_error": "{expected}",
+    "greater_than": "more than {gt:g}",
     "greater_than_equal": "at least {ge:g}",
     "less_than_equal": "at most {le:g}",
     "too_short": "at least {min_length} of them",
@@ -118,16 +121,18 @@ def _is_key(details: ErrorDetails) -> bool:
 def _section(location: Location) -> type[BaseModel]:
     """The schema of the section that `location` is a key of."""
     match location[:-1]:
+        case (*_, "diagnostics"):
+            return DiagnosticsModel
+        case (*_, "diagnostics", _):
+            return ThresholdModel
         case ("executor",):
             return ExecutorModel
         case ("components", _):
             return ComponentModel
         case ("resources", _):
             return ResourceModel
-        case ("resources", _, "topic"):
-            return TopicModel
-        case ("resources", _, "topic", "qos"):
-            return QosModel
+        case ("resources", _, *rest):
+            return QosModel if rest[-1] == "qos" else TopicModel
         case _:
             return FileModel
 

@@ -1,7 +1,7 @@
 """What the executor tells of its health: /diagnostics at 1 Hz."""
 
 import resource
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -9,9 +9,14 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import TopicReport
-from mauve_rt._kernel import ComponentDescription, allocation_counting
+from mauve_rt._kernel import ComponentDescription, RecentMaxima, allocation_counting
+from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_topics import BoundTopics
+
+_ONE = ThresholdModel(warn=1)
+_DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
+_PYTHON_DEFAULTS = DiagnosticsModel(overruns=_ONE)  # the interpreter allocates as it runs
 
 
 class Diagnostics:
@@ -25,25 +30,26 @@ class Diagnostics:
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
 
-    def publish(self) -> None:
-        """Publish once."""
-        array = DiagnosticArray(status=[self._component(part) for part in self._runtime.components()])
+    def publish(self, *, error: str = "") -> None:
+        """Publish once; `error`: why the last lifecycle transition failed."""
+        maxima = {recent.component: recent for recent in self._runtime.take_recent_maxima()}
+        parts = [part for part in self._runtime.components() if part.name in maxima]
+        array = DiagnosticArray(status=[self._component(part, maxima[part.name]) for part in parts])
         array.header.stamp = self._node.get_clock().now().to_msg()
         others = self._topics.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._topics.reports()]
-        array.status.append(self._process())
+        array.status.append(self._process(error))
         self._publisher.publish(array)
 
-    def _component(self, part: ComponentDescription) -> Any:
-        level, message = DiagnosticStatus.OK, part.state.lower()
-        remarks = self._remarks(part)
+    def _component(self, part: ComponentDescription, recent: RecentMaxima) -> Any:
+        remarks = [*self._remarks(part, recent)]
         if part.state == "FAULTED":
-            level, message = DiagnosticStatus.ERROR, part.fault
+            remarks = [(DiagnosticStatus.ERROR, part.fault)]
         elif part.fell_back:
-            words = [f"fallback core {part.core} runs after a fault: {part.fault}", *remarks]
-            level, message = DiagnosticStatus.WARN, "; ".join(words)
-        elif remarks:
-            level, message = DiagnosticStatus.WARN, f"{', '.join(remarks)} since the last status"
+            text = f"fallback core {part.core} runs after a fault: {part.fault}"
+            remarks.insert(0, (DiagnosticStatus.WARN, text))
+        level = max((level for level, _ in remarks), default=DiagnosticStatus.OK)
+        message = "; ".join(text for _, text in remarks) or part.state.lower()
         values: dict[str, object] = {
             "core": part.core,
             "state": part.current_state,
@@ -53,22 +59,45 @@ class Diagnostics:
             "wakeup_p50_ns": part.wakeup_p50_ns,
             "wakeup_p99_ns": part.wakeup_p99_ns,
             "wakeup_max_ns": part.wakeup_max_ns,
+            "wakeup_recent_max_ns": recent.wakeup_ns,
             "allocations": part.allocations,
             "page_faults": part.page_faults,
         }
         for time in part.execution_times:
             values[f"execution_mean_ns[{time.state}]"] = time.mean_ns
             values[f"execution_max_ns[{time.state}]"] = time.max_ns
+            values[f"execution_recent_max_ns[{time.state}]"] = recent.execution_ns.get(time.state, 0)
         return self._status(part.name, level, message, values)
 
-    def _remarks(self, part: ComponentDescription) -> list[str]:
-        """What went up that should not have. The interpreter allocates as it runs: that is no remark."""
-        counts = {"overruns": self._more(part.name, "overruns", part.overruns)}
-        allocations = self._more(part.name, "allocations", part.allocations)
-        page_faults = self._more(part.name, "page_faults", part.page_faults)
-        if not self._has_python_parts(part):
-            counts |= {"allocations": allocations, "page faults": page_faults}
-        return [f"{count} {what}" for what, count in counts.items() if count > 0]
+    def _remarks(self, part: ComponentDescription, recent: RecentMaxima) -> Iterator[tuple[bytes, str]]:
+        """What reached a threshold since the last status: level; measured beside allowed figure."""
+        thresholds = self._thresholds(part)
+        figures = [
+            ("wakeup_max_us", "", recent.wakeup_ns / 1000),
+            *(
+                ("execution_max_us", f" in state {state}", time_ns / 1000)
+                for state, time_ns in recent.execution_ns.items()
+            ),
+            *(
+                (count, "", self._more(part.name, count, getattr(part, count)))
+                for count in ("overruns", "skipped", "allocations", "page_faults")
+            ),
+        ]
+        for key, where, measured in figures:
+            threshold: ThresholdModel | None = getattr(thresholds, key)
+            if threshold is None:
+                continue
+            for level, word, limit in (
+                (DiagnosticStatus.ERROR, "error", threshold.error),
+                (DiagnosticStatus.WARN, "warning", threshold.warn),
+            ):
+                if limit is not None and measured >= limit:
+                    yield level, f"{key}{where} {measured:.10g}, {word} from {limit:.10g} on"
+                    break
+
+    def _thresholds(self, part: ComponentDescription) -> DiagnosticsModel:
+        defaults = _PYTHON_DEFAULTS if self._has_python_parts(part) else _DEFAULTS
+        return defaults.overridden_by(self._runtime.diagnostics(part.name))
 
     def _topic(self, report: TopicReport, other_types: Sequence[str] | None) -> Any:
         troubles = report.troubles
@@ -109,12 +138,14 @@ class Diagnostics:
         plugins = [find("shell", part.shell), find("core", part.core), find("fsm", part.fsm)]
         return any(plugin is not None and plugin.is_python for plugin in plugins)
 
-    def _process(self) -> Any:
+    def _process(self, error: str) -> Any:
         status = self._runtime.realtime_status()
         missing = list(status.missing) if status is not None else []
         usage = resource.getrusage(resource.RUSAGE_SELF)
         level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
         message = "without real-time rights" if missing else "real-time rights granted"
+        if error:
+            level, message = DiagnosticStatus.ERROR, error
         values = {
             "epoch": self._runtime.epoch,
             "missing": "; ".join(missing),

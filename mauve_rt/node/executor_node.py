@@ -66,7 +66,7 @@ class ExecutorNode(LifecycleNode):
             control_group=control_group,
             query_group=query_group,
         )
-        self.create_timer(1.0, self._diagnostics.publish, callback_group=query_group)
+        self.create_timer(1.0, self._tell_health, callback_group=query_group)
         self.add_on_set_parameters_callback(_refuse_sim_time)
 
     # ---- transitions
@@ -181,6 +181,9 @@ class ExecutorNode(LifecycleNode):
         self._recording.stop(self)
         self._topics.close()
         self._runtime.cleanup()
+
+    def _tell_health(self) -> None:
+        self._diagnostics.publish(error=self._state.error)
 
     def _log_realtime(self) -> None:
         status = self._runtime.realtime_status()

@@ -12,10 +12,11 @@ from mauve_rt._kernel import (
     Deployer,
     PluginRegistry,
     RealtimeStatus,
+    RecentMaxima,
 )
 from mauve_rt.errors import MauveError
 from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
-from mauve_rt.model.schema import ComponentModel
+from mauve_rt.model.schema import ComponentModel, DiagnosticsModel
 
 
 class StillRunningError(MauveError):
@@ -182,6 +183,11 @@ class Runtime:
         architecture = self._architecture
         return architecture.components() if architecture is not None else []
 
+    def take_recent_maxima(self) -> list[RecentMaxima]:
+        """The largest figures of every component since the last call; none while unconfigured."""
+        architecture = self._architecture
+        return architecture.take_recent_maxima() if architecture is not None else []
+
     def realtime_status(self) -> RealtimeStatus | None:
         """What was granted of the real-time rights; None while unconfigured."""
         deployer = self._deployer
@@ -211,6 +217,12 @@ class Runtime:
     def declared(self, component: str) -> ComponentModel:
         """What the file, or the request that added it, says of a component."""
         return self._declared[component].model
+
+    def diagnostics(self, component: str) -> DiagnosticsModel:
+        """The thresholds of a component: the executor's, overridden by its own. From any thread."""
+        model, declared = self._model, self._declared.get(component)
+        everybodys = DiagnosticsModel() if model is None else model.diagnostics
+        return everybodys if declared is None else everybodys.overridden_by(declared.model.diagnostics)
 
     def declare(self, *, added: Mapping[str, ComponentModel], removed: Iterable[str]) -> None:
         """Note what a transaction added and removed."""

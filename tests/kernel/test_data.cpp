@@ -130,5 +130,17 @@ TEST(LatencyHistogram, QuantilesAreWithinAnEighth) {
   EXPECT_EQ(10'000, histogram.max_ns());
 }
 
+TEST(Maximum, IsKeptSinceTheStartAndSinceItWasTaken) {
+  Maximum maximum;
+  EXPECT_EQ(0, maximum.take_recent_ns());
+  maximum.record(30);
+  maximum.record(10);
+  EXPECT_EQ(30, maximum.take_recent_ns());
+  maximum.record(20);
+  EXPECT_EQ(20, maximum.take_recent_ns());
+  EXPECT_EQ(0, maximum.take_recent_ns());
+  EXPECT_EQ(30, maximum.max_ns());
+}
+
 }  // namespace
 }  // namespace mauve::testing

@@ -49,6 +49,36 @@ BAD = {
         "peer: [robot_2",
         "unknown key 'peer' in 'executor'; did you mean peers?",
     ),
+    "diagnostics key": (
+        "priority: 40",
+        "diagnostics: {overrun: {warn: 1}}",
+        "overrun: {warn",
+        "unknown key 'overrun' in diagnostics of component 'source'; did you mean overruns?",
+    ),
+    "threshold key": (
+        "peers: [robot_2, robot_3]",
+        "diagnostics: {skipped: {wran: 1}}",
+        "wran: 1",
+        "unknown key 'wran' in 'executor.diagnostics.skipped'; did you mean warn?",
+    ),
+    "threshold": (
+        "priority: 40",
+        "diagnostics: {wakeup_max_us: {warn: 0}}",
+        "0}}",
+        "bad warn in diagnostics.wakeup_max_us of component 'source': expected more than 0, found 0",
+    ),
+    "threshold order": (
+        "priority: 40",
+        "diagnostics: {overruns: {warn: 5, error: 2}}",
+        "overruns: {warn",
+        "bad overruns in diagnostics of component 'source': expected an error that is no less than warn",
+    ),
+    "threshold of nothing": (
+        "priority: 40",
+        "diagnostics: {overruns: {}}",
+        "overruns: {}",
+        "bad overruns in diagnostics of component 'source': expected warn or error or both of them",
+    ),
     "duplicate key": ("  sink:\n", "  source:\n", "source:", "key 'source' given twice"),
     "missing key": ("    core: executor_tests/Counter\n", "", "sink:", "component 'sink' has no 'core'"),
     "unknown component": (

@@ -38,13 +38,14 @@ class Health:
             lambda: int(self.values(part).get("releases", "0")) >= count, f"{count} releases of {part}"
         )
 
-    def remarks(self, part: str, what: str) -> list[str]:
-        """Warnings about it."""
+    def remarks(self, part: str, what: str, level: bytes = DiagnosticStatus.WARN) -> list[str]:
+        """What statuses of that level say of it."""
         return [
-            status.message
-            for status in self.of(part)
-            if status.level == DiagnosticStatus.WARN and what in status.message
+            status.message for status in self.of(part) if status.level == level and what in status.message
         ]
+
+    def await_remark(self, part: str, what: str, level: bytes) -> None:
+        self._graph.spin_until(lambda: bool(self.remarks(part, what, level)), f"'{what}' of {part}")
 
 
 def test_each_component_s_figures_are_told(executor: Any, graph: Any) -> None:
@@ -63,21 +64,37 @@ def test_each_component_s_figures_are_told(executor: Any, graph: Any) -> None:
     assert (health.values("process")["allocation_counting"] == "none") == (allocation_counting() == "none")
 
 
-def test_a_component_that_allocates_is_told_of(
+def test_figures_are_held_against_the_thresholds_of_the_file(
     architecture: Path, start_executor: Callable[..., Any], graph: Any
 ) -> None:
     text = architecture.read_text(encoding="utf-8")
     text = text.replace(
         "guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter",
-        "guard: {shell: executor_tests/CounterShell, core: executor_tests/Wasteful",
+        "guard: {diagnostics: {allocations: {warn: 1, error: 4}}, "
+        "shell: executor_tests/CounterShell, core: executor_tests/Wasteful",
     )
+    text = text.replace("/robot_1}", "/robot_1, diagnostics: {wakeup_max_us: {warn: 0.001}}}")
+    own = "diagnostics: {wakeup_max_us: null, execution_max_us: {error: 0.001}}"
+    text = text.replace("priority: 40", f"priority: 40, {own}")
     architecture.write_text(text, encoding="utf-8")
     start_executor("-p", f"architecture:={architecture}")
     health = Health(graph)
     health.await_releases("guard", 20)
     assert int(health.values("guard")["allocations"]) >= 4 * 19
-    graph.spin_until(lambda: bool(health.remarks("guard", "allocations")), "a warning")
-    assert not health.remarks("counter", "allocations")
+    health.await_remark("guard", ", error from 4 on", DiagnosticStatus.ERROR)
+    health.await_remark("counter", "execution_max_us in state Count ", DiagnosticStatus.ERROR)
+    assert not any("allocations" in status.message for status in health.of("counter"))
+    assert not any("wakeup" in status.message for status in health.of("counter")), "switched off"
+    message = health.remarks("guard", "wakeup", DiagnosticStatus.ERROR)[-1]
+    (wakeup,) = [words.split() for words in message.split("; ") if words.startswith("wakeup_max_us ")]
+    assert float(wakeup[1].rstrip(",")) > 0.001
+    assert wakeup[2:] == ["warning", "from", "0.001", "on"]
+    # It is woken every five seconds: what was wrong a second ago is told once.
+    health.await_remark("sleepy", "wakeup_max_us ", DiagnosticStatus.WARN)
+    health.await_remark("sleepy", "running", DiagnosticStatus.OK)
+    values = health.values("guard")
+    assert 0 < int(values["wakeup_recent_max_ns"]) <= int(values["wakeup_max_ns"])
+    assert 0 < int(values["execution_recent_max_ns[Count]"]) <= int(values["execution_max_ns[Count]"])
 
 
 def test_the_interpreter_s_allocations_are_no_warning(executor: Any, graph: Any) -> None:

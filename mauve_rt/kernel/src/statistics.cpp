@@ -16,7 +16,7 @@ void LatencyHistogram::record(time_ns_t latency_ns) noexcept {
   }
   auto& count = counts_[std::min(bucket, counts_.size() - 1)];
   count.store(count.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  if (latency_ns > max_ns()) max_.store(latency_ns, std::memory_order_relaxed);
+  max_.record(latency_ns);
 }
 
 time_ns_t LatencyHistogram::quantile_ns(double quantile) const noexcept {
