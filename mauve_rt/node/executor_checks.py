@@ -48,8 +48,10 @@ def check_time(request: Request, runtime: Runtime) -> None:
     Raises:
         RefusalError: NOT_ACTIVE or WRONG_EPOCH.
     """
-    if not runtime.active:
-        text = "the executor is not active; activate it first (lifecycle)"
+    only_properties = all(step.kind == "set_property" for step in request.steps)
+    if not runtime.active and not (only_properties and runtime.configured):
+        needed = "configure" if only_properties else "activate"
+        text = f"the executor is not active; {needed} it first (lifecycle)"
         raise RefusalError(Code.NOT_ACTIVE, text)
     epoch = runtime.epoch
     if request.expected_epoch not in (0, epoch):

@@ -12,6 +12,8 @@ from rclpy.parameter import Parameter
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_diagnostics import Diagnostics
+from mauve_rt.node.executor_parameter_services import ParameterServices
+from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
@@ -47,7 +49,8 @@ class ExecutorNode(LifecycleNode):
         Raises:
             ParameterError: a parameter of the wrong type, or `use_sim_time`.
         """
-        super().__init__(NODE_NAME, namespace=namespace)  # transitions are in the node's default group
+        # Transitions are in the node's default group.
+        super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
         control_group, query_group = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self._data_group = MutuallyExclusiveCallbackGroup()
@@ -57,12 +60,21 @@ class ExecutorNode(LifecycleNode):
         self._topics = BoundTopics(self)
         self._state = StatePublisher(self, runtime, self._recording)
         self._diagnostics = Diagnostics(self, runtime, self._topics)
+        self._properties = Parameters(self, runtime)
         control = Control(runtime, phase_timeout_s=self._settings["report_phase_timeout_s"])
-        Services(
+        services = Services(
             self,
             runtime,
             control=control,
             state=self._state,
+            parameters=self._properties,
+            control_group=control_group,
+            query_group=query_group,
+        )
+        ParameterServices(
+            self,
+            self._properties,
+            services.handle,
             control_group=control_group,
             query_group=query_group,
         )
@@ -100,6 +112,7 @@ class ExecutorNode(LifecycleNode):
 
     def _configure(self) -> None:
         self._runtime.configure()
+        self._properties.follow()
         self._topics.open(self._runtime.model, self._runtime.architecture)
         bag = str(self.get_parameter("bag").value)
         if bag:
@@ -181,6 +194,7 @@ class ExecutorNode(LifecycleNode):
         self._recording.stop(self)
         self._topics.close()
         self._runtime.cleanup()
+        self._properties.follow()
 
     def _tell_health(self) -> None:
         self._diagnostics.publish(error=self._state.error)

@@ -9,9 +9,12 @@ from rclpy.lifecycle import LifecycleNode
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_messages import component_infos, realtime_status, step_reports
-from mauve_rt.node.executor_requests import Request, Step
+from mauve_rt.node.executor_parameters import Parameters
+from mauve_rt.node.executor_requests import Outcome, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_state import StatePublisher
+
+_CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "replace_shell"}
 
 
 class Services:
@@ -24,12 +27,14 @@ class Services:
         *,
         control: Control,
         state: StatePublisher,
+        parameters: Parameters,
         control_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
         self._runtime = runtime
         self._control = control
         self._state = state
+        self._parameters = parameters
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
         for service, name, translate in (
             (Stop, "~/stop", _stop),
@@ -38,6 +43,16 @@ class Services:
             (Reconfigure, "~/reconfigure", _reconfigure),
         ):
             node.create_service(service, name, self._handler(translate), callback_group=control_group)
+
+    def handle(self, request: Request) -> Outcome:
+        """Carry out a request, and tell of it. From any thread."""
+        outcome = self._control.handle(request)
+        if not outcome.replayed:
+            if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
+                self._parameters.follow()
+            self._state.refresh()
+            self._state.event(request, outcome)
+        return outcome
 
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
@@ -48,11 +63,7 @@ class Services:
 
     def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
         def handle(ros_request: Any, response: Any) -> Any:
-            request = translate(ros_request)
-            outcome = self._control.handle(request)
-            if not outcome.replayed:
-                self._state.refresh()
-                self._state.event(request, outcome)
+            outcome = self.handle(translate(ros_request))
             response.success = outcome.success
             response.code = int(outcome.code)
             response.message = outcome.message

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from mauve_rt.errors import ParameterError
+from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
+from mauve_rt.model.words import shown
 from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.node.ros_arguments import parse_ros_arguments
+from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,7 @@ class Settings:
             ParameterError: a value of the wrong type, or `use_sim_time`.
         """
         arguments = parse_ros_arguments(words, node="executor")
-        given = arguments.parameters
+        given = arguments.within(_namespace(arguments))
         if given.get("use_sim_time"):
             raise ParameterError(
                 "use_sim_time: expected false: components run by the monotonic clock; leave it out"
@@ -44,8 +45,12 @@ class Settings:
         properties = {}
         for name, value in given.items():
             component, dot, property_name = name.partition(".")
-            if dot and component != "qos_overrides" and isinstance(value, bool | int | float | str):
-                properties[component, property_name] = value
+            if not dot or component == "qos_overrides":
+                continue
+            if not isinstance(value, bool | int | float | str):
+                expected = f"expected true, false, a number or text, found {shown(value)}"
+                raise ParameterError(f"parameter {name}: {expected}", element=name)
+            properties[component, property_name] = value
         return cls(
             architecture=_typed(given, "architecture", str, ""),
             autostart=_typed(given, "autostart", bool, default=True),
@@ -71,6 +76,16 @@ class Settings:
             usage = "ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
             raise ParameterError(f"parameter 'architecture' is missing: {usage}")
         return load_architecture(Path(self.architecture), overrides=self.overrides)
+
+
+def _namespace(arguments: RosArguments) -> str:
+    """That of the node: remapped, or the one its architecture file has. A bad file is another's business."""
+    if arguments.namespace or not arguments.names_namespaces:
+        return "/" + arguments.namespace.strip("/")
+    try:
+        return load_architecture(str(arguments.parameters.get("architecture", ""))).namespace
+    except MauveError:
+        return "/"
 
 
 def _typed(given: dict[str, Any], name: str, kind: type, default: Any = None) -> Any:

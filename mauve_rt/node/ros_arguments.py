@@ -1,8 +1,8 @@
 """The part of a ROS command line to know before there is a node: the executor's file has its namespace."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,38 @@ from mauve_rt.errors import ParameterError
 
 _REMAP, _PARAMETER = ("-r", "--remap"), ("-p", "--param")
 _NAME = r"[A-Za-z_]\w*"
+_ALL_NODES = "/**"
 
 
 @dataclass(frozen=True, kw_only=True)
 class RosArguments:
-    """What `--ros-args` says to one node."""
+    """What `--ros-args` says to a node of one name."""
 
-    parameters: dict[str, Any] = field(default_factory=dict)  # later ones win, as in rcl
+    given: tuple[tuple[str, dict[str, Any]], ...] = ()  # nodes (as in a parameter file) and their parameters
+    node: str = ""
     namespace: str = ""  # of __ns:=, empty: not remapped
+
+    @property
+    def names_namespaces(self) -> bool:
+        """Whether some parameters are for nodes of certain namespaces only."""
+        return any(nodes != _ALL_NODES for nodes, _ in self.given)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters of such a node, whatever its namespace."""
+        return self._of(lambda nodes: nodes.endswith("*") or nodes.rsplit("/", 1)[-1] == self.node)
+
+    def within(self, namespace: str) -> dict[str, Any]:
+        """The parameters of the node of that namespace."""
+        full_name = f"{namespace.rstrip('/')}/{self.node}"
+        return self._of(lambda nodes: _pattern(nodes).fullmatch(full_name) is not None)
+
+    def _of(self, applies: Callable[[str], bool]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for nodes, values in self.given:
+            if applies(nodes):
+                found.update(values)  # later ones win, as in rcl
+        return found
 
 
 def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
@@ -39,16 +63,16 @@ def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
         raise ParameterError(f"remapping __node: expected a name such as boss, found {node}")
     if not re.fullmatch(f"/|(/{_NAME})+|", namespace, re.ASCII):
         raise ParameterError(f"remapping __ns: expected a full namespace such as /robot_1, found {namespace}")
-    parameters: dict[str, Any] = {}
+    given: list[tuple[str, dict[str, Any]]] = []
     for option, value in options:
         if option in _PARAMETER:
             source, separator, text = value.partition(":=")
             scope, _, name = source.rpartition(":")
             if separator and scope in ("", node):
-                parameters[name] = _parse(text)
+                given.append((_ALL_NODES, {name: _parse(text)}))
         elif option not in _REMAP:
-            parameters.update(_of_file(value, node))
-    return RosArguments(parameters=parameters, namespace=namespace)
+            given += _of_file(value)
+    return RosArguments(given=tuple(given), node=node, namespace=namespace)
 
 
 def _remapped(rules: Sequence[str], sources: Sequence[str], *, node: str) -> str:
@@ -84,18 +108,26 @@ def _parse(text: str) -> Any:
     return text if value is None else value
 
 
-def _of_file(path: str, node: str) -> dict[str, Any]:
+def _of_file(path: str) -> list[tuple[str, dict[str, Any]]]:
     try:
-        document = YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8"))
+        return [*_sections(YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8")), "")]
     except (OSError, YAMLError, ValueError, RecursionError):
-        return {}
-    found: dict[str, Any] = {}
-    for pattern, section in document.items() if isinstance(document, dict) else ():
-        applies = re.fullmatch(r"/\*\*|(/\*\*|/?[\w/]*/)?/?" + re.escape(node), str(pattern)) is not None
-        values = section.get("ros__parameters") if isinstance(section, dict) else None
-        if applies and isinstance(values, dict):
-            found.update(_flattened(values))
-    return found
+        return []
+
+
+def _sections(values: Any, nodes: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Namespaces may be nested or written out: `robot_1: {executor: {...}}` or `/robot_1/executor: {...}`."""
+    for key, value in values.items() if isinstance(values, dict) else ():
+        if key != "ros__parameters":
+            yield from _sections(value, f"{nodes}/{str(key).strip('/')}")
+        elif isinstance(value, dict):
+            yield nodes, dict(_flattened(value))
+
+
+def _pattern(nodes: str) -> re.Pattern[str]:
+    """`*` stands for one part of a name, `**` for any number of them."""
+    parts = {"**": r"(/\w+)*", "*": r"/\w+"}
+    return re.compile("".join(parts.get(part, "/" + re.escape(part)) for part in nodes.split("/")[1:]))
 
 
 def _flattened(values: dict[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

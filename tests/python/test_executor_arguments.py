@@ -1,10 +1,11 @@
 """What the executor reads of its command line before there is a node."""
 
+import re
 from pathlib import Path
 
 import pytest
 
-from mauve_rt.errors import ParameterError
+from mauve_rt.errors import ArchitectureFileError, ParameterError
 from mauve_rt.node.executor_settings import Settings
 from mauve_rt.node.ros_arguments import parse_ros_arguments
 
@@ -40,6 +41,28 @@ def test_parameter_files_and_their_wildcards(tmp_path: Path) -> None:
     given = _parse("--ros-args", "--params-file", str(file), "-p", "bag:=mine")
     assert given == {"bag": "mine", "architecture": "robot.yaml", "guidance.path_step": 2}
     assert _parse("--ros-args", "--params-file", str(tmp_path / "none.yaml")) == {}
+
+
+def test_parameters_of_one_file_for_several_robots(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(
+        "/**/executor: {ros__parameters: {guidance.path_step: 1}}\n"
+        "/*/executor: {ros__parameters: {guidance.speed: 5}}\n"
+        "/robot_1/executor: {ros__parameters: {guidance: {path_step: 2}}}\n"
+        "robot_2: {executor: {ros__parameters: {guidance: {path_step: 3}}}}\n",
+        encoding="utf-8",
+    )
+    architecture = tmp_path / "robot.yaml"
+    architecture.write_text(
+        "mauve: 1\nexecutor: {namespace: /robot_2}\n"
+        "components:\n  guidance: {shell: a/A, core: a/A, fsm: a/A}\n",
+        encoding="utf-8",
+    )
+    words = ["--ros-args", "--params-file", str(file), "-p", f"architecture:={architecture}"]
+    step, speed = ("guidance", "path_step"), ("guidance", "speed")
+    assert Settings.of([*words, "-r", "__ns:=/robot_1"]).overrides.properties == {step: 2, speed: 5}
+    assert Settings.of(words).overrides.properties == {step: 3, speed: 5}, "the namespace of the file"
+    assert Settings.of([*words, "-r", "__ns:=/"]).overrides.properties == {step: 1}
 
 
 @pytest.mark.parametrize(
@@ -87,10 +110,37 @@ def test_settings() -> None:
 @pytest.mark.parametrize(
     ("parameter", "message"),
     [
+        ("conter.step:=1", "sets a property of an unknown component; did you mean counter?"),
+        ("counter.stepp:=1", "(parameter counter.stepp); did you mean step?"),
+        ("counter.q:=1", "(parameter counter.q); known: enabled, label, list_file, period_ms, step"),
+        ("counter.step:=fast", "(parameter counter.step): expected a number, found 'fast'"),
+        ("counter.period_ms:=2.5", "(parameter counter.period_ms): expected a whole number, found 2.5"),
+        ("counter.label:=5", "(parameter counter.label): expected text, found 5; put it in quotes"),
+        ("counter.step:=10.5", "(parameter counter.step): expected at least 0 and at most 10, found 10.5"),
+    ],
+)
+def test_bad_properties(parameter: str, message: str, tmp_path: Path, plugin_prefix: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    parts = "core: executor_tests/Counter, fsm: executor_tests/CounterFsm"
+    path.write_text(
+        f"mauve: 1\ncomponents:\n  counter: {{shell: executor_tests/CounterShell, {parts}}}\n",
+        encoding="utf-8",
+    )
+    settings = Settings.of(["--ros-args", "-p", f"architecture:={path}", "-p", parameter])
+    runtime = settings.runtime()
+    with pytest.raises(ArchitectureFileError, match=re.escape(message)):
+        runtime.configure()
+    assert not runtime.configured
+
+
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
         ("use_sim_time:=true", "use_sim_time: expected false"),
         ("autostart:=5", "parameter autostart: expected true or false, found 5"),
         ("architecture:=[a]", "parameter architecture: expected text"),
         ("peers:=robot_2", "parameter peers: expected a list of names"),
+        ("guidance.path_step:=[1, 2]", r"parameter guidance.path_step: expected .* found a list of 2"),
     ],
 )
 def test_bad_settings(parameter: str, message: str) -> None:

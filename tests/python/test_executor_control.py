@@ -12,6 +12,7 @@ from mauve_rt.model import load_architecture
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.trace.records import Kind
 
 PATIENCE_S = 20.0
 FILE = """\
@@ -223,6 +224,39 @@ def test_a_refusal_names_the_step_and_changes_nothing(runtime: Runtime, control:
         assert outcome.code is code, f"{name}: {outcome.message}"
         assert not outcome.report, name
         assert _look(runtime) == before, name
+
+
+def test_properties_are_set_before_the_start_and_between_two(tmp_path: Path, plugin_prefix: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    runtime = Runtime(lambda: load_architecture(path))
+    control = Control(runtime)
+    steps = (Step("set_property", "free", "step", "2.5"), Step("set_property", "counter", "enabled", "false"))
+    refused = _ask(control, *steps)
+    assert (refused.code, "configure it first" in refused.message) == (Code.NOT_ACTIVE, True)
+    runtime.configure()
+    epoch = runtime.epoch
+    outcome = _ask(control, *steps)
+    assert outcome.success, outcome.message
+    assert outcome.epoch > epoch
+    assert {item.name: item.value for item in _part(runtime, "free").properties}["step"] == 2.5
+    assert _ask(control, *steps, Step("set_property", "free", "step", "11")).code is Code.INVALID
+    assert _ask(control, Step("set_property", "guard", "step", "2")).code is Code.NOT_RECONFIGURABLE
+    refused = _ask(control, *steps, Step("stop", "free"))
+    assert (refused.code, "activate it first" in refused.message) == (Code.NOT_ACTIVE, True)
+    runtime.activate()
+    assert {item.name: item.value for item in _part(runtime, "free").properties}["step"] == 2.5
+    runtime.deactivate()
+    runtime.cleanup()
+
+
+def test_components_stop_in_the_reverse_order_of_the_file(runtime: Runtime) -> None:
+    names = [part.name for part in runtime.components()]
+    _wait(lambda: all(part.releases > 0 for part in runtime.components()))
+    runtime.deactivate()
+    records = struct.iter_unpack("<QqqqqIHH", runtime.deployer.drain_trace().records)
+    stops = sorted((time_ns, component) for _, time_ns, *_, kind, component in records if kind == Kind.STOP)
+    assert [runtime.deployer.trace_components()[component] for _, component in stops] == names[::-1]
 
 
 def test_expected_epoch(runtime: Runtime, control: Control) -> None:

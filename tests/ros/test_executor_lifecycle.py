@@ -58,10 +58,10 @@ def test_failures_and_errors_are_told_and_leave_nothing_behind(
         assert state("bad priority of component 'counter': expected at most 98") == "unconfigured"
         architecture.write_text(good, encoding="utf-8")
         assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
-        assert state("") == "inactive"
+        assert (state(""), node.has_parameter("counter.step")) == ("inactive", True)
         assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
         assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
-        assert state("") == "finalized"
+        assert (state(""), node.has_parameter("counter.step")) == ("finalized", False)
 
 
 @pytest.mark.parametrize(
