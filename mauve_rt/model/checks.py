@@ -180,6 +180,8 @@ def property_mismatch(known: PropertyDescription, value: PropertyValue) -> Mappi
         return {"expected": wanted, "found": shown(value), "remedy": remedy, "code": "type_mismatch"}
     if isinstance(value, str | bool):
         return {}
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        return {"expected": "a number of at most 64 bits", "found": shown(value), "code": "out_of_range"}
     low = known.minimum is not None and not value >= known.minimum
     high = known.maximum is not None and not value <= known.maximum
     if not low and not high:
