@@ -35,9 +35,10 @@ LEFT_OUT = (
     "share/*/package.dsv",
     "share/ament_index/resource_index/parent_prefix_path/*",
 )
-SHEBANG = "#!/usr/bin/env python3\n"
+CONSOLE_SCRIPTS = "\n[console_scripts]\nmauve = mauve_rt.cli.main:main\n"
+SHEBANG = b"#!/usr/bin/env python3\n"
 # For the shell: start the interpreter of this program's own prefix. For Python: a string.
-OWN_PYTHON = """\
+OWN_PYTHON = b"""\
 #!/bin/sh
 '''exec' "$(dirname "$(readlink -f "$0")")/../../bin/python3" "$0" "$@"
 '''
@@ -63,9 +64,10 @@ class BuildByCMake(build_ext):
         for package in PYTHON_PACKAGES:
             if (site_packages / package).is_dir():
                 _copy_package(site_packages / package, Path(self.build_lib) / package)
-        for program in (stage / "lib" / "mauve_rt").iterdir():
-            text = program.read_text(encoding="utf-8")
-            program.write_text(text.replace(SHEBANG, OWN_PYTHON, 1), encoding="utf-8")
+        for program in (*stage.glob("lib/mauve_rt/*"), *stage.glob("lib/mauve_examples/*")):
+            content = program.read_bytes()
+            if content.startswith(SHEBANG):
+                program.write_bytes(content.replace(SHEBANG, OWN_PYTHON, 1))
         self.distribution.data_files = list(_data_files(stage, besides=site_packages))
 
 
@@ -158,7 +160,7 @@ setup(
     packages=[],
     ext_modules=[Extension("mauve_rt._kernel", sources=[])],  # a wheel for this platform and Python
     cmdclass={"build_ext": BuildByCMake},
-    entry_points={"console_scripts": ["mauve = mauve_rt.cli.main:main"]},
+    entry_points=(ROOT / "mauve_rt/cli/entry_points.txt").read_text("utf-8") + CONSOLE_SCRIPTS,
     setup_requires=_build_requirements(),
     install_requires=_run_requirements(),
 )
