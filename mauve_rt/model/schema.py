@@ -9,8 +9,8 @@
                     priority: 40, cpus: [1], offset_ms: 0, overrun: skip, properties: {range: 5.0}}
     resources:
       target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
-      scan: {kind: shared_data, type: sensor_msgs/msg/LaserScan,
-             topic: {name: scan, direction: subscribe, qos: {profile: sensor_data, deadline_ms: 200}}}
+      wanted: {kind: shared_data, type: geometry_msgs/msg/Twist,
+               topic: {name: cmd_vel, direction: subscribe, qos: {profile: sensor_data, deadline_ms: 200}}}
     connections:
       - [exploration.goal, goal.write]
 

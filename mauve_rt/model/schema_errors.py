@@ -1,6 +1,6 @@
 """What is wrong with the form of an architecture file, in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -118,6 +118,9 @@ def _is_key(details: ErrorDetails) -> bool:
     return details["loc"][-1] == "[key]"
 
 
+_RESOURCE_SECTIONS: Sequence[type[BaseModel]] = (ResourceModel, TopicModel, QosModel)  # resource, topic, qos
+
+
 def _section(location: Location) -> type[BaseModel]:
     """The schema of the section that `location` is a key of."""
     match location[:-1]:
@@ -129,10 +132,8 @@ def _section(location: Location) -> type[BaseModel]:
             return ExecutorModel
         case ("components", _):
             return ComponentModel
-        case ("resources", _):
-            return ResourceModel
         case ("resources", _, *rest):
-            return QosModel if rest[-1] == "qos" else TopicModel
+            return _RESOURCE_SECTIONS[len(rest)]
         case _:
             return FileModel
 

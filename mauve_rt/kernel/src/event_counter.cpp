@@ -5,9 +5,7 @@
 
 namespace mauve {
 
-namespace {
-
-const char* type_of(EventMessage said) {
+const char* type_of(EventMessage said) noexcept {
   switch (said) {
     case EventMessage::empty:
       return "std_msgs/msg/Empty";
@@ -17,6 +15,8 @@ const char* type_of(EventMessage said) {
       return "std_msgs/msg/UInt64";
   }
 }
+
+namespace {
 
 /// Empty has a byte too, as no message may be without a member.
 void put_signal(std::vector<std::byte>& message, EventMessage said) {

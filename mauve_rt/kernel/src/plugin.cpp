@@ -31,17 +31,21 @@ void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry
   throw Error(ErrorCode::duplicate_name, "the plug-in is registered twice", {.element = shown});
 }
 
+EventMessage event_message(const std::string& type) {
+  for (const EventMessage said : {EventMessage::empty, EventMessage::truth, EventMessage::count}) {
+    if (type == type_of(said)) return said;
+  }
+  throw Error(
+      ErrorCode::invalid_argument, "an event cannot be said by that message",
+      {.element = "type",
+       .expected = "std_msgs/msg/Empty, std_msgs/msg/Bool, std_msgs/msg/UInt64, or none, which is the last",
+       .found = type});
+}
+
 }  // namespace
 
 PluginRegistry::PluginRegistry() {
-  const auto add_event = [this](const std::string& type, EventMessage said) {
-    add_resource("event", type,
-                 [said](const ResourceParameters&) { return std::make_unique<EventCounter>(said); });
-  };
-  add_event("", EventMessage::count);
-  add_event("std_msgs/msg/UInt64", EventMessage::count);
-  add_event("std_msgs/msg/Empty", EventMessage::empty);
-  add_event("std_msgs/msg/Bool", EventMessage::truth);
+  add_resource("event", "", [](const ResourceParameters&) { return std::make_unique<EventCounter>(); });
   ports_.emplace(type_name<EventCount>(), data_ports<EventCount>());
 }
 
@@ -98,13 +102,7 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
                                                         const ResourceParameters& parameters) const {
   if (const auto found = resources_.find({kind, type}); found != resources_.end())
     return found->second(parameters);
-  if (kind == "event") {
-    throw Error(
-        ErrorCode::invalid_argument, "an event cannot be said by that message",
-        {.element = "type",
-         .expected = "std_msgs/msg/Empty, std_msgs/msg/Bool, std_msgs/msg/UInt64, or none, which is the last",
-         .found = type});
-  }
+  if (kind == "event") return std::make_unique<EventCounter>(event_message(type));
   if (kind == "latest_value" && resources_.contains({"shared_data", type})) {
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",
                 {.element = "type " + type,

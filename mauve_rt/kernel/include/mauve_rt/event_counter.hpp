@@ -28,6 +28,9 @@ enum class EventMessage : std::uint8_t {
   truth,  // std_msgs/msg/Bool, true for every raise; a false one that arrives raises nothing
 };
 
+/// The type's name. [rt]
+const char* type_of(EventMessage said) noexcept;
+
 /// Services `raise` (event) and `read` (the count, with the time of the last raise), any number of each.
 /// Raises between two reads are not lost: the count says how many there were.
 ///
