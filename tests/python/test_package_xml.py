@@ -92,6 +92,16 @@ def _types_by_name() -> set[str]:
     return set(re.findall(r"\b([a-z]\w*)/(?:msg|srv|action)/[A-Z]", text)) - OWN - {"package"}
 
 
+def _ros2_commands() -> set[str]:
+    """Packages of the verbs that sources run as `ros2 VERB ...`."""
+    files = _files(PRODUCT, "*.py")
+    return {
+        f"ros2{verb}"
+        for file in files
+        for verb in re.findall(r'\["ros2", "(\w+)"', file.read_text(encoding="utf-8"))
+    }
+
+
 def _found_by_cmake(folders: tuple[str, ...]) -> set[str]:
     keys: set[str] = set()
     for file in _files(folders, "CMakeLists.txt", "*.cmake"):
@@ -103,7 +113,7 @@ def _found_by_cmake(folders: tuple[str, ...]) -> set[str]:
 
 
 def test_what_runs_is_listed_exactly() -> None:
-    needed = _keys(_modules(PRODUCT)) | _types_by_name() | GENERATED
+    needed = _keys(_modules(PRODUCT)) | _types_by_name() | _ros2_commands() | GENERATED
     libraries = _found_by_cmake(PRODUCT)
     listed = _depends(ROOT, "depend", "exec_depend")
     assert needed - listed == set(), "add to package.xml"
