@@ -72,6 +72,7 @@ Component& Architecture::add_component(const std::string& name, const std::strin
 void Architecture::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
   require_new(find_in(resources(), name) != nullptr, "resource", name);
   resource->set_name(name);
+  prepare_outward(*resource, TopicBinding::none);
   change_lists({.added_resources = {std::move(resource)}});
 }
 
@@ -101,20 +102,18 @@ void Architecture::connect(const std::string& component_name, const std::string&
 }
 
 void Architecture::publish(const std::string& name) {
-  Resource& published = resource(name);
-  if (!published.is_serializable()) {
-    throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
-                {.element = "resource " + name,
-                 .expected = "shared_data, ring_buffer, latest_value or event",
-                 .found = published.kind()});
-  }
-  published.set_notifier(&publications_);
-  published_.push_back({&published, 0});
+  prepare_outward(resource(name), TopicBinding::publish);
 }
 
-bool Architecture::is_published(const Resource& resource) const noexcept {
-  return std::any_of(published_.begin(), published_.end(),
-                     [&resource](const Published& published) { return published.resource == &resource; });
+void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
+  if (topic != TopicBinding::none && !resource.is_serializable()) {
+    throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
+                {.element = "resource " + resource.name(),
+                 .expected = "shared_data, ring_buffer, latest_value or event",
+                 .found = resource.kind()});
+  }
+  if (topic == TopicBinding::subscribe) resource.bind_input();
+  if (topic == TopicBinding::publish || resource.client() != nullptr) resource.set_notifier(&publications_);
 }
 
 std::vector<std::shared_ptr<Component>> Architecture::components() const {
@@ -148,9 +147,9 @@ std::unique_ptr<CoreBase> Architecture::make_core(const std::string& implementat
 
 bool Architecture::next_published(std::string& resource, std::vector<std::byte>& message,
                                   time_ns_t& time_ns) {
-  for (Published& published : published_) {
-    if (!published.resource->next_sample(message, time_ns, published.seen)) continue;
-    resource = published.resource->name();
+  for (const auto& published : resources()) {
+    if (!published->next_published(message, time_ns)) continue;
+    resource = published->name();
     return true;
   }
   return false;

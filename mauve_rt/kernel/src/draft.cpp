@@ -97,10 +97,11 @@ void Draft::remove_component(const std::string& name) {
   }
 }
 
-void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource) {
+void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
   const auto names = names_of(resources_);
   if (std::find(names.begin(), names.end(), name) != names.end()) throw_taken("resource", name);
   resource->set_name(name);
+  architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});
 }
 
@@ -118,10 +119,6 @@ void Draft::remove_resource(const std::string& name) {
                  .expected = "no port",
                  .found = join(ports),
                  .remedy = "disconnect these in a step before"});
-  }
-  if (architecture_.is_published(removed)) {
-    throw Error(ErrorCode::invalid_argument, "the resource is bound to a topic",
-                {.element = "resource " + name, .remedy = "it stays for as long as the executor runs"});
   }
   const auto place = std::find_if(resources_.begin(), resources_.end(),
                                   [&](const DraftResource& each) { return each.resource.get() == &removed; });

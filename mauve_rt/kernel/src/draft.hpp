@@ -83,7 +83,7 @@ class Draft {
   /// Throws Error: duplicate_name, out_of_range (settings).
   DraftComponent& add_component(const std::string& name, const TaskSettings& settings);
   void remove_component(const std::string& name);
-  void add_resource(const std::string& name, std::shared_ptr<Resource> resource);
+  void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic);
   /// Throws Error (invalid_argument) while it is connected or bound to a topic.
   void remove_resource(const std::string& name);
   void connect(DraftComponent& component, const std::string& port, const std::string& resource,

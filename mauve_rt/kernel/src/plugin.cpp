@@ -110,6 +110,13 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
                  .found = "one with a copy constructor of its own",
                  .remedy = "use shared_data, or bounded members in the type"});
   }
+  if (kind == "client") {
+    throw Error(ErrorCode::unknown_type, "the type of call is not registered",
+                {.element = "type " + type,
+                 .expected = "one of " + join(names("call_type")),
+                 .found = type,
+                 .remedy = "check the name, and that a package registers it among its plug-ins"});
+  }
   if (kind == "shared_data" || kind == "ring_buffer" || kind == "latest_value") throw_unknown_type(type);
   throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
               {.element = "kind " + kind,
@@ -160,12 +167,16 @@ std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
     add_keys(cores_);
   } else if (kind == "fsm") {
     add_keys(fsms_);
-  } else if (kind == "resource" || kind == "type") {
-    for (const auto& [key, factory] : resources_) found.insert(kind == "type" ? key.second : key.first);
+  } else if (kind == "resource") {
+    for (const auto& [key, factory] : resources_) found.insert(key.first);
+  } else if (kind == "type" || kind == "call_type") {
+    for (const auto& [key, factory] : resources_) {
+      if ((key.first == "client") == (kind == "call_type")) found.insert(key.second);
+    }
     found.erase("");
   } else {
     throw Error(ErrorCode::invalid_argument, "there is no such kind of plug-in",
-                {.expected = "shell, core, fsm, resource or type", .found = kind});
+                {.expected = "shell, core, fsm, resource, type or call_type", .found = kind});
   }
   return {found.begin(), found.end()};
 }

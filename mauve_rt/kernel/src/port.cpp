@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include "mauve_rt/call_type.hpp"
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/resource.hpp"
 
@@ -21,6 +22,11 @@ std::string_view to_string(PortKind kind) noexcept {
       return "event";
   }
   return "unknown";
+}
+
+CallOutcome ServiceBase::call_serialized(std::span<const std::byte> /*request*/,
+                                         std::vector<std::byte>& /*reply*/) {
+  return CallOutcome::malformed;
 }
 
 void ServiceBase::check_ports(std::uint32_t wanted) const {

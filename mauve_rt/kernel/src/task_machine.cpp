@@ -163,6 +163,24 @@ void Task::signal_event() noexcept {
   }
 }
 
+void Task::await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept {
+  for (;;) {
+    const std::uint32_t control = control_.load(std::memory_order_acquire);
+    if (word.load(std::memory_order_acquire) == number || (control & (kStop | kExit)) != 0) return;
+    if ((control & kAwaited) != 0) {
+      // Of an earlier wait, or the word was set since the look at it; cleared, the next signal changes control_.
+      control_.fetch_and(~kAwaited, std::memory_order_acq_rel);
+    } else if (!futex_wait_until(control_, control, until_ns)) {
+      return;
+    }
+  }
+}
+
+void Task::signal_awaited() noexcept {
+  control_.fetch_or(kAwaited, std::memory_order_acq_rel);
+  futex_wake_all(control_);
+}
+
 void Task::handle_overrun(const State& state, time_ns_t now_ns) {
   const time_ns_t missed = clock_ns();
   const time_ns_t period = grid_.period_ns;

@@ -29,6 +29,8 @@ constexpr std::size_t kPrefaultedStackBytes = std::size_t{64} * 1024;
   for (std::size_t offset = 0; offset < size; offset += kPage) pages[offset] = 0;
 }
 
+thread_local Task* task_of_this_thread = nullptr;
+
 struct ThreadAttributes {
   pthread_attr_t value;
   ThreadAttributes() { pthread_attr_init(&value); }
@@ -96,6 +98,8 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   }
 }
 
+Task* Task::of_this_thread() noexcept { return task_of_this_thread; }
+
 void* Task::thread_entry(void* self) noexcept {
   static_cast<Task*>(self)->thread_main();
   return nullptr;
@@ -104,6 +108,7 @@ void* Task::thread_entry(void* self) noexcept {
 void Task::thread_main() noexcept {
   pthread_setname_np(pthread_self(), name_.substr(0, 15).c_str());
   prefault_stack(settings_.stack_bytes);
+  task_of_this_thread = this;
   TraceRing::set_for_this_thread(ring_.get());
   prctl(PR_SET_TIMERSLACK, 1UL);  // of use where SCHED_FIFO was refused
   counters_.attach();

@@ -140,16 +140,18 @@ Transaction& Transaction::remove_component(const std::string& name) {
 }
 
 Transaction& Transaction::add_resource(const std::string& name, const std::string& kind,
-                                       const std::string& type, ResourceParameters parameters) {
+                                       const std::string& type, ResourceParameters parameters,
+                                       TopicBinding topic) {
   std::string text = "add_resource " + name + " " + kind + (type.empty() ? "" : " " + type);
-  return add(step(std::move(text), {}, [name, kind, type, parameters](Draft& draft) {
-    draft.add_resource(name, draft.registry().make_resource(kind, type, parameters));
+  return add(step(std::move(text), {}, [name, kind, type, parameters, topic](Draft& draft) {
+    draft.add_resource(name, draft.registry().make_resource(kind, type, parameters), topic);
   }));
 }
-Transaction& Transaction::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
+Transaction& Transaction::add_resource(const std::string& name, std::unique_ptr<Resource> resource,
+                                       TopicBinding topic) {
   std::string text = "add_resource " + name + (resource != nullptr ? " " + resource->kind() : "");
-  return add(step(std::move(text), {}, [name, resource = std::move(resource)](Draft& draft) mutable {
-    draft.add_resource(name, take(resource));
+  return add(step(std::move(text), {}, [name, resource = std::move(resource), topic](Draft& draft) mutable {
+    draft.add_resource(name, take(resource), topic);
   }));
 }
 

@@ -46,7 +46,6 @@ struct ListChange {
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
-/// | published_                      | [setup]               | one     | -                              |
 /// | leaving_                        | who changes it        | same    | -                              |
 /// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
 /// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
@@ -89,9 +88,9 @@ class Architecture final : public Configurable {
   void connect(const std::string& component, const std::string& port, const std::string& resource,
                const std::string& service);
 
-  /// Marks a resource as bound to an outgoing topic; it cannot be removed then. [setup]
+  /// Lets who carries samples out of the architecture know of every write to a resource. [setup]
+  /// Throws Error (invalid_argument) when it has no samples.
   void publish(const std::string& resource);
-  bool is_published(const Resource& resource) const noexcept;
 
   Component& component(const std::string& name) const;  // Throws Error: unknown_component
   Resource& resource(const std::string& name) const;    // Throws Error: unknown_resource
@@ -133,7 +132,11 @@ class Architecture final : public Configurable {
   /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one
   /// thread.
   bool next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns);
+  /// Told of the writes to published resources, and of clients' calls.
   Notifier& publications() noexcept { return publications_; }
+  /// Wires a resource that nobody uses yet to those who carry things in and out. [non-rt] Throws as publish(), and
+  /// as Resource::bind_input().
+  void prepare_outward(Resource& resource, TopicBinding topic);
 
   // ---- for transactions
 
@@ -152,10 +155,6 @@ class Architecture final : public Configurable {
   void retire_trace(Task& task);
 
  private:
-  struct Published {
-    Resource* resource;
-    std::uint64_t seen;
-  };
   struct Leaving {
     std::shared_ptr<Component> component;
     bool was_listed;
@@ -172,7 +171,6 @@ class Architecture final : public Configurable {
   PluginRegistry* registry_;
   ChangeSignal changes_;
   Notifier publications_;
-  std::vector<Published> published_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable std::mutex list_mutex_;
   std::vector<std::string> names_;  // by number

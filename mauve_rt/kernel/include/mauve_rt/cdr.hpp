@@ -35,6 +35,10 @@ concept Described = requires {
 template <typename T>
 concept Primitive = std::is_arithmetic_v<T>;
 
+/// A message without fields has one byte on the wire.
+template <Described T>
+inline constexpr bool kIsEmpty = std::tuple_size_v<decltype(TypeTraits<T>::fields())> == 0;
+
 /// The encapsulation header of plain CDR, little-endian.
 inline constexpr std::array<std::byte, 4> kCdrHeader{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
 
@@ -66,6 +70,7 @@ class CdrWriter {
   }
   template <Described T>
   void put(const T& value) {
+    if constexpr (kIsEmpty<T>) put(std::uint8_t{0});
     std::apply([&](auto... member) { (put(value.*member), ...); }, TypeTraits<T>::fields());
   }
 
@@ -132,6 +137,7 @@ class CdrReader {
   }
   template <Described T>
   bool get(T& value) {
+    if constexpr (kIsEmpty<T>) (void)take(1, 1);
     std::apply([&](auto... member) { (void)(get(value.*member) && ...); }, TypeTraits<T>::fields());
     return ok_;
   }

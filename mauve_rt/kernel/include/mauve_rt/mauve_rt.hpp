@@ -4,7 +4,9 @@
 
 #include "mauve_rt/architecture.hpp"
 #include "mauve_rt/bounded.hpp"
+#include "mauve_rt/call_type.hpp"
 #include "mauve_rt/cdr.hpp"
+#include "mauve_rt/client.hpp"
 #include "mauve_rt/component.hpp"
 #include "mauve_rt/core.hpp"
 #include "mauve_rt/deployer.hpp"

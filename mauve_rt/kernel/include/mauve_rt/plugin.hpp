@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/client.hpp"
 #include "mauve_rt/component.hpp"
 #include "mauve_rt/latest_value.hpp"
 #include "mauve_rt/port.hpp"
@@ -21,6 +22,7 @@ struct ResourceParameters {
   std::size_t capacity{0};                        // ring_buffer
   bool overwrite{false};                          // ring_buffer
   std::uint32_t max_readers{kDefaultMaxReaders};  // latest_value
+  time_ns_t timeout_ns{kDefaultCallTimeout};      // client
 };
 
 /// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at
@@ -75,6 +77,14 @@ class PluginRegistry {
     }
   }
 
+  /// The type of a ROS service: makes clients of it possible. Ports and offered calls need no registration.
+  template <DescribedCall S>
+  void call_type() {
+    add_resource("client", std::string(CallTraits<S>::name), [](const ResourceParameters& parameters) {
+      return std::make_unique<Client<S>>(parameters.timeout_ns);
+    });
+  }
+
   // The same with a factory, for parts that are no C++ class of their own.
 
   void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
@@ -99,7 +109,7 @@ class PluginRegistry {
 
   const std::string& core_shell(const std::string& name) const;
   const std::string& fsm_shell(const std::string& name) const;
-  /// Registered names of "shell", "core", "fsm", "resource" or "type", sorted. Throws Error
+  /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
   /// (invalid_argument).
   std::vector<std::string> names(const std::string& kind) const;
 

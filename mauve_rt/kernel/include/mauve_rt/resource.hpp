@@ -15,6 +15,8 @@
 
 namespace mauve {
 
+class ClientBase;
+
 /// Tells one waiting thread that some published resource was written.
 ///
 /// | member   | written by            | order                                                                    |
@@ -79,6 +81,9 @@ class EventListeners {
   std::atomic<std::size_t> count_{0};
 };
 
+/// How a resource is bound to a topic.
+enum class TopicBinding : std::uint8_t { none, publish, subscribe };
+
 /// Derive from this to offer services of your own; a service is a member registered by offer().
 class Resource : public Configurable {
  public:
@@ -95,7 +100,7 @@ class Resource : public Configurable {
   virtual void set_name(const std::string& name) { name_ = name; }
   std::string description() const override { return "resource " + name_; }
 
-  /// Whom to tell of writes, for topics. [setup]
+  /// Whom to tell of writes and calls, for those who carry them outside. [setup]
   void set_notifier(Notifier* notifier) noexcept { notifier_ = notifier; }
   /// Whom else to tell of every write that succeeded, until unlisten(), while writers run. [non-rt]
   /// Throws Error (out_of_range) when there are too many.
@@ -117,6 +122,10 @@ class Resource : public Configurable {
                            std::uint64_t& /*seen*/) {
     return false;
   }
+  /// The next sample not handed out by this call yet, of a published one. [non-rt], one thread
+  bool next_published(std::vector<std::byte>& message, time_ns_t& time_ns) {
+    return notifier_ != nullptr && next_sample(message, time_ns, handed_out_);
+  }
   /// Looks at the newest sample without removing it; false when there is none. [non-rt]
   virtual bool peek_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
                            std::uint64_t& /*sequence*/) {
@@ -126,14 +135,21 @@ class Resource : public Configurable {
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
 
+  /// What it is seen from those who carry its calls; nullptr: no client. [rt]
+  virtual ClientBase* client() noexcept { return nullptr; }
+
  protected:
   void offer(ServiceBase& service) {
     service.resource_ = this;
     services_.push_back(&service);
   }
+  /// Tells who carries samples and calls out of the architecture. [rt]
+  void notify() noexcept {
+    if (notifier_ != nullptr) notifier_->notify();
+  }
   /// To be called by services after a write that succeeded, no lock held. [rt]
   void written(time_ns_t time_ns) noexcept {
-    if (notifier_ != nullptr) notifier_->notify();
+    notify();
     listeners_.call(time_ns);
   }
 
@@ -143,6 +159,7 @@ class Resource : public Configurable {
   std::string name_;
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};
+  std::uint64_t handed_out_{0};  // as `seen`, of next_published()
   EventListeners listeners_;
 };
 

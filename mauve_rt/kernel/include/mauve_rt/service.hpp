@@ -4,13 +4,17 @@
 
 #include <atomic>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mauve_rt/cdr.hpp"
 #include "mauve_rt/time.hpp"
 
 namespace mauve {
+
+enum class CallOutcome : std::uint8_t;  // call_type.hpp
 
 enum class PortKind : std::uint8_t { read = 1, write = 2, call = 3, event = 4 };
 
@@ -80,6 +84,11 @@ class ServiceBase {
   virtual std::string_view representation() const noexcept { return "C++"; }
   /// The resource that offers it, or nullptr. [rt]
   Resource* resource() const noexcept { return resource_; }
+
+  /// Whether the next does anything: a call whose type is a ROS service's. [rt]
+  virtual bool is_call_serializable() const noexcept { return false; }
+  /// A call by serialized messages; the reply is written when it was answered. [non-rt]
+  virtual CallOutcome call_serialized(std::span<const std::byte> request, std::vector<std::byte>& reply);
 
   /// How many ports may be connected at once; 0: any number. [rt]
   virtual std::uint32_t max_ports() const noexcept { return 0; }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/call_type.hpp"
 #include "mauve_rt/configurable.hpp"
 #include "mauve_rt/port.hpp"
 #include "mauve_rt/property.hpp"
@@ -45,6 +46,11 @@ class Shell : public Configurable {
   template <typename Signature>
   CallPort<Signature>& call_port(std::string name, std::string type) {
     return add(ports_, std::make_unique<CallPort<Signature>>(std::move(name), std::move(type)));
+  }
+  /// A port for calls of a type that was declared by MAUVE_CALL_TYPE.
+  template <DescribedCall S>
+  CallPort<CallOf<S>>& call_port(std::string name) {
+    return call_port<CallOf<S>>(std::move(name), std::string(CallTraits<S>::name));
   }
   /// A port whose type is known at run time only.
   PortBase& add_port(std::unique_ptr<PortBase> port) { return add(ports_, std::move(port)); }

@@ -176,6 +176,19 @@ class Task {
   /// Tells the machine that an event it may wait for has come. [rt]
   void signal_event() noexcept;
 
+  // ---- a wait within a state, for what another thread does
+
+  /// The task whose thread this is, or nullptr. [rt]
+  static Task* of_this_thread() noexcept;
+  /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
+  /// the task's thread. Who sets the word calls signal_awaited() then.
+  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept;
+  void signal_awaited() noexcept;
+  /// Whether the state under way is the last before a park. [rt]
+  bool is_to_stop() const noexcept {
+    return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  }
+
   /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component
   /// FAULTED, writes its outputs and takes the thread's priority away. Returns whether it did. [non-rt]
   bool check_execution(time_ns_t now_ns);
@@ -207,7 +220,8 @@ class Task {
   std::uint16_t number() const noexcept { return number_; }
 
  private:
-  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16;  // of control_
+  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16,
+                                 kAwaited = 32;                        // of control_
   enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
 
   // commands

@@ -78,9 +78,11 @@ class Transaction {
   }
   /// It is parked, its outputs written as on a stop, its ports disconnected.
   Transaction& remove_component(const std::string& name);
+  /// `topic`: as Architecture::publish() or Resource::bind_input().
   Transaction& add_resource(const std::string& name, const std::string& kind, const std::string& type,
-                            ResourceParameters parameters = {});
-  Transaction& add_resource(const std::string& name, std::unique_ptr<Resource> resource);
+                            ResourceParameters parameters = {}, TopicBinding topic = TopicBinding::none);
+  Transaction& add_resource(const std::string& name, std::unique_ptr<Resource> resource,
+                            TopicBinding topic = TopicBinding::none);
   /// Refused while a port is connected to it.
   Transaction& remove_resource(const std::string& name);
   /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.
