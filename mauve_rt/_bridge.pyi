@@ -1,4 +1,6 @@
-"""Resources on ROS topics, natively, on a node of rclpy's. C++: mauve_rt/bridge."""
+"""Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge."""
+
+from typing import overload
 
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""
@@ -45,26 +47,72 @@ class TopicReport:
     @property
     def troubles(self) -> TopicTroubles: ...
 
+class CallCounts:
+    """How calls ended so far."""
+
+    @property
+    def answered(self) -> int: ...
+    @property
+    def no_server(self) -> int: ...
+    @property
+    def timed_out(self) -> int: ...
+    @property
+    def other(self) -> int:
+        """Busy, malformed, or given up for a stop; of an offered call: refused by the resource."""
+    @property
+    def longest_ns(self) -> int:
+        """The longest of those answered."""
+
+class CallReport:
+    """A ROS service that a resource calls or offers: its name, expanded and remapped, and counts."""
+
+    @property
+    def resource(self) -> str: ...
+    @property
+    def service(self) -> str: ...
+    @property
+    def is_offered(self) -> bool: ...
+    @property
+    def counts(self) -> CallCounts: ...
+
 class Bridge:
-    """The topics of an architecture. One thread of its own sends, another receives."""
+    """The topics and services of an architecture, by threads of its own: one sends, the others receive.
+
+    What is opened can be found on the network; it serves its resource from attach() on.
+    """
 
     def __init__(self, node: int, architecture: int) -> None:
         """Take addresses: `node.handle.pointer`, `architecture.pointer`; both outlive the bridge."""
     def publish(self, resource: str, topic: str, type: str, qos: Qos) -> int:
-        """Bind a resource to a topic; returns the topic's number in the log.
+        """Open a topic for a resource; returns the number of what was opened, also in the log.
 
         Raises:
-            MauveError: the type is not installed, or the middleware refuses; nothing is bound then.
+            MauveError: the type is not installed, or the middleware refuses; nothing is open then.
         """
     def subscribe(self, resource: str, topic: str, type: str, qos: Qos) -> int:
         """As publish(), the other way."""
+    def call(self, resource: str, service: str, type: str) -> int:
+        """Open a ROS service that answers a client's calls; as publish()."""
+    def offer(self, resource: str, service: str, type: str, offered: str) -> int:
+        """Open a ROS service that a resource's call `offered` answers; as publish()."""
+    def attach(self, numbers: list[int]) -> None:
+        """Let these serve the resources of their names in the architecture.
+
+        Raises:
+            MauveError: there is no such resource, or it is none to serve.
+        """
+    @overload
+    def close(self, numbers: list[int]) -> None:
+        """End these; what was written before is sent."""
+    @overload
+    def close(self) -> None:
+        """stop(), and end all."""
     def start(self) -> None:
         """Let messages flow, both ways."""
     def stop(self) -> None:
         """End the flow when what was written before is sent. May be called again."""
-    def close(self) -> None:
-        """stop(), and no topic is bound any more."""
-    def reports(self) -> list[TopicReport]: ...
+    def topics(self) -> list[TopicReport]: ...
+    def calls(self) -> list[CallReport]: ...
     def log(self, on: bool) -> None:
         """Keep messages for take_log() from now on, or do not."""
     def take_log(self) -> list[tuple[int, int, bytes]]:

@@ -62,11 +62,12 @@ class ServiceDescription:
     name: Final[str]
     kind: Final[str]  # as PortDescription.kind: the kind of port that connects to it
     type: Final[str]
+    takes_messages: Final[bool]  # a call that can be a ROS service
 
 @final
 class ResourceDescription:
     name: Final[str]
-    kind: Final[str]  # 'shared_data', 'ring_buffer', 'latest_value', 'event', or the plug-in's name
+    kind: Final[str]  # 'shared_data', 'ring_buffer', 'latest_value', 'event', 'client', or the plug-in's name
     type: Final[str]
     services: Final[list[ServiceDescription]]
 
@@ -333,7 +334,7 @@ class Transaction:
         """It arrives STOPPED; a start step starts it."""
     def remove_component(self, name: str) -> Transaction: ...
     @overload
-    def add_resource(self, name: str, resource: AnyResource) -> Transaction: ...
+    def add_resource(self, name: str, resource: AnyResource, *, topic: str = "") -> Transaction: ...
     @overload
     def add_resource(
         self,
@@ -344,7 +345,10 @@ class Transaction:
         capacity: int = 0,
         overwrite: bool = False,
         max_readers: int = 14,
-    ) -> Transaction: ...
+        timeout_ns: int = 100_000_000,
+        topic: str = "",
+    ) -> Transaction:
+        """As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''."""
     def remove_resource(self, name: str) -> Transaction:
         """Refused while a port is connected to it."""
     def start(self, component: str, clock_ns: int | None = None) -> Transaction: ...
@@ -395,10 +399,12 @@ class Architecture:
         capacity: int = 0,
         overwrite: bool = False,
         max_readers: int = 14,
+        timeout_ns: int = 100_000_000,
     ) -> None:
         """Adds a resource of a given kind or a plug-in's.
 
-        Given: 'shared_data', 'ring_buffer' (capacity, overwrite), 'latest_value' (max_readers), 'event'.
+        Given: 'shared_data', 'ring_buffer' (capacity, overwrite), 'latest_value' (max_readers), 'event',
+        'client' (timeout_ns).
         """
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
     def set_property(self, component: str, name: str, value: PropertyValue) -> None:

@@ -35,8 +35,8 @@ PropertyDescription describe_property(const ShownProperty& property) {
 ResourceDescription describe_resource(const Resource& resource) {
   ResourceDescription description{resource.name(), resource.kind(), resource.type(), {}};
   for (const ServiceBase* service : resource.services()) {
-    description.services.push_back(
-        {service->name(), std::string(to_string(service->kind())), service->type()});
+    description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
+                                    service->is_call_serializable()});
   }
   return description;
 }
@@ -131,7 +131,8 @@ void bind_descriptions(py::module_& module) {
   py::class_<ServiceDescription>(module, "ServiceDescription")
       .def_readonly("name", &ServiceDescription::name)
       .def_readonly("kind", &ServiceDescription::kind)
-      .def_readonly("type", &ServiceDescription::type);
+      .def_readonly("type", &ServiceDescription::type)
+      .def_readonly("takes_messages", &ServiceDescription::takes_messages);
   py::class_<ResourceDescription>(module, "ResourceDescription")
       .def_readonly("name", &ResourceDescription::name)
       .def_readonly("kind", &ResourceDescription::kind)

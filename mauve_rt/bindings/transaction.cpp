@@ -30,6 +30,14 @@ PyTransaction& add_component(Self self, const std::string& name, const py::objec
   });
 }
 
+TopicBinding topic_binding(const std::string& name) {
+  if (name.empty()) return TopicBinding::none;
+  if (name == "publish") return TopicBinding::publish;
+  if (name == "subscribe") return TopicBinding::subscribe;
+  throw Error(ErrorCode::invalid_argument, "there is no such way to bind a resource to a topic",
+              {.element = "topic", .expected = "publish, subscribe or nothing", .found = name});
+}
+
 bool is_name(const py::object& part) { return py::isinstance<py::str>(part); }
 
 void bind_replacements(py::class_<PyTransaction>& transaction) {
@@ -105,23 +113,30 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
           py::arg("name"))
       .def(
           "add_resource",
-          [](Self self, const std::string& name, const py::object& resource) -> Self {
+          [](Self self, const std::string& name, const py::object& resource,
+             const std::string& topic) -> Self {
+            const TopicBinding binding = topic_binding(topic);
             return self.add([=](Steps steps, Registry registry) {
-              steps.add_resource(name, make_resource(resource, registry));
+              steps.add_resource(name, make_resource(resource, registry), binding);
             });
           },
-          py::arg("name"), py::arg("resource"))
+          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("topic") = "")
       .def(
           "add_resource",
           [](Self self, const std::string& name, const std::string& kind, const std::string& type,
-             std::size_t capacity, bool overwrite, std::uint32_t max_readers) -> Self {
-            return self.add([=](Steps steps, Registry) {
-              steps.add_resource(name, kind, type,
-                                 {.capacity = capacity, .overwrite = overwrite, .max_readers = max_readers});
-            });
+             std::size_t capacity, bool overwrite, std::uint32_t max_readers, time_ns_t timeout_ns,
+             const std::string& topic) -> Self {
+            const TopicBinding binding = topic_binding(topic);
+            const ResourceParameters parameters{.capacity = capacity,
+                                                .overwrite = overwrite,
+                                                .max_readers = max_readers,
+                                                .timeout_ns = timeout_ns};
+            return self.add(
+                [=](Steps steps, Registry) { steps.add_resource(name, kind, type, parameters, binding); });
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
-          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders)
+          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders,
+          py::arg("timeout_ns") = kDefaultCallTimeout, py::arg("topic") = "")
       .def(
           "remove_resource",
           [](Self self, const std::string& name) -> Self {

@@ -91,6 +91,7 @@ struct ServiceDescription {
   std::string name;
   std::string kind;
   std::string type;
+  bool takes_messages;
 };
 struct ResourceDescription {
   std::string name;

@@ -195,9 +195,9 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
             expected = f"{', '.join(EVENT_TYPES)}, or none, which is the last"
             yield model.problem((*location, "type"), what, expected=expected, found=resource.type)
         if resource.kind in GIVEN_RESOURCES and resource.kind != "event" and not resource.type:
-            yield model.problem(
-                location, f"resource '{name}' has no type", expected="e.g. geometry_msgs/msg/Point"
-            )
+            example = "std_srvs/srv/SetBool" if resource.kind == "client" else "geometry_msgs/msg/Point"
+            yield model.problem(location, f"resource '{name}' has no type", expected=f"e.g. {example}")
+        yield from _service_problems(model, name)
         for key, kind in (
             ("capacity", "ring_buffer"),
             ("overwrite", "ring_buffer"),
@@ -206,6 +206,32 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
             if resource.kind != kind and key in resource.model_fields_set:
                 what = f"resource '{name}' of kind {resource.kind} has no {key}"
                 yield model.key_problem((*location, key), what, remedy=f"only a {kind} has one")
+
+
+def _service_problems(model: ArchitectureModel, name: str) -> Iterator[Problem]:
+    """A client calls a ROS service; any other resource may offer a call of its own as one."""
+    resource, location = model.resources[name], ("resources", name)
+    service, is_client = resource.service, resource.kind == "client"
+    if is_client and resource.topic is not None:
+        what = f"resource '{name}' of kind client is bound to a topic"
+        yield model.key_problem((*location, "topic"), what, remedy="a client calls a service")
+    if service is None:
+        if is_client:
+            what = f"resource '{name}' of kind client calls no service"
+            yield model.problem(location, what, expected="service: {name: ...}")
+        return
+    at = (*location, "service")
+    if is_client and service.offers is not None:
+        what = f"resource '{name}' of kind client cannot offer a service"
+        yield model.key_problem((*at, "offers"), what, remedy="leave offers out; it calls the service")
+    if not is_client and service.offers is None:
+        what = f"resource '{name}' does not say which of its calls the ROS service is"
+        yield model.problem(
+            at, what, expected="offers: the name of a call", remedy="or kind: client, to call it"
+        )
+    if not is_client and "timeout_ms" in service.model_fields_set:
+        what = f"resource '{name}' of kind {resource.kind} has no timeout_ms"
+        yield model.key_problem((*at, "timeout_ms"), what, remedy="only a client has one")
 
 
 def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:

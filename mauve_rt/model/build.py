@@ -88,7 +88,9 @@ def add_resource_step(
     transaction: Transaction, model: ArchitectureModel, name: str, registry: PluginRegistry
 ) -> None:
     """Let a transaction add a resource that `model` describes."""
-    transaction.add_resource(name, **resource_part(model.resources[name], registry))
+    resource = model.resources[name]
+    direction = resource.topic.direction if resource.topic is not None else ""
+    transaction.add_resource(name, **resource_part(resource, registry), topic=direction)
 
 
 def _add_component(

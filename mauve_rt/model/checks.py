@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from mauve_rt._kernel import PortDescription, PropertyDescription, ResourceDescription, ShellDescription
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
-from mauve_rt.model.message_types import message_class
+from mauve_rt.model.message_types import message_class, service_class
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import GIVEN_RESOURCES, PropertyValue
@@ -116,16 +116,14 @@ class Checks:
                 yield from missing
                 if missing:
                     return
+            type_kind = "call_type" if resource.kind == "client" else "type"
             if resource.type:
-                self._loader.require_type(resource.type)
+                self._loader.require_type(resource.type, type_kind)
             self._resources[name] = describe_resource(resource, self._loader.registry)
         except MauveError as error:
             what = f"bad type '{resource.type}' of resource '{name}': {error}"
-            remedy = (
-                did_you_mean(resource.type, self._loader.names("type"))
-                if error.code == "unknown_type"
-                else ""
-            )
+            known = self._loader.names(type_kind)
+            remedy = did_you_mean(resource.type, known) if error.code == "unknown_type" else ""
             yield self._model.problem((*place, "type"), what, remedy=remedy, code=error.code)
             return
         if resource.topic is not None and message_class(self._resources[name].type) is None:
@@ -135,6 +133,31 @@ class Checks:
             expected = "an installed message type such as geometry_msgs/msg/Point"
             found = shown(self._resources[name].type)
             yield self._model.key_problem((*place, "topic"), what, expected=expected, found=found)
+        yield from self._service(name)
+
+    def _service(self, name: str) -> Iterator[Problem]:
+        """The ROS service that a resource calls or offers."""
+        service, described = self._model.resources[name].service, self._resources[name]
+        if service is None:
+            return
+        place: Location = ("resources", name, "service")
+        service_type, calls = described.type, {each.name: each for each in described.services}
+        if service.offers is not None:
+            offered = calls.get(service.offers)
+            if offered is None or not offered.takes_messages:
+                what = f"resource '{name}' cannot offer '{service.offers}' as a ROS service"
+                fitting = [each.name for each in described.services if each.takes_messages]
+                expected = "one of its calls with a ROS type"
+                found = shown(offered.type) if offered else f"no service '{service.offers}'"
+                remedy = did_you_mean(service.offers, fitting) if fitting else "it has none"
+                at = (*place, "offers")
+                yield self._model.problem(at, what, expected=expected, found=found, remedy=remedy)
+                return
+            service_type = offered.type
+        if service_class(service_type) is None:
+            what = f"resource '{name}' is bound to service '{service.name}', but its type is no ROS service"
+            expected = "an installed service type such as std_srvs/srv/SetBool"
+            yield self._model.key_problem(place, what, expected=expected, found=shown(service_type))
 
     def _connection(self, connection: Connection) -> Iterator[Problem]:
         shell = self._shells.get(connection.component)

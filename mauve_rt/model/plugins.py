@@ -23,7 +23,7 @@ from mauve_rt.model import ament_index
 from mauve_rt.model.words import did_you_mean
 
 INDEX_RESOURCE = "mauve_rt_plugins"
-KINDS = ("shell", "core", "fsm", "resource", "type")
+KINDS = ("shell", "core", "fsm", "resource", "type", "call_type")
 _FIELDS = 4
 
 
@@ -156,10 +156,10 @@ class PluginLoader:
             remedy = "correct the package's list of plug-ins"
             raise PluginError(f"{plugin.library} has no {kind} '{name}'", element=name, remedy=remedy)
 
-    def require_type(self, name: str) -> None:
-        """As `require("type", name)`, but leaves a type that nothing lists to the registry's own words."""
-        if self.index.find("type", name) is not None:
-            self.require("type", name)
+    def require_type(self, name: str, kind: str = "type") -> None:
+        """As require(), but leaves a type (or call_type) that nothing lists to the registry's own words."""
+        if self.index.find(kind, name) is not None:
+            self.require(kind, name)
 
     def _load_library(self, plugin: Plugin) -> None:
         if not plugin.library.is_file():

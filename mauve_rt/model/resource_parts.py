@@ -25,6 +25,7 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
         "capacity": capacity,
         "overwrite": resource.overwrite,
         "max_readers": resource.max_readers,
+        **({"timeout_ns": round(resource.service.timeout_ms * 1e6)} if resource.service else {}),
     }
 
 

@@ -9,6 +9,8 @@
                     priority: 40, cpus: [1], offset_ms: 0, overrun: skip, properties: {range: 5.0}}
     resources:
       target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
+      lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp, timeout_ms: 20}}
+      map: {kind: mauve_examples/Map, service: {name: map/clear, offers: clear}}
       wanted: {kind: shared_data, type: geometry_msgs/msg/Twist,
                topic: {name: cmd_vel, direction: subscribe, qos: {profile: sensor_data, deadline_ms: 200}}}
     connections:
@@ -39,7 +41,7 @@ from pydantic_core import PydanticCustomError
 PropertyValue = bool | int | float | str
 
 QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
-GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event")
+GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event", "client")
 # What an event's topic carries: a message a raise, true a raise, or how often it was raised (the default).
 EVENT_TYPES = ("std_msgs/msg/Empty", "std_msgs/msg/Bool", "std_msgs/msg/UInt64")
 MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
@@ -187,6 +189,14 @@ class TopicModel(_Section):
     qos: Annotated[QosModel, BeforeValidator(_qos)] = QosModel()
 
 
+class ServiceModel(_Section):
+    """The ROS service that a client calls, or that a resource offers; names as TopicModel."""
+
+    name: RosName
+    offers: Identifier | None = None  # the resource's call; absent: the resource is a client
+    timeout_ms: Annotated[float, Field(gt=0, le=1e9)] = 100.0  # of a client: no call blocks longer
+
+
 class ResourceModel(_Section):
     """Data that components share."""
 
@@ -195,6 +205,7 @@ class ResourceModel(_Section):
     capacity: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None  # elements; ring_buffer only
     overwrite: bool = False  # a full ring_buffer drops its oldest element rather than the new one
     topic: TopicModel | None = None
+    service: ServiceModel | None = None
     max_readers: Annotated[int, Field(ge=1, le=MAX_READERS)] = DEFAULT_READERS  # ports; latest_value only
     # of one message, where no plug-in registered its type: what is larger is refused and counted
     max_bytes: Annotated[int, Field(ge=1, le=MAX_MESSAGE_BYTES)] = DEFAULT_MESSAGE_BYTES

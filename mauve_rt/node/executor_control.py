@@ -1,10 +1,14 @@
 """Requests carried out or refused. Knows nothing of ROS: `executor_services` is its ROS face."""
 
 import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import Protocol
 
-from mauve_rt._kernel import StepReport, TransactionReport, monotonic_ns
+from mauve_rt._kernel import ResourceDescription, StepReport, TransactionReport, monotonic_ns
 from mauve_rt.errors import MauveError, error_code, one_line
+from mauve_rt.model.schema import ResourceModel
 from mauve_rt.node.executor_checks import check_form, check_state, check_time
 from mauve_rt.node.executor_requests import (
     NOT_MEASURED,
@@ -18,18 +22,46 @@ from mauve_rt.node.executor_requests import (
     code_of,
 )
 from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.node.executor_steps import Plan
+from mauve_rt.node.executor_steps import Bound, Plan
 
 DEFAULT_TIMEOUT_S = 1.0
 _STOP_SLICE_NS = 100_000_000
 
 
+class Outside(Protocol):
+    """What binds resources to topics and services; see `executor_bound_resources`."""
+
+    def open(
+        self, resources: Mapping[str, ResourceModel], described: Mapping[str, ResourceDescription]
+    ) -> dict[str, list[int]]:
+        """Open what resources to come are bound to.
+
+        Raises:
+            MauveError: nothing is open then.
+        """
+
+    def attach(self, opened: Mapping[str, list[int]]) -> None:
+        """They are there: let what was opened serve them."""
+
+    def discard(self, opened: Mapping[str, list[int]]) -> None:
+        """They did not come."""
+
+    def remove(self, resources: Iterable[str]) -> None:
+        """These are gone."""
+
+
 class Control:
     """Carries out one request at a time. handle() may be called from any thread."""
 
-    def __init__(self, runtime: Runtime, *, phase_timeout_s: float = 1.0) -> None:
-        """The reply to a commit waits up to `phase_timeout_s` for the next release, to report its phase."""
+    def __init__(
+        self, runtime: Runtime, *, phase_timeout_s: float = 1.0, outside: Outside | None = None
+    ) -> None:
+        """The reply to a commit waits up to `phase_timeout_s` for the next release, to report its phase.
+
+        Without an `outside`, a request that binds a resource to a topic or service is refused.
+        """
         self._runtime = runtime
+        self._outside = outside
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
         self._lock = threading.Lock()
@@ -82,13 +114,14 @@ class Control:
             check_state(step, next(part for part in self._runtime.components() if part.name == step.target))
             if not request.dry_run:
                 return self._start_or_stop(step, request)
-        measured = self._runtime.deployer.commit(
-            plan.transaction,
-            dry_run=request.dry_run,
-            expected_epoch=kernel_epoch,
-            commit_timeout_ns=_timeout_ns(request),
-            phase_timeout_ns=self._phase_timeout_of(request),
-        )
+        with self._bound(plan.bound, dry_run=request.dry_run):
+            measured = self._runtime.deployer.commit(
+                plan.transaction,
+                dry_run=request.dry_run,
+                expected_epoch=kernel_epoch,
+                commit_timeout_ns=_timeout_ns(request),
+                phase_timeout_ns=self._phase_timeout_of(request),
+            )
         reports = _reports(request.steps, measured)
         if request.dry_run:
             words = "; ".join(str(step) for step in request.steps)
@@ -96,6 +129,28 @@ class Control:
         self._runtime.declare(added=plan.added, removed=plan.removed)
         self._count_change(epoch)
         return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
+
+    @contextmanager
+    def _bound(self, bound: Bound, *, dry_run: bool) -> Iterator[None]:
+        """Around a commit: topics of what is added open before it, of what is removed close after it."""
+        outside = self._outside
+        if outside is None:
+            if bound.added:
+                text = f"resource '{next(iter(bound.added))}': nothing can be bound to ROS here"
+                raise RefusalError(Code.UNSUPPORTED, f"{text}; leave its topic or service out")
+            yield
+            return
+        opened = outside.open(bound.added, bound.described) if bound.added else {}
+        try:
+            yield
+        except BaseException:
+            outside.discard(opened)
+            raise
+        if dry_run:
+            outside.discard(opened)
+            return
+        outside.remove(bound.removed)
+        outside.attach(opened)
 
     def _count_change(self, before: int) -> None:
         """A core replaced by another one of its kind, or a restart, shows nowhere: it counts all the same."""

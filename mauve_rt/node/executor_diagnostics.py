@@ -1,18 +1,18 @@
 """What the executor tells of its health: /diagnostics at 1 Hz."""
 
 import resource
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
-from mauve_rt._bridge import TopicReport
+from mauve_rt._bridge import CallReport, TopicReport
 from mauve_rt._kernel import ComponentDescription, RecentMaxima, allocation_counting
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
+from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.node.executor_topics import BoundTopics
 
 _ONE = ThresholdModel(warn=1)
 _DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
@@ -20,12 +20,12 @@ _PYTHON_DEFAULTS = DiagnosticsModel(overruns=_ONE)  # the interpreter allocates 
 
 
 class Diagnostics:
-    """/diagnostics: a status per component, per bound topic, and the process's. On the node's timer only."""
+    """/diagnostics: a status per component, bound topic and service, and the process's. On the timer only."""
 
-    def __init__(self, node: LifecycleNode, runtime: Runtime, topics: BoundTopics) -> None:
+    def __init__(self, node: LifecycleNode, runtime: Runtime, bound: BoundResources) -> None:
         self._node = node
         self._runtime = runtime
-        self._topics = topics
+        self._bound = bound
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -36,8 +36,9 @@ class Diagnostics:
         parts = [part for part in self._runtime.components() if part.name in maxima]
         array = DiagnosticArray(status=[self._component(part, maxima[part.name]) for part in parts])
         array.header.stamp = self._node.get_clock().now().to_msg()
-        others = self._topics.other_types()
-        array.status += [self._topic(report, others.get(report.topic)) for report in self._topics.reports()]
+        others = self._bound.other_types()
+        array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
+        array.status += [self._call(report) for report in self._bound.calls()]
         array.status.append(self._process(error))
         self._publisher.publish(array)
 
@@ -106,11 +107,7 @@ class Diagnostics:
             "deadlines missed": troubles.deadlines_missed,
             "publishers lost": troubles.liveliness_lost,
         }
-        remarks = [
-            f"{more} {what} since the last status"
-            for what, count in counts.items()
-            if (more := self._more(f"topic {report.topic}", what, count)) > 0
-        ]
+        remarks = self._grown(f"topic {report.topic}", counts)
         if other_types:
             remarks.append(f"other nodes use {' and '.join(other_types)} on it, with whom it does not talk")
         if troubles.incompatible_qos:
@@ -126,6 +123,29 @@ class Diagnostics:
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(f"topic {report.topic}", level, "; ".join(remarks) or "no trouble", values)
+
+    def _call(self, report: CallReport) -> Any:
+        counts = report.counts
+        failures = {"calls refused": counts.other}
+        if not report.is_offered:
+            failures |= {"calls without a server": counts.no_server, "calls timed out": counts.timed_out}
+        remarks = self._grown(f"service {report.service}", failures)
+        values: dict[str, object] = {
+            "resource": report.resource,
+            "side": "server" if report.is_offered else "client",
+            "answered": counts.answered,
+            "longest_ns": counts.longest_ns,
+            "no_server": counts.no_server,
+            "timed_out": counts.timed_out,
+            "refused": counts.other,
+        }
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        return self._status(f"service {report.service}", level, "; ".join(remarks) or "no trouble", values)
+
+    def _grown(self, name: str, counts: Mapping[str, int]) -> list[str]:
+        """Those of these counts that grew since the last status, in words."""
+        grown = {what: self._more(name, what, count) for what, count in counts.items()}
+        return [f"{more} {what} since the last status" for what, more in grown.items() if more > 0]
 
     def _more(self, component: str, what: str, count: int) -> int:
         """How much it grew since it was told last; a start of the component counts anew."""

@@ -10,6 +10,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 
 from mauve_rt.errors import MauveError, ParameterError, one_line
+from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_diagnostics import Diagnostics
 from mauve_rt.node.executor_parameter_services import ParameterServices
@@ -18,7 +19,6 @@ from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_state import StatePublisher
-from mauve_rt.node.executor_topics import BoundTopics
 from mauve_rt.trace import TraceError
 
 NODE_NAME = "executor"
@@ -37,8 +37,8 @@ class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
     Requests, lifecycle transitions, listing and recorded topics have a callback group each, so that a stop
-    that waits for a component delays none of the others (given a thread for each: `THREADS`). Messages of
-    bound topics do not come by here: they have threads of their own, in C++.
+    that waits for a component delays none of the others (given a thread for each: `THREADS`). Messages and
+    calls of bound resources do not come by here: they have threads of their own, in C++.
     """
 
     THREADS = 4
@@ -57,11 +57,13 @@ class ExecutorNode(LifecycleNode):
         self._runtime = runtime
         self._settings = self._declared()
         self._recording = Recording()
-        self._topics = BoundTopics(self)
+        self._bound = BoundResources(self)
         self._state = StatePublisher(self, runtime, self._recording)
-        self._diagnostics = Diagnostics(self, runtime, self._topics)
+        self._diagnostics = Diagnostics(self, runtime, self._bound)
         self._properties = Parameters(self, runtime)
-        control = Control(runtime, phase_timeout_s=self._settings["report_phase_timeout_s"])
+        control = Control(
+            runtime, phase_timeout_s=self._settings["report_phase_timeout_s"], outside=self._bound
+        )
         services = Services(
             self,
             runtime,
@@ -113,17 +115,17 @@ class ExecutorNode(LifecycleNode):
     def _configure(self) -> None:
         self._runtime.configure()
         self._properties.follow()
-        self._topics.open(self._runtime.model, self._runtime.architecture)
+        self._bound.configure(self._runtime.model, self._runtime.architecture)
         bag = str(self.get_parameter("bag").value)
         if bag:
-            self._topics.keep_messages()
-            self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._topics)
+            self._bound.keep_messages()
+            self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._bound)
             self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
         self._log_realtime()
 
     def _activate(self) -> None:
         self._runtime.activate()
-        self._topics.start()
+        self._bound.start()
         self._state.start(self._runtime.deployer)
 
     def _end(self) -> None:
@@ -173,7 +175,7 @@ class ExecutorNode(LifecycleNode):
             self._runtime.deactivate()
             self._state.refresh()
         self._state.stop()
-        self._topics.stop()
+        self._bound.stop()
 
     def close(self) -> None:
         """End everything this node holds, in order: components, threads, bag, node.
@@ -186,13 +188,13 @@ class ExecutorNode(LifecycleNode):
         except MauveError as error:
             self.get_logger().error(str(error))
             self._recording.stop(self)
-            self._topics.close()
+            self._bound.close()
         self.destroy_node()
 
     def _release(self) -> None:
         self._runtime.require_parked()
         self._recording.stop(self)
-        self._topics.close()
+        self._bound.close()
         self._runtime.cleanup()
         self._properties.follow()
 

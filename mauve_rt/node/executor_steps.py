@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from mauve_rt._kernel import ComponentDescription, PropertyDescription, Transaction
+from mauve_rt._kernel import ComponentDescription, PropertyDescription, ResourceDescription, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
 from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
-from mauve_rt.model.schema import ComponentModel, PropertyValue
+from mauve_rt.model.resource_parts import describe_resource
+from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_requests import Code, RefusalError, Step, code_of
 from mauve_rt.node.executor_runtime import Runtime
@@ -32,6 +33,15 @@ class _Sketch:
     is_new: bool = False
 
 
+@dataclass
+class Bound:
+    """Resources that a plan binds to topics or services, and resources that it removes."""
+
+    added: dict[str, ResourceModel] = field(default_factory=dict)
+    described: dict[str, ResourceDescription] = field(default_factory=dict)
+    removed: set[str] = field(default_factory=set)
+
+
 class Plan:
     """The transaction that a request asks for, and what it will have added and removed."""
 
@@ -44,6 +54,7 @@ class Plan:
         self.transaction = Transaction()
         self.added: dict[str, ComponentModel] = {}
         self.removed: set[str] = set()
+        self.bound = Bound()
         self._runtime = runtime
         self._sketches = {part.name: self._sketch_of(part) for part in runtime.components()}
         self._resources = set(runtime.resources())
@@ -156,22 +167,21 @@ class Plan:
         name = step.target
         self._check_name(step)
         model = self._fragment(step, "resources")
-        if model.resources[name].topic is not None:
-            text = f"resource '{name}': a topic cannot be bound while the executor runs"
-            raise RefusalError(Code.UNSUPPORTED, f"{text}; leave topic out, or put the resource in the file")
+        resource = model.resources[name]
         with self._runtime.loading() as loader:
             if problems := Checks(model, loader).problems():
                 raise ArchitectureFileError(model.path, problems)
             add_resource_step(self.transaction, model, name, loader.registry)
+            if resource.topic is not None or resource.service is not None:
+                self.bound.added[name] = resource
+                self.bound.described[name] = describe_resource(resource, loader.registry)
         self._resources.add(name)
 
     def _remove_resource(self, step: Step) -> None:
-        described = self._runtime.model.resources.get(step.target)
-        if described is not None and described.topic is not None:
-            text = f"resource '{step.target}' is bound to topic '{described.topic.name}'"
-            raise RefusalError(Code.INVALID, f"{text}; it stays for as long as the executor runs")
         self.transaction.remove_resource(step.target)
         self._resources.discard(step.target)
+        if self.bound.added.pop(step.target, None) is None:
+            self.bound.removed.add(step.target)
 
     def _check_name(self, step: Step) -> None:
         if step.target in self._sketches or step.target in self._resources:

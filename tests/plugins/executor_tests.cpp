@@ -2,6 +2,7 @@
 // A small package of plug-ins for the executor's tests: a component that counts, in every temper.
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -37,12 +38,36 @@ struct Owning {
   double value{};
 };
 
+struct SetBool {
+  struct Request {
+    bool data{};
+  };
+  struct Response {
+    bool success{};
+    mauve::BoundedString<16> message;
+  };
+};
+
+struct Trigger {
+  struct Request {};
+  struct Response {
+    bool success{};
+    mauve::BoundedString<16> message;
+  };
+};
+
 }  // namespace executor_tests
 
 MAUVE_TYPE(executor_tests::Number, "std_msgs/msg/Float64", data)
 MAUVE_TYPE(executor_tests::Point, "geometry_msgs/msg/Point", x, y, z)
 MAUVE_TYPE(executor_tests::Private, "executor_tests/Private", value)
 MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
+MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", data)
+MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
+MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
+MAUVE_TYPE(executor_tests::Trigger::Request, "std_srvs/srv/Trigger_Request")
+MAUVE_TYPE(executor_tests::Trigger::Response, "std_srvs/srv/Trigger_Response", success, message)
+MAUVE_CALL_TYPE(executor_tests::Trigger, "std_srvs/srv/Trigger")
 
 namespace executor_tests {
 
@@ -198,6 +223,98 @@ struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
   }
 };
 
+/// Calls at every activation, with true and false in turns.
+struct CallerShell : mauve::Shell {
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10);
+  mauve::CallPort<mauve::CallOf<SetBool>>& lamp = call_port<SetBool>("lamp");
+  mauve::WritePort<Number>& count = write_port<Number>("count");
+};
+
+/// Counts answers; says how a call ended that was not answered by minus its outcome.
+struct Caller : mauve::Core<CallerShell> {
+  int answered = 0;
+
+  void act() {
+    SetBool::Response response;
+    const mauve::CallOutcome outcome = shell().lamp({answered % 2 == 0}, response);
+    if (outcome != mauve::CallOutcome::answered) {
+      shell().count.write({-static_cast<double>(outcome)});
+    } else if (response.success && response.message == (answered % 2 == 0 ? "on" : "off")) {
+      shell().count.write({static_cast<double>(++answered)});
+    }
+  }
+};
+
+struct CallerFsm : mauve::Fsm<CallerShell, Caller> {
+  void define() override {
+    mauve::State& run = execution("Call", "act", &Caller::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+/// A lamp to switch and to ask, by components and, where a file offers them, by ROS.
+class Lamp final : public mauve::Resource {
+ public:
+  Lamp() : Resource("executor_tests/Lamp", "") {
+    offer(set);
+    offer(ask);
+    offer(look);
+  }
+
+ private:
+  class Set final : public mauve::RequestService<SetBool> {
+   public:
+    explicit Set(Lamp& owner) : RequestService("set"), owner_(owner) {}
+    mauve::CallOutcome call(const SetBool::Request& request, SetBool::Response& response) override {
+      const std::lock_guard lock(owner_.mutex_);
+      owner_.is_on_ = request.data;
+      response.success = true;
+      response.message.assign(owner_.is_on_ ? "on" : "off");
+      return mauve::CallOutcome::answered;
+    }
+
+   private:
+    Lamp& owner_;
+  };
+  class Ask final : public mauve::RequestService<Trigger> {
+   public:
+    explicit Ask(Lamp& owner) : RequestService("ask"), owner_(owner) {}
+    mauve::CallOutcome call(const Trigger::Request& /*request*/, Trigger::Response& response) override {
+      const std::lock_guard lock(owner_.mutex_);
+      if (!owner_.is_on_) throw std::runtime_error("nobody is at home");
+      response.success = true;
+      response.message.assign("on");
+      return mauve::CallOutcome::answered;
+    }
+
+   private:
+    Lamp& owner_;
+  };
+  /// A call that no ROS service is.
+  class Look final : public mauve::CallService<bool()> {
+   public:
+    explicit Look(Lamp& owner) : CallService("look", "executor_tests/Look"), owner_(owner) {}
+    bool call() override {
+      const std::lock_guard lock(owner_.mutex_);
+      return owner_.is_on_;
+    }
+
+   private:
+    Lamp& owner_;
+  };
+
+  mauve::PiMutex mutex_;
+  bool is_on_{false};
+
+ public:
+  Set set{*this};
+  Ask ask{*this};
+  Look look{*this};
+};
+
 }  // namespace executor_tests
 
 MAUVE_PLUGINS(registry) {
@@ -221,6 +338,12 @@ MAUVE_PLUGINS(registry) {
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);
   registry.fsm<CalmFsm>("executor_tests/CalmFsm", shell);
   registry.fsm<EventFsm>("executor_tests/EventFsm", shell);
+  registry.call_type<SetBool>();
+  registry.resource<Lamp>("executor_tests/Lamp");
+  const std::string caller = "executor_tests/CallerShell";
+  registry.shell<CallerShell>(caller);
+  registry.core<Caller>("executor_tests/Caller", caller);
+  registry.fsm<CallerFsm>("executor_tests/CallerFsm", caller);
   const std::string twin = "executor_tests/TwinShell";
   registry.shell<TwinShell>(twin);
   registry.core<Twin>("executor_tests/Twin", twin);

@@ -154,11 +154,10 @@ REFUSED = {
     "connected": ((Step("connect", "counter", "count", "count.write"),), Code.INVALID, "connected already"),
     "not connected": ((Step("disconnect", "free", "count"),), Code.INVALID, "is not connected"),
     "still connected": ((Step("remove_resource", "count"),), Code.INVALID, "disconnect these"),
-    "topic's resource": ((Step("remove_resource", "poison"),), Code.INVALID, "bound to topic 'poison'"),
     "topic": (
         (Step("add_resource", "x", "", NUMBER[:-1] + ", topic: {name: x, direction: publish}}"),),
         Code.UNSUPPORTED,
-        "a topic cannot be bound while the executor runs; leave topic out",
+        "nothing can be bound to ROS here; leave its topic or service out",
     ),
     "two names": ((ADD[0], ADD[0]), Code.INVALID, "step 2 (add_resource sum {kind"),
     "a component's name": ((Step("add_resource", "free", "", NUMBER),), Code.INVALID, "there is a component"),

@@ -258,7 +258,7 @@ BAD = {
         "kind: ring_buffer",
         "kind: ringbuffer",
         "ringbuffer",
-        "expected shared_data, ring_buffer, latest_value, event or",
+        "expected shared_data, ring_buffer, latest_value, event, client or",
     ),
     "ring without capacity": (
         ", capacity: 4",
@@ -357,6 +357,69 @@ BAD = {
         "expected publish or subscribe, found 'out'",
     ),
     "topic qos": ("qos: reliable", "qos: relaible", "relaible", "found 'relaible'"),
+    "client without a service": (
+        "  queue:",
+        "  lamp: {kind: client, type: std_srvs/srv/SetBool}\n  queue:",
+        "lamp: {",
+        "resource 'lamp' of kind client calls no service: expected service: {name: ...}",
+    ),
+    "client without a type": (
+        "  queue:",
+        "  lamp: {kind: client, service: {name: x}}\n  queue:",
+        "lamp: {",
+        "resource 'lamp' has no type: expected e.g. std_srvs/srv/SetBool",
+    ),
+    "client of no registered type": (
+        "  queue:",
+        "  lamp: {kind: client, type: std_srvs/srv/SetBol, service: {name: x}}\n  queue:",
+        "std_srvs/srv/SetBol",
+        "did you mean std_srvs/srv/SetBool?",
+    ),
+    "client that offers": (
+        "  queue:",
+        "  lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: x, offers: y}}\n  queue:",
+        "offers: y",
+        "resource 'lamp' of kind client cannot offer a service",
+    ),
+    "client's time": (
+        "  queue:",
+        "  lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: x, timeout_ms: 0}}\n  queue:",
+        "0}",
+        "found 0",
+    ),
+    "client with a topic": (
+        "  queue:",
+        (
+            "  lamp: {kind: client, type: std_srvs/srv/SetBool, "
+            "topic: {name: x, direction: publish},\n         service: {name: x}}\n  queue:"
+        ),
+        "topic: {",
+        "resource 'lamp' of kind client is bound to a topic",
+    ),
+    "service of nothing": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, service: {name: x}}\n  queue:",
+        "service: {name: x}",
+        "does not say which of its calls the ROS service is",
+    ),
+    "offered call of no ROS type": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, service: {name: x, offers: look}}\n  queue:",
+        "look",
+        "expected one of its calls with a ROS type, found 'executor_tests/Look'",
+    ),
+    "offered call that is none": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, service: {name: x, offers: sett}}\n  queue:",
+        "sett",
+        "did you mean set?",
+    ),
+    "time of an offered call": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, service: {name: x, offers: set, timeout_ms: 5}}\n  queue:",
+        "timeout_ms",
+        "only a client has one",
+    ),
     "namespace": ("namespace: /robot_1", "namespace: /robot 1", "/robot 1", "bad namespace in 'executor'"),
     "one name twice": (
         "  queue:",

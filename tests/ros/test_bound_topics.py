@@ -27,8 +27,8 @@ from std_msgs.msg import Bool, Empty, Float64, String
 from mauve_rt._bridge import TopicReport
 from mauve_rt.errors import MauveError
 from mauve_rt.model import load_architecture
+from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.node.executor_topics import BoundTopics
 
 PARTS = """\
 mauve: 1
@@ -45,11 +45,11 @@ class Bound:
     """An architecture with its topics open and flowing, in the test's process."""
 
     runtime: Runtime
-    topics: BoundTopics
+    topics: BoundResources
 
     def report(self, topic: str) -> TopicReport:
         """How a topic fares."""
-        return next(report for report in self.topics.reports() if report.topic == topic)
+        return next(report for report in self.topics.topics() if report.topic == topic)
 
     def received(self, resource: str, message_type: Any) -> Any:
         """What a resource holds."""
@@ -79,8 +79,8 @@ def bind(graph: Any, tmp_path: Path, plugin_prefix: Path) -> Iterator[Bind]:
         path.write_text(PARTS + resources, encoding="utf-8")
         runtime = Runtime(lambda: load_architecture(path))
         runtime.configure()
-        opened.append(Bound(runtime, BoundTopics(node)))
-        opened[-1].topics.open(runtime.model, runtime.architecture)
+        opened.append(Bound(runtime, BoundResources(node)))
+        opened[-1].topics.configure(runtime.model, runtime.architecture)
         opened[-1].topics.start()
         return opened[-1]
 

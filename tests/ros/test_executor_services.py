@@ -11,7 +11,7 @@ from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code
 
 NODE = "/robot_1/executor"
-LATE_TOPIC = "{kind: shared_data, type: std_msgs/msg/Float64, topic: {name: late, direction: publish}}"
+NO_TYPE = "{kind: shared_data, type: std_msgs/msg/Flaot64, topic: {name: late, direction: publish}}"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -142,14 +142,14 @@ REFUSED = {
         Code.INVALID,
         "unknown kind of step 'replace_cor'; did you mean replace_core?",
     ),
-    "topic of later": (
+    "no installed type": (
         (
             Reconfigure,
             "reconfigure",
-            {"steps": [ReconfigurationStep(kind="add_resource", target="late", value=LATE_TOPIC)]},
+            {"steps": [ReconfigurationStep(kind="add_resource", target="late", value=NO_TYPE)]},
         ),
-        Code.UNSUPPORTED,
-        "resource 'late': a topic cannot be bound while the executor runs",
+        Code.INVALID,
+        "bad type 'std_msgs/msg/Flaot64' of resource 'late'",
     ),
     "second step": (
         (Reconfigure, "reconfigure", {"steps": [ReconfigurationStep(kind="stop", target="counter")] * 2}),

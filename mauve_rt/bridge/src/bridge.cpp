@@ -15,30 +15,50 @@ constexpr time_ns_t kLook = s_to_ns(1);  // so often the sending thread looks ev
 
 Bridge::~Bridge() { close(); }
 
-std::size_t Bridge::publish(const std::string& resource, const std::string& topic, const std::string& type,
-                            const rmw_qos_profile_t& qos) {
-  const TopicSettings settings{.name = topic, .type = type, .qos = qos, .number = topic_count_};
-  auto made = std::make_unique<OutgoingTopic>(node_, architecture_.resource(resource), settings, log_);
-  stop_receivers();
-  {
-    const std::lock_guard lock(topics_mutex_);
-    outgoing_.push_back(std::move(made));
-  }
-  start_receivers();
-  return topic_count_++;
+template <typename Kind, typename... Args>
+std::size_t Bridge::open(const Args&... args) {
+  auto made = std::make_unique<Kind>(node_, args...);
+  const std::lock_guard lock(mutex_);
+  bindings_.emplace(opened_, std::move(made));
+  return opened_++;
 }
 
-std::size_t Bridge::subscribe(const std::string& resource, const std::string& topic, const std::string& type,
-                              const rmw_qos_profile_t& qos) {
-  const TopicSettings settings{.name = topic, .type = type, .qos = qos, .number = topic_count_};
-  auto made = std::make_unique<IncomingTopic>(node_, architecture_.resource(resource), settings, log_);
+std::size_t Bridge::publish(const TopicSettings& settings) {
+  return open<OutgoingTopic>(settings, opened_, std::ref(log_));
+}
+std::size_t Bridge::subscribe(const TopicSettings& settings) {
+  return open<IncomingTopic>(settings, opened_, std::ref(log_));
+}
+std::size_t Bridge::call(const CallSettings& settings) { return open<CalledService>(settings); }
+std::size_t Bridge::offer(const CallSettings& settings, const std::string& offered) {
+  return open<OfferedService>(settings, offered);
+}
+
+void Bridge::attach(const std::vector<std::size_t>& numbers) {
   stop_receivers();  // what arrives meanwhile waits in the middleware
-  {
-    const std::lock_guard lock(topics_mutex_);
-    incoming_.push_back(std::move(made));
+  try {
+    const std::lock_guard lock(mutex_);
+    for (const std::size_t number : numbers) {
+      Binding& binding = *bindings_.at(number);
+      binding.attach(architecture_.hold_resource(binding.resource_name()));
+    }
+  } catch (...) {
+    start_receivers();
+    throw;
   }
   start_receivers();
-  return topic_count_++;
+  architecture_.publications().notify();  // of what was written before
+}
+
+void Bridge::close(const std::vector<std::size_t>& numbers) {
+  while (send_some()) {
+  }
+  stop_receivers();
+  {
+    const std::lock_guard lock(mutex_);
+    for (const std::size_t number : numbers) bindings_.erase(number);
+  }
+  start_receivers();
 }
 
 void Bridge::start() {
@@ -60,35 +80,31 @@ void Bridge::stop() {
 
 void Bridge::close() {
   stop();
-  const std::lock_guard lock(topics_mutex_);
-  outgoing_.clear();
-  incoming_.clear();
+  const std::lock_guard lock(mutex_);
+  bindings_.clear();
 }
 
-std::vector<TopicReport> Bridge::reports() {
-  const std::lock_guard lock(topics_mutex_);
-  std::vector<TopicReport> all;
-  const auto add = [&all](const auto& topic) {
-    all.push_back({.resource = topic->resource().name(),
-                   .topic = topic->full_name(),
-                   .counts = topic->counts(),
-                   .troubles = topic->events().troubles()});
-  };
-  for (const auto& topic : outgoing_) add(topic);
-  for (const auto& topic : incoming_) add(topic);
+BridgeReport Bridge::report() {
+  const std::lock_guard lock(mutex_);
+  BridgeReport all;
+  for (const auto& [number, binding] : bindings_) binding->report(all);
   return all;
+}
+
+bool Bridge::send_some() {
+  const std::lock_guard lock(mutex_);
+  bool more = false;
+  for (const auto& [number, binding] : bindings_) more = (binding->is_attached() && binding->send()) || more;
+  return more;
 }
 
 void Bridge::send_all() {
   Notifier& written = architecture_.publications();
   for (bool ending = false; !ending;) {
     const std::uint32_t word = written.word();  // before the look: what comes after is noticed
-    ending =
-        ending_.load(std::memory_order_acquire);  // one more round then: outputs of the stop are sent too
-    for (bool more = true; more;) {
-      more = false;
-      const std::lock_guard lock(topics_mutex_);
-      for (const auto& topic : outgoing_) more = topic->send() || more;
+    // Read before it: one more round at the end, for the outputs of the stop.
+    ending = ending_.load(std::memory_order_acquire);
+    while (send_some()) {
     }
     if (!ending) written.wait(word, monotonic_now_ns() + kLook);
   }
@@ -96,23 +112,23 @@ void Bridge::send_all() {
 
 void Bridge::start_receivers() {
   if (!running_) return;
-  std::vector<Arrival*> messages;
-  std::vector<Arrival*> events;
-  const auto add_events = [&events](const auto& topic) {
-    const std::vector<Arrival*> all = topic->events().arrivals();
-    events.insert(events.end(), all.begin(), all.end());
+  const auto arrivals = [this](Lane lane) {
+    std::vector<Arrival*> all;
+    for (const auto& [number, binding] : bindings_) {
+      if (!binding->is_attached()) continue;
+      const std::vector<Arrival*> own = binding->arrivals(lane);
+      all.insert(all.end(), own.begin(), own.end());
+    }
+    return all;
   };
-  for (const auto& topic : outgoing_) add_events(topic);
-  for (const auto& topic : incoming_) {
-    messages.push_back(topic.get());
-    add_events(topic);
-  }
-  receiver_.start(std::move(messages));
-  events_.start(std::move(events));
+  messages_.start(arrivals(Lane::messages));
+  requests_.start(arrivals(Lane::requests));
+  events_.start(arrivals(Lane::events));
 }
 
 void Bridge::stop_receivers() {
-  receiver_.stop();
+  messages_.stop();
+  requests_.stop();
   events_.stop();
 }
 

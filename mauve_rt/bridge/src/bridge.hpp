@@ -1,32 +1,27 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The topics of an architecture, on a ROS node that someone else made; no interpreter on the way.
+// The topics and services of an architecture, on a ROS node that someone else made; no interpreter on the way.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <vector>
 
 #include "mauve_rt/architecture.hpp"
 
+#include "calls.hpp"
 #include "topics.hpp"
 
 namespace mauve::bridge {
 
-/// What is known of a bound topic from outside.
-struct TopicReport {
-  std::string resource;
-  std::string topic;  // expanded and remapped
-  TopicCounts counts;
-  TopicTroubles troubles;
-};
-
-/// Opens, serves and closes topics. One thread sends, one receives, one hears of deadlines and the like.
+/// Opens, serves and closes bindings. One thread sends, one takes messages and answers, one takes requests, one hears of
+/// deadlines and the like.
 ///
-/// | member              | written by               | read by               | under / order                    |
-/// | ------------------- | ------------------------ | --------------------- | -------------------------------- |
-/// | outgoing_,          | publish(), subscribe(),  | the sending thread,   | topics_mutex_; the receivers     |
-/// | incoming_           | close()                  | reports()             | are stopped for a change         |
-/// | ending_             | stop()                   | the sending thread    | release/acquire                  |
+/// | member      | written by                   | read by                        | under / order                    |
+/// | ----------- | ---------------------------- | ------------------------------ | -------------------------------- |
+/// | bindings_   | publish() ... close()        | the sending thread, report()   | mutex_; receivers are stopped    |
+/// | ending_     | stop()                       | the sending thread             | release/acquire                  |
+/// | the others  | one ordinary thread at a time, which the caller sees to      | -                                |
 class Bridge {
  public:
   /// The node and the architecture outlive the bridge. Throws Error when rcl refuses. [non-rt]
@@ -35,25 +30,36 @@ class Bridge {
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  /// Binds a resource to a topic; returns its number in the log. [non-rt]
-  /// Throws Error when the type is not installed or rcl refuses; nothing is bound then.
-  std::size_t publish(const std::string& resource, const std::string& topic, const std::string& type,
-                      const rmw_qos_profile_t& qos);
-  /// As publish(), the other way.
-  std::size_t subscribe(const std::string& resource, const std::string& topic, const std::string& type,
-                        const rmw_qos_profile_t& qos);
-  /// Lets messages flow, both ways. [non-rt]
+  // Each opens a binding under a number of its own, which the log uses too. Others may find it on the network, but
+  // nothing flows before attach(). [non-rt] Throws Error when the type is not installed or rcl refuses.
+
+  std::size_t publish(const TopicSettings& settings);
+  std::size_t subscribe(const TopicSettings& settings);
+  /// A client's calls go to a ROS service.
+  std::size_t call(const CallSettings& settings);
+  /// A resource's call is a ROS service.
+  std::size_t offer(const CallSettings& settings, const std::string& offered);
+
+  /// These serve the resources of their names from now on. [non-rt] Throws Error when one is none to serve.
+  void attach(const std::vector<std::size_t>& numbers);
+  /// These end; what was written before is sent. [non-rt]
+  void close(const std::vector<std::size_t>& numbers);
+
+  /// Lets messages and calls flow, both ways. [non-rt]
   void start();
   /// Ends the flow when what was written before is sent. May be called again. [non-rt]
   void stop();
-  /// stop(), and no topic is bound any more. [non-rt]
+  /// stop(), and all bindings end. [non-rt]
   void close();
 
   /// [non-rt]
-  std::vector<TopicReport> reports();
+  BridgeReport report();
   TopicLog& log() noexcept { return log_; }
 
  private:
+  template <typename Kind, typename... Args>
+  std::size_t open(const Args&... args);
+  bool send_some();
   void send_all();
   void start_receivers();
   void stop_receivers();
@@ -61,12 +67,12 @@ class Bridge {
   rcl_node_t& node_;
   Architecture& architecture_;
   TopicLog log_;
-  std::mutex topics_mutex_;
-  std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;
-  std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  std::size_t topic_count_{0};
-  Receiver receiver_{node_, "topics_in"};
-  Receiver events_{node_, "topic_events"};  // few, so that waiting for messages stays cheap
+  std::mutex mutex_;
+  std::map<std::size_t, std::unique_ptr<Binding>> bindings_;
+  std::size_t opened_{0};
+  Receiver messages_{node_, "topics_in"};
+  Receiver requests_{node_, "requests_in"};  // the resource's own code runs here
+  Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap
   bool running_{false};
   std::atomic<bool> ending_{false};
   std::thread sender_;

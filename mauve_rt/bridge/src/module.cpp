@@ -33,6 +33,12 @@ rmw_qos_profile_t make_qos(int reliability, int durability, std::size_t depth, t
   return qos;
 }
 
+template <std::size_t (Bridge::*open)(const TopicSettings&)>
+std::size_t open_topic(Bridge& self, const std::string& resource, const std::string& topic,
+                       const std::string& type, const rmw_qos_profile_t& qos) {
+  return (self.*open)({.resource = resource, .name = topic, .type = type, .qos = qos});
+}
+
 py::list take_log(Bridge& self) {
   py::list all;
   for (const LoggedMessage& message : self.log().take()) {
@@ -45,7 +51,7 @@ py::list take_log(Bridge& self) {
 }  // namespace
 
 PYBIND11_MODULE(_bridge, module) {
-  module.doc() = "Resources on ROS topics, natively, on a node of rclpy's.";
+  module.doc() = "Resources on ROS topics and services, natively, on a node of rclpy's.";
   // What the threads wait for may want the interpreter's lock: never wait for them under it.
   using Unlocked = py::call_guard<py::gil_scoped_release>;
   py::class_<rmw_qos_profile_t>(module, "Qos")
@@ -57,6 +63,17 @@ PYBIND11_MODULE(_bridge, module) {
       .def_readonly("liveliness_lost", &TopicTroubles::liveliness_lost)
       .def_readonly("incompatible_qos", &TopicTroubles::incompatible_qos)
       .def_readonly("policy", &TopicTroubles::policy);
+  py::class_<CallCounts>(module, "CallCounts")
+      .def_readonly("answered", &CallCounts::answered)
+      .def_readonly("no_server", &CallCounts::no_server)
+      .def_readonly("timed_out", &CallCounts::timed_out)
+      .def_readonly("other", &CallCounts::other)
+      .def_readonly("longest_ns", &CallCounts::longest_ns);
+  py::class_<CallReport>(module, "CallReport")
+      .def_readonly("resource", &CallReport::resource)
+      .def_readonly("service", &CallReport::service)
+      .def_readonly("is_offered", &CallReport::is_offered)
+      .def_readonly("counts", &CallReport::counts);
   py::class_<TopicReport>(module, "TopicReport")
       .def_readonly("resource", &TopicReport::resource)
       .def_readonly("topic", &TopicReport::topic)
@@ -69,14 +86,33 @@ PYBIND11_MODULE(_bridge, module) {
                                              *std::bit_cast<Architecture*>(architecture));
            }),
            py::arg("node"), py::arg("architecture"))
-      .def("publish", &Bridge::publish, py::arg("resource"), py::arg("topic"), py::arg("type"),
-           py::arg("qos"))
-      .def("subscribe", &Bridge::subscribe, py::arg("resource"), py::arg("topic"), py::arg("type"),
+      .def("publish", &open_topic<&Bridge::publish>, py::arg("resource"), py::arg("topic"), py::arg("type"),
            py::arg("qos"), Unlocked())
+      .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
+           py::arg("type"), py::arg("qos"), Unlocked())
+      .def(
+          "call",
+          [](Bridge& self, const std::string& resource, const std::string& service, const std::string& type) {
+            return self.call({.resource = resource, .name = service, .type = type});
+          },
+          py::arg("resource"), py::arg("service"), py::arg("type"), Unlocked())
+      .def(
+          "offer",
+          [](Bridge& self, const std::string& resource, const std::string& service, const std::string& type,
+             const std::string& offered) {
+            return self.offer({.resource = resource, .name = service, .type = type}, offered);
+          },
+          py::arg("resource"), py::arg("service"), py::arg("type"), py::arg("offered"), Unlocked())
+      .def("attach", &Bridge::attach, py::arg("numbers"), Unlocked())
+      .def("close", py::overload_cast<const std::vector<std::size_t>&>(&Bridge::close), py::arg("numbers"),
+           Unlocked())
       .def("start", &Bridge::start)
       .def("stop", &Bridge::stop, Unlocked())
-      .def("close", &Bridge::close, Unlocked())
-      .def("reports", &Bridge::reports, Unlocked())
+      .def("close", py::overload_cast<>(&Bridge::close), Unlocked())
+      .def(
+          "topics", [](Bridge& self) { return self.report().topics; }, Unlocked())
+      .def(
+          "calls", [](Bridge& self) { return self.report().calls; }, Unlocked())
       .def(
           "log", [](Bridge& self, bool on) { self.log().enable(on); }, py::arg("on"))
       .def("take_log", &take_log)

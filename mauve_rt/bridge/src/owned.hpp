@@ -6,6 +6,11 @@
 #include <rcl/node.h>
 #include <rcl/types.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 namespace mauve::bridge {
 
 /// An entity of a node, which outlives it; zero until it is initialised.
@@ -27,6 +32,14 @@ class Owned {
   Entity entity_;
 };
 
+/// A message where it lies, for those of rcl that only read it. [non-rt]
+inline rcl_serialized_message_t borrowed(std::vector<std::byte>& message) {
+  return {.buffer = reinterpret_cast<std::uint8_t*>(message.data()),
+          .buffer_length = message.size(),
+          .buffer_capacity = message.size(),
+          .allocator = rcl_get_default_allocator()};
+}
+
 /// A buffer that keeps its capacity between messages.
 class OwnedMessage {
  public:
@@ -41,6 +54,10 @@ class OwnedMessage {
   OwnedMessage& operator=(const OwnedMessage&) = delete;
 
   rcl_serialized_message_t* get() noexcept { return &message_; }
+  /// What it holds now. [non-rt]
+  std::span<const std::byte> bytes() const noexcept {
+    return {reinterpret_cast<const std::byte*>(message_.buffer), message_.buffer_length};
+  }
 
  private:
   rcl_serialized_message_t message_;

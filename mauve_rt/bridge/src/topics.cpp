@@ -14,55 +14,66 @@ namespace {
 
 constexpr int kAtOnce = 64;  // messages of one topic before the others have their turn
 
-std::string described(const Resource& resource, const TopicSettings& settings) {
-  return "resource " + resource.name() + ", topic " + settings.name;
+std::string described(const TopicSettings& settings) {
+  return "resource " + settings.resource + ", topic " + settings.name;
 }
 
 }  // namespace
 
-OutgoingTopic::OutgoingTopic(rcl_node_t& node, Resource& resource, const TopicSettings& settings,
+std::vector<Arrival*> BoundTopic::arrivals(Lane lane) {
+  return lane == Lane::events ? events().arrivals() : std::vector<Arrival*>{};
+}
+
+void BoundTopic::report(BridgeReport& report) const {
+  report.topics.push_back({.resource = resource_name(),
+                           .topic = full_name(),
+                           .counts = counter_.counts(),
+                           .troubles = events().troubles()});
+}
+
+void BoundTopic::count(bool passed, time_ns_t time_ns, std::span<const std::byte> message) {
+  counter_.count(passed);
+  log_.add(number_, time_ns, message);
+}
+
+OutgoingTopic::OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number,
                              TopicLog& log)
-    : resource_(resource),
-      log_(log),
-      number_(settings.number),
-      publisher_(node, rcl_get_zero_initialized_publisher()) {
+    : BoundTopic(settings.resource, number, log), publisher_(node, rcl_get_zero_initialized_publisher()) {
   rcl_publisher_options_t options = rcl_publisher_get_default_options();
   options.qos = settings.qos;
   check(rcl_publisher_init(publisher_.get(), &node, &message_type_support(settings.type),
                            settings.name.c_str(), &options),
-        "the topic cannot be published", described(resource, settings));
+        "the topic cannot be published", described(settings));
   events_.open(*publisher_.get(), settings.qos);
 }
 
 bool OutgoingTopic::send() {
   time_ns_t time_ns = 0;
   for (int sent = 0; sent < kAtOnce; ++sent) {
-    if (!resource_.next_sample(message_, time_ns, seen_)) return false;
+    if (!resource().next_sample(message_, time_ns, seen_)) return false;
     // Sent from where it lies: rcl only reads it.
-    const rcl_serialized_message_t serialized{.buffer = reinterpret_cast<std::uint8_t*>(message_.data()),
-                                              .buffer_length = message_.size(),
-                                              .buffer_capacity = message_.size(),
-                                              .allocator = rcl_get_default_allocator()};
+    const rcl_serialized_message_t serialized = borrowed(message_);
     const bool passed = rcl_publish_serialized_message(publisher_.get(), &serialized, nullptr) == RCL_RET_OK;
     if (!passed) rcl_reset_error();
-    counter_.count(passed);
-    log_.add(number_, monotonic_now_ns(), message_);
+    count(passed, monotonic_now_ns(), message_);
   }
   return true;
 }
 
-IncomingTopic::IncomingTopic(rcl_node_t& node, Resource& resource, const TopicSettings& settings,
+IncomingTopic::IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number,
                              TopicLog& log)
-    : resource_(resource),
-      log_(log),
-      number_(settings.number),
+    : BoundTopic(settings.resource, number, log),
       subscription_(node, rcl_get_zero_initialized_subscription()) {
   rcl_subscription_options_t options = rcl_subscription_get_default_options();
   options.qos = settings.qos;
   check(rcl_subscription_init(subscription_.get(), &node, &message_type_support(settings.type),
                               settings.name.c_str(), &options),
-        "the topic cannot be subscribed to", described(resource, settings));
+        "the topic cannot be subscribed to", described(settings));
   events_.open(*subscription_.get(), settings.qos);
+}
+
+std::vector<Arrival*> IncomingTopic::arrivals(Lane lane) {
+  return lane == Lane::messages ? std::vector<Arrival*>{this} : BoundTopic::arrivals(lane);
 }
 
 void IncomingTopic::join(rcl_wait_set_t& set) {
@@ -80,11 +91,8 @@ void IncomingTopic::take() {
       rcl_reset_error();  // nothing left, which is no error
       return;
     }
-    const rcl_serialized_message_t& arrived = *message_.get();
-    const std::span data(reinterpret_cast<const std::byte*>(arrived.buffer), arrived.buffer_length);
     const time_ns_t now = monotonic_now_ns();
-    counter_.count(resource_.write_sample(data, now));
-    log_.add(number_, now, data);
+    count(resource().write_sample(message_.bytes(), now), now, message_.bytes());
   }
 }
 

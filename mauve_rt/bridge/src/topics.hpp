@@ -8,20 +8,11 @@
 #include <atomic>
 #include <string>
 
-#include "mauve_rt/resource.hpp"
-
+#include "binding.hpp"
 #include "owned.hpp"
-#include "receiver.hpp"
-#include "topic_events.hpp"
 #include "topic_log.hpp"
 
 namespace mauve::bridge {
-
-/// How a topic fared. Counts of messages.
-struct TopicCounts {
-  std::uint64_t passed{0};   // sent, or received and written
-  std::uint64_t refused{0};  // by rcl, or by the resource: full, malformed, larger than it declares
-};
 
 /// The counts while one thread counts and others look.
 ///
@@ -46,59 +37,70 @@ class TopicCounter {
 
 /// What both directions are made from.
 struct TopicSettings {
+  std::string resource;
   std::string name;  // as given; rcl expands and remaps it
   std::string type;  // package/msg/Type
   rmw_qos_profile_t qos;
-  std::size_t number;  // in the log
+};
+
+/// What both directions have in common.
+class BoundTopic : public Binding {
+ public:
+  /// `number`: in the log.
+  BoundTopic(const std::string& resource_name, std::size_t number, TopicLog& log)
+      : Binding(resource_name), log_(log), number_(number) {}
+  std::vector<Arrival*> arrivals(Lane lane) override;
+  void report(BridgeReport& report) const override;
+
+ protected:
+  /// Of a message that went through, or not. [non-rt]
+  void count(bool passed, time_ns_t time_ns, std::span<const std::byte> message);
+  virtual std::string full_name() const = 0;
+  virtual const TopicEvents& events() const = 0;
+
+ private:
+  TopicLog& log_;
+  std::size_t number_;
+  TopicCounter counter_;
 };
 
 /// Publishes what is written to a resource. For one thread at a time.
-class OutgoingTopic {
+class OutgoingTopic final : public BoundTopic {
  public:
   /// Throws Error when the type is not installed or rcl refuses. [non-rt]
-  OutgoingTopic(rcl_node_t& node, Resource& resource, const TopicSettings& settings, TopicLog& log);
+  OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number, TopicLog& log);
 
-  /// Publishes what was written since the last call, oldest first; true when there may be more. [non-rt]
-  bool send();
-  std::string full_name() const { return rcl_publisher_get_topic_name(publisher_.get()); }
-  TopicCounts counts() const noexcept { return counter_.counts(); }
-  const TopicEvents& events() const noexcept { return events_; }
-  const Resource& resource() const noexcept { return resource_; }
+  bool send() override;
 
  private:
-  Resource& resource_;
-  TopicLog& log_;
-  std::size_t number_;
+  std::string full_name() const override { return rcl_publisher_get_topic_name(publisher_.get()); }
+  const TopicEvents& events() const override { return events_; }
+
   Owned<rcl_publisher_t, rcl_publisher_fini> publisher_;
   std::vector<std::byte> message_;  // keeps its capacity
   std::uint64_t seen_{0};
-  TopicCounter counter_;
   TopicEvents events_;  // end before the entity that they are of
 };
 
 /// Writes to a resource what is published. Taken from by the receiver's thread.
-class IncomingTopic final : public Arrival {
+class IncomingTopic final : public BoundTopic, private Arrival {
  public:
   /// Throws Error when the type is not installed or rcl refuses. [non-rt]
-  IncomingTopic(rcl_node_t& node, Resource& resource, const TopicSettings& settings, TopicLog& log);
+  IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number, TopicLog& log);
 
+  std::vector<Arrival*> arrivals(Lane lane) override;
+
+ private:
   void join(rcl_wait_set_t& set) override;
   bool has_arrived(const rcl_wait_set_t& set) const override;
   void take() override;
-  std::string full_name() const { return rcl_subscription_get_topic_name(subscription_.get()); }
-  TopicCounts counts() const noexcept { return counter_.counts(); }
-  const TopicEvents& events() const noexcept { return events_; }
-  const Resource& resource() const noexcept { return resource_; }
+  std::string full_name() const override { return rcl_subscription_get_topic_name(subscription_.get()); }
+  const TopicEvents& events() const override { return events_; }
 
- private:
-  Resource& resource_;
-  TopicLog& log_;
-  std::size_t number_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;
   std::size_t place_{0};  // in the wait set
-  TopicCounter counter_;
-  TopicEvents events_;  // end before the entity that they are of
+  TopicEvents events_;    // end before the entity that they are of
 };
 
 }  // namespace mauve::bridge

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <rosidl_runtime_c/message_type_support_struct.h>
+#include <rosidl_runtime_c/service_type_support_struct.h>
 
 #include <string>
 
@@ -11,5 +12,22 @@ namespace mauve::bridge {
 /// The type support of `package/msg/Type`; its library stays loaded. [non-rt]
 /// Throws Error (unknown_type) naming what is not installed.
 const rosidl_message_type_support_t& message_type_support(const std::string& type);
+
+/// The type of a ROS service, and how its messages are made.
+struct CallTypeSupport {
+  using Create = void* (*)();
+  using Destroy = void (*)(void*);
+  struct Message {
+    const rosidl_message_type_support_t* type;
+    Create create;
+    Destroy destroy;
+  };
+  const rosidl_service_type_support_t* service;
+  Message request;
+  Message response;
+};
+
+/// Of `package/srv/Type`. [non-rt] Throws Error (unknown_type) when it is not installed.
+CallTypeSupport call_type_support(const std::string& type);
 
 }  // namespace mauve::bridge

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What all bindings of a resource to ROS are: opened on a name, then attached to the resource that they serve.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/client.hpp"
+#include "mauve_rt/resource.hpp"
+
+#include "receiver.hpp"
+#include "topic_events.hpp"
+
+namespace mauve::bridge {
+
+/// How a topic fared. Counts of messages.
+struct TopicCounts {
+  std::uint64_t passed{0};   // sent, or received and written
+  std::uint64_t refused{0};  // by rcl, or by the resource: full, malformed, larger than it declares
+};
+
+/// What is known of a bound topic from outside.
+struct TopicReport {
+  std::string resource;
+  std::string topic;  // expanded and remapped
+  TopicCounts counts;
+  TopicTroubles troubles;
+};
+
+/// What is known of a ROS service that a resource calls, or offers: then only answered and other count.
+struct CallReport {
+  std::string resource;
+  std::string service;  // expanded and remapped
+  bool is_offered;
+  CallCounts counts;
+};
+
+struct BridgeReport {
+  std::vector<TopicReport> topics;
+  std::vector<CallReport> calls;
+};
+
+/// Which receiver's thread takes what arrives: calls wait for nobody's messages, nor the other way round.
+enum class Lane { messages, requests, events };
+
+/// An rcl entity and the resource behind it. Used by one thread at a time, or as its parts say.
+class Binding {
+ public:
+  explicit Binding(std::string resource_name) : resource_name_(std::move(resource_name)) {}
+  virtual ~Binding() = default;
+  Binding(const Binding&) = delete;
+  Binding& operator=(const Binding&) = delete;
+
+  const std::string& resource_name() const noexcept { return resource_name_; }
+  /// Whether it serves a resource; nothing is sent or taken before. [non-rt]
+  bool is_attached() const noexcept { return resource_ != nullptr; }
+  /// Serves the resource from now on, and keeps it alive. [non-rt] Throws Error when it is none to serve.
+  virtual void attach(std::shared_ptr<Resource> resource) { resource_ = std::move(resource); }
+  /// Sends what its resource has for the outside, oldest first; true when there may be more. [non-rt]
+  virtual bool send() { return false; }
+  /// What its receivers wait for. [non-rt]
+  virtual std::vector<Arrival*> arrivals(Lane /*lane*/) { return {}; }
+  virtual void report(BridgeReport& report) const = 0;
+
+ protected:
+  Resource& resource() const noexcept { return *resource_; }
+
+ private:
+  std::string resource_name_;
+  std::shared_ptr<Resource> resource_;
+};
+
+}  // namespace mauve::bridge
