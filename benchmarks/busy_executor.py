@@ -1,17 +1,15 @@
 """A real executor process of the tutorial's architecture, kept busy through ROS by a process of its own."""
 
-import os
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from native import ROOT, BenchmarkError
+from executor_process import ExecutorProcess
+from native import ROOT
 from processes import Processes
 
-from mauve_msgs.srv import Start, Stop
 from mauve_rt.cli.client import Client, connected
-from mauve_rt.errors import MauveError
 from mauve_rt.model import load_architecture
 from mauve_rt.trace.reader import read_bag
 from mauve_rt.trace.trace import Trace
@@ -30,21 +28,16 @@ class BusyExecutor:
     def __init__(self) -> None:
         self._stack = ExitStack()
         self._component = load_architecture(ARCHITECTURE).components[COMPONENT]
-        self._namespace = f"/bench_{os.getpid()}"
         self.load_report = ""
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self._processes = stack.enter_context(Processes())
             self._bag = self._processes.folder / "bag"
-            self._processes.spawn(
-                "executor",
-                *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={self._namespace}"),
-                *("-p", f"architecture:={ARCHITECTURE}", "-p", f"bag:={self._bag}"),
-            )
+            self._executor = ExecutorProcess(self._processes, ARCHITECTURE, f"bag:={self._bag}")
             self._client: Client = stack.enter_context(connected())
             program = str(Path(__file__).with_name("rclpy_load.py"))
-            names = (f"{self._namespace}/executor", f"{self._namespace}/beat")
+            names = (f"{self._executor.namespace}/executor", f"{self._executor.namespace}/beat")
             self._processes.spawn("load", program, *names)
             self._processes.await_output("load", "busy")
             self._stack = stack.pop_all()
@@ -67,11 +60,11 @@ class BusyExecutor:
 
     def start(self) -> None:
         """Start the component."""
-        self._ask(Start, "start", Start.Request(component=COMPONENT))
+        self._executor.start(self._client, COMPONENT)
 
     def stop(self) -> None:
         """Stop the component; executor and load go on."""
-        self._ask(Stop, "stop", Stop.Request(component=COMPONENT))
+        self._executor.stop(self._client, COMPONENT)
 
     def finish(self) -> Trace:
         """End both processes and read the bag.
@@ -81,13 +74,5 @@ class BusyExecutor:
         """
         self._processes.end("load")
         self.load_report = self._processes.output("load").strip().splitlines()[-1]
-        self._processes.end("executor")
+        self._executor.end()
         return read_bag(self._bag)
-
-    def _ask(self, service_type: type, name: str, request: object) -> None:
-        try:
-            reply = self._client.call(service_type, f"{self._namespace}/executor/{name}", request)
-        except MauveError as error:
-            raise BenchmarkError(f"executor: {error}; {self._processes.output('executor')}") from None
-        if not reply.success:
-            raise BenchmarkError(f"executor: {name} refused: {reply.message}")

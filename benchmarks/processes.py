@@ -37,13 +37,34 @@ class Processes:
     ) -> None:
         self._stack.__exit__(kind, error, traceback)
 
-    def spawn(self, name: str, *words: str) -> None:
-        """Start a Python program: a file, or -m and a module, and its arguments."""
+    def spawn(self, name: str, *words: str, **environment: str) -> int:
+        """Start a Python program: a file, or -m and a module, and its arguments; its process id."""
         log = self._stack.enter_context((self.folder / f"{name}.log").open("wb"))
-        process = subprocess.Popen([sys.executable, "-P", *words], stdout=log, stderr=log)
+        process = subprocess.Popen(
+            [sys.executable, "-P", *words],
+            stdin=subprocess.PIPE,
+            stdout=log,
+            stderr=log,
+            env=os.environ | environment,
+        )
         self._stack.callback(process.wait)
         self._stack.callback(process.kill)  # first: unless it ended well by then
         self._running[name] = process
+        return process.pid
+
+    def tell(self, name: str, line: str) -> None:
+        """Write a line to a process's standard input.
+
+        Raises:
+            BenchmarkError: it has ended.
+        """
+        pipe = self._running[name].stdin
+        assert pipe is not None  # noqa: S101 - spawned with one
+        try:
+            pipe.write(f"{line}\n".encode())
+            pipe.flush()
+        except OSError:
+            raise BenchmarkError(f"{name} ended: {self.output(name)}") from None
 
     def output(self, name: str) -> str:
         """Everything that a process printed."""
