@@ -20,6 +20,7 @@ class Settings:
     transactions: int
     soak: int
     service_calls: int
+    topics_s: float
     priority: int = 80
     cpu: int = 0
 
@@ -38,6 +39,7 @@ QUICK = Settings(
     transactions=100,
     soak=500,
     service_calls=50,
+    topics_s=1.0,
 )
 FULL = Settings(
     mode="full",
@@ -53,4 +55,5 @@ FULL = Settings(
     transactions=300,
     soak=10_000,
     service_calls=100,
+    topics_s=3.0,
 )

@@ -33,9 +33,12 @@ class Options {
       fail("--" + name + ": expected a number, found " + found->second);
     }
   }
+  std::string text(const std::string& name, const std::string& otherwise) const {
+    const auto found = values_.find(name);
+    return found == values_.end() ? otherwise : found->second;
+  }
   Who who() const {
-    const auto found = values_.find("who");
-    const std::string word = found == values_.end() ? "component" : found->second;
+    const std::string word = text("who", "component");
     if (word != "component" && word != "bare") fail("--who: expected component or bare, found " + word);
     return word == "component" ? Who::component : Who::bare;
   }

@@ -1,6 +1,9 @@
 """What the benchmarks conclude from their rounds: intervals, ratios, verdicts, the table."""
 
+import os
 import sys
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +16,7 @@ import machine
 import native
 from ratios import Interval, median_interval, percentile, ratio_interval, verdict
 from rows import alone, compared, exactly_zero, markdown, never_over, not_available
+from topics import Window, latencies_ns, lost_percent, process_cpu_ns
 
 
 def test_the_interval_of_equal_values_is_that_value():
@@ -147,3 +151,23 @@ def test_the_machine_is_described_in_one_line():
     assert found.kernel in found.line()
     assert "\n" not in found.line()
     assert 0.0 <= machine.StealMeter().percent() <= 100.0
+
+
+def test_messages_are_counted_by_when_they_were_sent():
+    window = Window(begin_ns=1_000_000_000, end_ns=2_000_000_000, cpu_ns=250_000_000)
+    sent_ns = np.arange(0, 3_000_000_000, 1_000_000)
+    messages = np.stack([0 * sent_ns, sent_ns // 1_000_000, sent_ns, sent_ns + 50_000], axis=1)
+    assert latencies_ns(messages, window) == [50_000.0] * 1000
+    assert lost_percent(messages, window, 1) == 0.0
+    assert lost_percent(messages, window, 2) == 50.0
+    assert lost_percent(messages[::4], window, 1) == 75.0
+    assert window.cpu_percent == 25.0
+
+
+def test_the_cpu_time_of_a_process_is_that_of_all_its_threads():
+    before_ns = process_cpu_ns(os.getpid())
+    thread = threading.Thread(target=lambda: sum(range(1_000_000)))
+    thread.start()
+    thread.join()
+    assert process_cpu_ns(os.getpid()) > before_ns
+    assert process_cpu_ns(os.getpid()) == pytest.approx(time.process_time_ns(), rel=0.1)

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A ROS node as one would have it with rcl alone, for the references.
+#pragma once
+
+#include <geometry_msgs/msg/point.h>
+#include <rcl/error_handling.h>
+#include <rcl/rcl.h>
+
+#include <atomic>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace bench {
+
+using PointMessage = geometry_msgs__msg__Point;
+
+/// Throws std::runtime_error with what rcl says unless it went well.
+inline void check(rcl_ret_t outcome, const char* what) {
+  if (outcome == RCL_RET_OK) return;
+  const std::string message = rcl_get_error_string().str;
+  rcl_reset_error();
+  throw std::runtime_error(std::string(what) + ": " + message);
+}
+
+inline const rosidl_message_type_support_t* point_type() {
+  return ROSIDL_GET_MSG_TYPE_SUPPORT(geometry_msgs, msg, Point);
+}
+
+/// A context and a node in it. Ends with the process, as do publishers and subscriptions.
+class BareNode {
+ public:
+  BareNode(const char* name, const std::string& name_space) {
+    rcl_init_options_t options = rcl_get_zero_initialized_init_options();
+    check(rcl_init_options_init(&options, rcl_get_default_allocator()), "rcl_init_options_init");
+    check(rcl_init(0, nullptr, &options, &context_), "rcl_init");
+    const rcl_node_options_t node_options = rcl_node_get_default_options();
+    check(rcl_node_init(&node_, name, name_space.c_str(), &context_, &node_options), "rcl_node_init");
+  }
+  BareNode(const BareNode&) = delete;
+  BareNode& operator=(const BareNode&) = delete;
+
+  rcl_context_t& context() { return context_; }
+  rcl_node_t& get() { return node_; }
+
+ private:
+  rcl_context_t context_ = rcl_get_zero_initialized_context();
+  rcl_node_t node_ = rcl_get_zero_initialized_node();
+};
+
+/// point_0, point_1 ..., relative to the node's namespace, as the talker's architecture names them.
+inline std::string topic_name(std::size_t number) { return "point_" + std::to_string(number); }
+
+/// Says on the standard output that everybody is there.
+inline void say(const char* word) { std::cout << word << std::endl; }
+
+}  // namespace bench

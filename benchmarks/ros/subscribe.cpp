@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Takes stamped points with rcl alone, and remembers when.
+//   subscribe [--topics 1] [--namespace /bench] [--publishers 1] [--capacity 1000000] --file FILE
+// Prints `ready` when it knows so many publishers of each topic. At a line on the standard input it writes what it
+// took to the file, as 64 bit integers (topic, number, instant sent, instant taken), and prints `written`.
+#include <chrono>
+#include <fstream>
+
+#include "mauve_rt/time.hpp"
+
+#include "ros/bare_node.hpp"
+#include "ros/stamp.hpp"
+#include "support/options.hpp"
+
+namespace {
+
+struct Taken {
+  std::int64_t topic;
+  std::int64_t number;
+  mauve::time_ns_t sent_ns;
+  mauve::time_ns_t taken_ns;
+};
+
+class BareSubscriber {
+ public:
+  explicit BareSubscriber(const bench::Options& options)
+      : node_("bare_subscriber", options.text("namespace", "/bench")) {
+    taken_.resize(static_cast<std::size_t>(options.number("capacity", 1'000'000)));  // pages touched
+    subscriptions_.resize(static_cast<std::size_t>(options.number("topics", 1)),
+                          rcl_get_zero_initialized_subscription());
+    const rcl_subscription_options_t reliable = rcl_subscription_get_default_options();
+    for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
+      bench::check(rcl_subscription_init(&subscriptions_[i], &node_.get(), bench::point_type(),
+                                         bench::topic_name(i).c_str(), &reliable),
+                   "rcl_subscription_init");
+    }
+    bench::check(rcl_wait_set_init(&set_, subscriptions_.size(), 0, 0, 0, 0, 0, &node_.context(),
+                                   rcl_get_default_allocator()),
+                 "rcl_wait_set_init");
+  }
+
+  void await_publishers(std::size_t wanted) {
+    for (const rcl_subscription_t& subscription : subscriptions_) {
+      for (std::size_t found = 0; found < wanted;) {
+        bench::check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
+        if (found < wanted) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    }
+  }
+
+  /// Takes what comes until told to end.
+  void run(const std::atomic<bool>& ending) {
+    while (!ending) {
+      bench::check(rcl_wait_set_clear(&set_), "rcl_wait_set_clear");
+      for (const rcl_subscription_t& subscription : subscriptions_)
+        bench::check(rcl_wait_set_add_subscription(&set_, &subscription, nullptr), "rcl_wait_set_add");
+      const rcl_ret_t outcome = rcl_wait(&set_, mauve::ms_to_ns(100));
+      if (outcome == RCL_RET_TIMEOUT) continue;
+      bench::check(outcome, "rcl_wait");
+      for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
+        if (set_.subscriptions[i] != nullptr) take(i);
+      }
+    }
+  }
+
+  void write(const std::string& name) const {
+    std::ofstream file(name, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(taken_.data()),
+               static_cast<std::streamsize>(count_ * sizeof(Taken)));
+    if (!file.flush()) throw std::runtime_error("cannot write " + name);
+  }
+
+ private:
+  void take(std::size_t topic) {
+    bench::PointMessage point{};
+    while (rcl_take(&subscriptions_[topic], &point, nullptr, nullptr) == RCL_RET_OK) {
+      const mauve::time_ns_t now = mauve::monotonic_now_ns();
+      if (count_ == taken_.size()) throw std::runtime_error("more messages than --capacity");
+      taken_[count_++] = {.topic = static_cast<std::int64_t>(topic),
+                          .number = static_cast<std::int64_t>(point.z),
+                          .sent_ns = bench::instant_of(point),
+                          .taken_ns = now};
+    }
+    rcl_reset_error();  // nothing left, which is no error
+  }
+
+  bench::BareNode node_;
+  std::vector<rcl_subscription_t> subscriptions_;
+  rcl_wait_set_t set_ = rcl_get_zero_initialized_wait_set();
+  std::vector<Taken> taken_;
+  std::size_t count_{0};
+};
+
+}  // namespace
+
+extern "C" int bench_subscribe(int count, char** words) {
+  return bench::run_program(count, words, [](const bench::Options& options) {
+    BareSubscriber subscriber(options);
+    subscriber.await_publishers(static_cast<std::size_t>(options.number("publishers", 1)));
+    bench::say("ready");
+    static std::atomic<bool> ending{false};
+    std::thread([] {
+      std::string line;
+      std::getline(std::cin, line);
+      ending = true;
+    }).detach();  // the process ends with or without a line
+    subscriber.run(ending);
+    subscriber.write(options.text("file", "/dev/null"));
+    bench::say("written");
+  });
+}
