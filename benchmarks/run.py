@@ -16,10 +16,12 @@ from pathlib import Path
 import machine
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from native import BenchmarkError
+from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
 from rows import Row, markdown, not_available
 from scale import scale_rows
 from service_calls import service_rows
 from settings import FULL, QUICK, Settings
+from start import start_rows
 from topics import topic_rows
 from transactions import soak_rows, transaction_rows
 from wakeup import wakeup_rows
@@ -29,6 +31,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "wakeup": wakeup_rows,
     "executor-wakeup": executor_wakeup_rows,
     "deployment": deployment_rows,
+    "restart": restart_rows,
     "stop": stop_rows,
     "swap": swap_rows,
     "transaction": transaction_rows,
@@ -41,6 +44,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "soak": soak_rows,
     "service": service_rows,
     "topics": topic_rows,
+    "start": start_rows,
 }
 
 
