@@ -2,6 +2,8 @@
 
 from typing import overload
 
+from collections.abc import Sequence
+
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""
 
@@ -81,8 +83,11 @@ class Bridge:
     What is opened can be found on the network; it serves its resource from attach() on.
     """
 
-    def __init__(self, node: int, architecture: int) -> None:
-        """Take addresses: `node.handle.pointer`, `architecture.pointer`; both outlive the bridge."""
+    def __init__(self, node: int, architecture: int, *, priority: int = 1, cpus: Sequence[int] = ()) -> None:
+        """Take addresses: `node.handle.pointer`, `architecture.pointer`; both outlive the bridge.
+
+        Priority (SCHED_FIFO) and CPUs (none: any) are the sending thread's.
+        """
     def publish(self, resource: str, topic: str, type: str, qos: Qos) -> int:
         """Open a topic for a resource; returns the number of what was opened, also in the log.
 

@@ -43,6 +43,7 @@ class ArchitectureModel:
         self.peers = list(content.executor.peers if overrides.peers is None else overrides.peers)
         self.require_realtime = content.executor.require_realtime
         self.diagnostics = content.executor.diagnostics
+        self.sender = content.executor.sender
         self.components: dict[str, ComponentModel] = dict(content.components)
         self.resources: dict[str, ResourceModel] = dict(content.resources)
         self.connections = [
@@ -153,7 +154,8 @@ def online_cpus() -> frozenset[int]:
 
 
 def element_problems(model: ArchitectureModel) -> Iterator[Problem]:
-    """What is wrong with components and resources, each taken by itself."""
+    """What is wrong with the executor, components and resources, each taken by itself."""
+    yield from _cpu_problems(model, ("executor", "sender"), "executor's sender", model.sender.cpus)
     yield from _component_problems(model)
     yield from _resource_problems(model)
 
@@ -167,21 +169,27 @@ def _override_problems(model: ArchitectureModel, overrides: Overrides) -> Iterat
 
 
 def _component_problems(model: ArchitectureModel) -> Iterator[Problem]:
-    online = online_cpus()
     for name, component in model.components.items():
         if name in model.resources:
             what = f"'{name}' is the name of a component and of a resource"
             yield model.key_problem(("resources", name), what, remedy="rename one", code="duplicate_name")
-        for index, cpu in enumerate(component.cpus or ()):
-            if cpu not in online:
-                yield model.problem(
-                    ("components", name, "cpus", index),
-                    f"component '{name}' asks for a CPU that this machine does not have",
-                    expected=f"one of {', '.join(str(cpu) for cpu in sorted(online))}",
-                    found=str(cpu),
-                    remedy="leave cpus out to allow every CPU",
-                    code="out_of_range",
-                )
+        yield from _cpu_problems(model, ("components", name), f"component '{name}'", component.cpus)
+
+
+def _cpu_problems(
+    model: ArchitectureModel, location: Location, who: str, cpus: Sequence[int] | None
+) -> Iterator[Problem]:
+    online = online_cpus()
+    for index, cpu in enumerate(cpus or ()):
+        if cpu not in online:
+            yield model.problem(
+                (*location, "cpus", index),
+                f"{who} asks for a CPU that this machine does not have",
+                expected=f"one of {', '.join(str(cpu) for cpu in sorted(online))}",
+                found=str(cpu),
+                remedy="leave cpus out to allow every CPU",
+                code="out_of_range",
+            )
 
 
 def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:

@@ -29,6 +29,11 @@ From which figures on /diagnostics warns, for all components and for each one:
 Figures are those since the last status, a second before. A key of a component takes the place of the
 executor's, `null` switches it off.
 
+Messages are sent by a thread of the executor, after the components have done their work. Where a message must
+not wait for other components, or for another CPU to wake up, say where it runs and how urgently:
+
+    executor: {sender: {priority: 70, cpus: [0]}}
+
 Nothing here looks at plug-ins, so a file can be read where none is installed.
 """
 
@@ -159,6 +164,13 @@ class DiagnosticsModel(_Section):
         return self.model_copy(update={key: getattr(other, key) for key in other.model_fields_set})
 
 
+class SenderModel(_Section):
+    """The thread that sends the messages of bound topics."""
+
+    priority: Annotated[int, Field(ge=1, le=MAX_PRIORITY)] = 1
+    cpus: Annotated[list[Cpu], Field(min_length=1)] | None = None  # absent: any
+
+
 class ExecutorModel(_Section):
     """The process as a whole."""
 
@@ -166,6 +178,7 @@ class ExecutorModel(_Section):
     peers: list[Identifier] = []
     require_realtime: bool = False
     diagnostics: DiagnosticsModel = DiagnosticsModel()  # of every component
+    sender: SenderModel = SenderModel()
 
 
 class QosModel(_Section):

@@ -14,6 +14,7 @@ from mauve_rt.model.schema import (
     FileModel,
     QosModel,
     ResourceModel,
+    SenderModel,
     ThresholdModel,
     TopicModel,
 )
@@ -128,8 +129,8 @@ def _section(location: Location) -> type[BaseModel]:
             return DiagnosticsModel
         case (*_, "diagnostics", _):
             return ThresholdModel
-        case ("executor",):
-            return ExecutorModel
+        case ("executor", *rest):
+            return (ExecutorModel, SenderModel)[len(rest)]
         case ("components", _):
             return ComponentModel
         case ("resources", _, *rest):

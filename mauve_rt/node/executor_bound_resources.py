@@ -55,7 +55,13 @@ class BoundResources:
             MauveError: a type is not installed, or the middleware refuses; nothing is open then.
         """
         with self._lock:
-            self._bridge = Bridge(self._node.handle.pointer, architecture.pointer)
+            sender = model.sender
+            self._bridge = Bridge(
+                self._node.handle.pointer,
+                architecture.pointer,
+                priority=sender.priority,
+                cpus=sender.cpus or (),
+            )
             try:
                 described = {resource.name: resource for resource in architecture.resources()}
                 self.attach(self.open(model.resources, described))

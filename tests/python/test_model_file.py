@@ -180,6 +180,18 @@ BAD = {
         "4000",
         "a CPU that this machine does not have: expected one of 0",
     ),
+    "no such cpu of the sender": (
+        "peers: [robot_2, robot_3]",
+        "sender: {cpus: [4000]}",
+        "4000",
+        "executor's sender asks for a CPU that this machine does not have: expected one of 0",
+    ),
+    "sender key": (
+        "peers: [robot_2, robot_3]",
+        "sender: {prioritty: 1}",
+        "prioritty: 1",
+        "unknown key 'prioritty' in 'executor.sender'; did you mean priority?",
+    ),
     "no cpu": (
         "cpus: [0]",
         "cpus: []",

@@ -1,5 +1,7 @@
 """The native bridge: any installed message type, both ways, by quality of service; and what goes wrong."""
 
+import os
+import resource
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -32,6 +34,7 @@ from mauve_rt.node.executor_runtime import Runtime
 
 PARTS = """\
 mauve: 1
+executor: {sender: {priority: 7, cpus: [0]}}
 components:
   counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
             properties: {period_ms: 20}}
@@ -210,6 +213,19 @@ def test_qualities_of_service_by_field_are_those_of_the_topic(bind: Bind, graph:
     )
     assert found.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
     assert found.liveliness_lease_duration == Duration(seconds=2)
+
+
+def test_messages_are_sent_where_and_as_urgently_as_the_file_says(bind: Bind) -> None:
+    bind("""\
+  word: {kind: shared_data, type: std_msgs/msg/String, topic: {name: word, direction: publish}}
+""")
+    tasks = Path("/proc/self/task").iterdir()
+    sender = next(int(task.name) for task in tasks if (task / "comm").read_text() == "topics_out\n")
+    assert os.sched_getaffinity(sender) == {0}
+    if resource.getrlimit(resource.RLIMIT_RTPRIO)[0] == 0 and os.geteuid() != 0:
+        pytest.skip("needs the right to real-time priorities (rtprio)")
+    assert os.sched_getscheduler(sender) == os.SCHED_FIFO
+    assert os.sched_getparam(sender).sched_priority == 7
 
 
 def test_a_quality_of_service_that_does_not_fit_is_told(bind: Bind, graph: Any) -> None:

@@ -66,6 +66,7 @@ void Bridge::start() {
   running_ = true;
   ending_.store(false, std::memory_order_release);
   sender_ = start_thread("topics_out", [this] { send_all(); });
+  place(sender_, sender_place_);
   start_receivers();
 }
 

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "mauve_rt/architecture.hpp"
+#include "mauve_rt/pi_mutex.hpp"
 
 #include "calls.hpp"
+#include "thread.hpp"
 #include "topics.hpp"
 
 namespace mauve::bridge {
@@ -25,7 +27,9 @@ namespace mauve::bridge {
 class Bridge {
  public:
   /// The node and the architecture outlive the bridge. Throws Error when rcl refuses. [non-rt]
-  Bridge(rcl_node_t& node, Architecture& architecture) : node_(node), architecture_(architecture) {}
+  /// The sending thread is real-time: an ordinary one of a busy machine comes when the newest value is replaced already.
+  Bridge(rcl_node_t& node, Architecture& architecture, ThreadPlace sender = {})
+      : node_(node), architecture_(architecture), sender_place_(std::move(sender)) {}
   ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
@@ -66,8 +70,9 @@ class Bridge {
 
   rcl_node_t& node_;
   Architecture& architecture_;
+  ThreadPlace sender_place_;
   TopicLog log_;
-  std::mutex mutex_;
+  PiMutex mutex_;
   std::map<std::size_t, std::unique_ptr<Binding>> bindings_;
   std::size_t opened_{0};
   Receiver messages_{node_, "topics_in"};

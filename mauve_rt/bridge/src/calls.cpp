@@ -5,6 +5,8 @@
 #include <rcl/graph.h>
 #include <rmw/rmw.h>
 
+#include <mutex>
+
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/time.hpp"
 

@@ -6,8 +6,9 @@
 #include <rcl/service.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
+
+#include "mauve_rt/pi_mutex.hpp"
 
 #include "binding.hpp"
 #include "owned.hpp"
@@ -71,7 +72,7 @@ class CalledService final : public Binding, private Arrival {
   std::vector<std::byte> serialized_;
   OwnedMessage message_;
   std::size_t place_{0};  // in the wait set
-  std::mutex mutex_;
+  PiMutex mutex_;
   std::int64_t sequence_{-1};  // rcl's number of the last request
   std::uint32_t number_{0};    // the client's
 };

@@ -81,11 +81,14 @@ PYBIND11_MODULE(_bridge, module) {
       .def_property_readonly("refused", [](const TopicReport& self) { return self.counts.refused; })
       .def_property_readonly("troubles", [](const TopicReport& self) { return self.troubles; });
   py::class_<Bridge>(module, "Bridge")
-      .def(py::init([](std::uintptr_t node, std::uintptr_t architecture) {
+      .def(py::init([](std::uintptr_t node, std::uintptr_t architecture, int priority,
+                       const std::vector<int>& cpus) {
              return std::make_unique<Bridge>(*std::bit_cast<rcl_node_t*>(node),
-                                             *std::bit_cast<Architecture*>(architecture));
+                                             *std::bit_cast<Architecture*>(architecture),
+                                             ThreadPlace{.priority = priority, .cpus = cpus});
            }),
-           py::arg("node"), py::arg("architecture"))
+           py::arg("node"), py::arg("architecture"), py::kw_only(), py::arg("priority") = 1,
+           py::arg("cpus") = std::vector<int>())
       .def("publish", &open_topic<&Bridge::publish>, py::arg("resource"), py::arg("topic"), py::arg("type"),
            py::arg("qos"), Unlocked())
       .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
