@@ -42,8 +42,12 @@ class Talkers:
         priority: int,
         cpu: int,
         releases: int = 1,
+        sent_anywhere: bool = False,
     ) -> None:
-        """Write the architecture file; each talker remembers so many releases."""
+        """Write the architecture file; each talker remembers so many releases.
+
+        Messages are sent on the CPU of the talkers, unless `sent_anywhere`.
+        """
         self.architecture = path
         self.names = [f"talker_{index}" for index in range(count)]
         self._files = [path.with_suffix(f".{name}") for name in self.names]
@@ -62,7 +66,13 @@ class Talkers:
             | {"properties": {"topics": topics, "releases": releases, "file": str(file)}}
             for name, file in zip(self.names, self._files, strict=True)
         }
-        model = {"mauve": 1, "components": components, "resources": resources, "connections": connections}
+        model = {
+            "mauve": 1,
+            "executor": {} if sent_anywhere else {"sender": {"cpus": [cpu]}},
+            "components": components,
+            "resources": resources,
+            "connections": connections,
+        }
         path.write_text(json.dumps(model), encoding="utf-8")  # which is YAML
 
     def releases(self) -> list[npt.NDArray[np.int64]]:

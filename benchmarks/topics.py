@@ -116,8 +116,11 @@ class Stage:
     ) -> None:
         self._stack.__exit__(kind, error, traceback)
 
-    def executor(self, name: str, *, bound: bool = True) -> Side:
-        """An executor with one component that writes to all topics, or to resources bound to none."""
+    def executor(self, name: str, *, bound: bool = True, sent_anywhere: bool = False) -> Side:
+        """An executor with one component that writes to all topics, or to resources bound to none.
+
+        Its messages are sent on the CPU of the component, as those of the bare publisher, or on any.
+        """
         talkers = Talkers(
             self._processes.folder / f"{name}.yaml",
             topics=self._topics,
@@ -125,6 +128,7 @@ class Stage:
             priority=self._settings.priority,
             cpu=self._settings.cpu,
             releases=self._releases,
+            sent_anywhere=sent_anywhere,
         )
         process = ExecutorProcess(self._processes, talkers.architecture, name=name, plugins=self._plugins)
         self._executors.append((process, talkers))
@@ -204,17 +208,17 @@ def topic_rows(settings: Settings) -> Iterator[Row]:
 def _latency_rows(settings: Settings) -> Iterator[Row]:
     """One topic: rounds of the executor's component and of the bare publisher."""
     with Stage(settings, topics=1) as stage:
-        rounds = _rounds(stage, settings, (stage.executor("executor"), stage.bare()[0]))
+        sides = (stage.executor("executor"), stage.bare()[0], stage.executor("anywhere", sent_anywhere=True))
+        rounds = _rounds(stage, settings, sides)
         messages = stage.messages()
+    what = "a Point from a 1 kHz component's write to another process's subscription"
     for percent in (50, 99):
         latencies = [[_latency_us(messages, window, percent) for window in found] for found in rounds]
-        yield compared(
-            f"a Point from a 1 kHz component's write to another process's subscription, p{percent}",
-            [(executor, bare) for executor, bare in latencies],
-            unit="us",
-            beside="bare rcl publisher, same subscriber",
-            ratio_limit=1.2,
-        )
+        beside = "bare rcl publisher, same subscriber"
+        here = [(here, bare) for here, bare, _ in latencies]
+        yield compared(f"{what}, p{percent}", here, unit="us", beside=beside, ratio_limit=1.2)
+        elsewhere = [(elsewhere, bare) for _, bare, elsewhere in latencies]
+        yield compared(f"the same, sent on any CPU, p{percent}", elsewhere, unit="us", beside=beside)
 
 
 def _load_rows(settings: Settings) -> Iterator[Row]:
