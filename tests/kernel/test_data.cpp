@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Serialization, names in errors, trace rings, histograms.
+// Serialization, names in errors, trace rings, histograms, the notifier.
 #include "fixtures.hpp"
 
 namespace mauve::testing {
@@ -140,6 +140,32 @@ TEST(Maximum, IsKeptSinceTheStartAndSinceItWasTaken) {
   EXPECT_EQ(20, maximum.take_recent_ns());
   EXPECT_EQ(0, maximum.take_recent_ns());
   EXPECT_EQ(30, maximum.max_ns());
+}
+
+TEST(Notifier, WakesEveryWaiterForEveryWriteThatCameAfterItsLook) {
+  constexpr std::uint32_t kWrites = 3000;
+  Notifier notifier;
+  std::array<std::atomic<std::uint32_t>, 2> seen{};
+  const auto follow = [&notifier](std::atomic<std::uint32_t>& mine) {
+    while (mine < kWrites) {
+      const time_ns_t until = monotonic_now_ns() + s_to_ns(10);
+      const std::uint32_t word = notifier.wait(mine, until);
+      if (monotonic_now_ns() >= until) return;  // nobody woke it
+      mine = word;
+    }
+  };
+  {
+    const std::jthread first([&] { follow(seen[0]); });
+    const std::jthread second([&] { follow(seen[1]); });
+    const time_ns_t until = monotonic_now_ns() + s_to_ns(20);
+    for (std::uint32_t i = 1; i <= kWrites; ++i) {
+      notifier.wait(i - 1, monotonic_now_ns());  // a third one gives up
+      notifier.notify();
+      while ((seen[0] < i || seen[1] < i) && monotonic_now_ns() < until) std::this_thread::yield();
+    }
+  }
+  EXPECT_EQ(seen[0], kWrites);
+  EXPECT_EQ(seen[1], kWrites);
 }
 
 }  // namespace

@@ -11,15 +11,15 @@ namespace mauve {
 
 void Notifier::notify() noexcept {
   word_.fetch_add(1, std::memory_order_seq_cst);
-  if (waiters_.load(std::memory_order_seq_cst) != 0) futex_wake_all(word_);
+  // Once for all writes until it waits again: it may not run before the component that writes has come to its wait.
+  if (waiting_.load(std::memory_order_seq_cst) && waiting_.exchange(false, std::memory_order_seq_cst))
+    futex_wake_all(word_);
 }
 
 std::uint32_t Notifier::wait(std::uint32_t seen, time_ns_t until_ns) noexcept {
-  waiters_.fetch_add(1, std::memory_order_seq_cst);
-  while (word_.load(std::memory_order_seq_cst) == seen) {
-    if (!futex_wait_until(word_, seen, until_ns)) break;
-  }
-  waiters_.fetch_sub(1, std::memory_order_seq_cst);
+  waiting_.store(true, std::memory_order_seq_cst);
+  while (word_.load(std::memory_order_seq_cst) == seen && futex_wait_until(word_, seen, until_ns))
+    waiting_.store(true, std::memory_order_seq_cst);
   return word();
 }
 

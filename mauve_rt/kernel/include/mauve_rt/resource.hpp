@@ -19,10 +19,10 @@ class ClientBase;
 
 /// Tells one waiting thread that some published resource was written.
 ///
-/// | member   | written by            | order                                                                    |
-/// | -------- | --------------------- | ------------------------------------------------------------------------ |
-/// | word_    | writers               | seq_cst with waiters_: the writer sees the waiter or the waiter the word |
-/// | waiters_ | the thread that waits | seq_cst: likewise                                                        |
+/// | member   | written by                         | order                                                                    |
+/// | -------- | ---------------------------------- | ------------------------------------------------------------------------ |
+/// | word_    | writers                            | seq_cst with waiting_: the writer sees the waiter or the waiter the word |
+/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when nobody woke it, which costs one wake   |
 class Notifier {
  public:
   /// Wakes the waiter if one sleeps. [rt]
@@ -35,7 +35,7 @@ class Notifier {
 
  private:
   std::atomic<std::uint32_t> word_{0};
-  std::atomic<std::uint32_t> waiters_{0};
+  std::atomic<bool> waiting_{false};
 };
 
 /// Someone told of every write to a resource, e.g. a task that waits for one.
