@@ -16,7 +16,7 @@ import machine
 import native
 from ratios import Interval, median_interval, percentile, ratio_interval, verdict
 from rows import alone, compared, exactly_zero, markdown, never_over, not_available
-from topics import Window, latencies_ns, lost_percent, process_cpu_ns
+from topics import Window, latencies_ns, lost_on_the_way, lost_percent, process_cpu_ns
 
 
 def test_the_interval_of_equal_values_is_that_value():
@@ -161,6 +161,11 @@ def test_messages_are_counted_by_when_they_were_sent():
     assert lost_percent(messages, window, 1) == 0.0
     assert lost_percent(messages, window, 2) == 50.0
     assert lost_percent(messages[::4], window, 1) == 75.0
+    assert lost_on_the_way(messages, window) == 0
+    gappy = messages[messages[:, 1] % 100 != 50]  # a hundredth, never the first or last of the window
+    assert lost_on_the_way(gappy, window) == 10
+    of_another_topic = messages + np.array([1, 5, 0, 0])
+    assert lost_on_the_way(np.concatenate([gappy, of_another_topic]), window) == 10
     assert window.cpu_percent == 25.0
 
 
