@@ -87,9 +87,11 @@ def _autostart(node: Any, stop: threading.Event) -> int:
 
 
 def _spin(node: Any, stop: threading.Event) -> None:
-    from rclpy.executors import MultiThreadedExecutor  # noqa: PLC0415
+    from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThread  # noqa: PLC0415
 
-    executor = MultiThreadedExecutor(num_threads=node.THREADS)
+    requests = ServiceThread(node, node.control_group)
+    requests.start()
+    executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
     executor.add_node(node)
     while not stop.is_set():
         try:
@@ -97,6 +99,7 @@ def _spin(node: Any, stop: threading.Event) -> None:
         except Exception as error:  # noqa: BLE001 - a malformed request must not end the process
             node.get_logger().error(f"a message or request was dropped: {type(error).__name__}: {error}")
     node.quiesce()  # ends what a request may be waiting for
+    requests.stop()
     # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
     executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
     executor.shutdown(timeout_sec=0)

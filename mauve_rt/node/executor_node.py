@@ -37,11 +37,12 @@ class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
     Requests, lifecycle transitions, listing and recorded topics have a callback group each, so that a stop
-    that waits for a component delays none of the others (given a thread for each: `THREADS`). Messages and
-    calls of bound resources do not come by here: they have threads of their own, in C++.
+    that waits for a component delays none of the others. Requests, in `control_group`, are for a
+    `ServiceThread`, the others for an executor with a thread for each: `THREADS`. Messages and calls
+    of bound resources do not come by here: they have threads of their own, in C++.
     """
 
-    THREADS = 4
+    THREADS = 3
 
     def __init__(self, runtime: Runtime, *, namespace: str) -> None:
         """Create the node; the runtime may be configured already.
@@ -52,7 +53,8 @@ class ExecutorNode(LifecycleNode):
         # Transitions are in the node's default group.
         super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
-        control_group, query_group = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        self.control_group = control_group = MutuallyExclusiveCallbackGroup()
+        query_group = MutuallyExclusiveCallbackGroup()
         self._data_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         self._settings = self._declared()
