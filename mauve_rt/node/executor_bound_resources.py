@@ -78,6 +78,8 @@ class BoundResources:
             MauveError: as configure(); none of them is open then.
         """
         opened: dict[str, list[int]] = {}
+        if not resources:
+            return opened
         with self._lock:
             bridge = self._require_bridge()
             try:
@@ -109,20 +111,21 @@ class BoundResources:
         Raises:
             MauveError: one of them is none to serve.
         """
-        with self._lock:
-            self._require_bridge().attach([number for numbers in opened.values() for number in numbers])
-            self._numbers.update(opened)
+        if opened:
+            with self._lock:
+                self._require_bridge().attach([number for numbers in opened.values() for number in numbers])
+                self._numbers.update(opened)
 
     def discard(self, opened: Mapping[str, list[int]]) -> None:
         """Close what was opened for resources that did not come to be."""
-        with self._lock:
-            self._require_bridge().close([number for numbers in opened.values() for number in numbers])
+        if opened:
+            with self._lock:
+                self._require_bridge().close([number for numbers in opened.values() for number in numbers])
 
     def remove(self, resources: Iterable[str]) -> None:
         """Close the topics and services of resources that are gone; what they were told before is sent."""
         with self._lock:
-            if gone := {name: self._numbers.pop(name) for name in resources if name in self._numbers}:
-                self.discard(gone)
+            self.discard({name: self._numbers.pop(name) for name in resources if name in self._numbers})
 
     def start(self) -> None:
         """Let messages and calls flow, both ways."""

@@ -1,12 +1,18 @@
 """Requests carried out or refused. Knows nothing of ROS: `executor_services` is its ROS face."""
 
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Protocol
 
-from mauve_rt._kernel import ResourceDescription, StepReport, TransactionReport, monotonic_ns
+from mauve_rt._kernel import (
+    ComponentDescription,
+    ResourceDescription,
+    StepReport,
+    TransactionReport,
+    monotonic_ns,
+)
 from mauve_rt.errors import MauveError, error_code, one_line
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.node.executor_checks import check_form, check_state, check_time
@@ -79,10 +85,13 @@ class Control:
             return outcome
 
     def _outcome(self, request: Request) -> Outcome:
-        from_core, to_core = self._replaced_core(request)
+        # The kernel's count is taken first: what changes from here on, the commit finds.
+        kernel_epoch = self._runtime.kernel_epoch()
+        epoch, parts = self._runtime.observe()
+        from_core, to_core = _replaced_core(request, parts)
         try:
             check_form(request)
-            outcome = self._carry_out(request)
+            outcome = self._carry_out(request, parts, kernel_epoch=kernel_epoch)
         except RefusalError as refusal:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
@@ -90,35 +99,27 @@ class Control:
         except Exception as error:  # noqa: BLE001 - an error of ours must not cost the requester the answer
             text = one_line(f"internal error: {type(error).__name__}: {error}")
             outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
-        self._runtime.observe()
-        return replace(outcome, epoch=self._runtime.epoch, from_core=from_core, to_core=to_core)
+        after = self._runtime.observe(
+            changed_since=epoch if outcome.success and not request.dry_run else None
+        )
+        return replace(outcome, epoch=after.epoch, from_core=from_core, to_core=to_core)
 
-    def _replaced_core(self, request: Request) -> tuple[str, str]:
-        """Which core the request's one replace_core step puts in the place of which."""
-        replacing = [step for step in request.steps if step.kind == "replace_core"]
-        if len(replacing) != 1:
-            return "", ""
-        step = replacing[0]
-        present = [part.core for part in self._runtime.components() if part.name == step.target]
-        return (present[0], step.name) if present else ("", "")
-
-    def _carry_out(self, request: Request) -> Outcome:
-        # The kernel's count is taken first: what changes from here on, the commit finds.
-        kernel_epoch = self._runtime.kernel_epoch() if request.expected_epoch else 0
-        self._runtime.observe()
+    def _carry_out(
+        self, request: Request, parts: Sequence[ComponentDescription], *, kernel_epoch: int
+    ) -> Outcome:
         check_time(request, self._runtime)
-        epoch = self._runtime.epoch
-        plan = Plan(request.steps, self._runtime)
+        plan = Plan(request.steps, self._runtime, parts)
         if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):
             step = request.steps[0]
-            check_state(step, next(part for part in self._runtime.components() if part.name == step.target))
+            present = self._runtime.components()  # of this moment: a stop may just have begun
+            check_state(step, next(part for part in present if part.name == step.target))
             if not request.dry_run:
                 return self._start_or_stop(step, request)
         with self._bound(plan.bound, dry_run=request.dry_run):
             measured = self._runtime.deployer.commit(
                 plan.transaction,
                 dry_run=request.dry_run,
-                expected_epoch=kernel_epoch,
+                expected_epoch=kernel_epoch if request.expected_epoch else 0,
                 commit_timeout_ns=_timeout_ns(request),
                 phase_timeout_ns=self._phase_timeout_of(request),
             )
@@ -127,7 +128,6 @@ class Control:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
         self._runtime.declare(added=plan.added, removed=plan.removed)
-        self._count_change(epoch)
         return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
 
     @contextmanager
@@ -140,7 +140,7 @@ class Control:
                 raise RefusalError(Code.UNSUPPORTED, f"{text}; leave its topic or service out")
             yield
             return
-        opened = outside.open(bound.added, bound.described) if bound.added else {}
+        opened = outside.open(bound.added, bound.described)
         try:
             yield
         except BaseException:
@@ -151,12 +151,6 @@ class Control:
             return
         outside.remove(bound.removed)
         outside.attach(opened)
-
-    def _count_change(self, before: int) -> None:
-        """A core replaced by another one of its kind, or a restart, shows nowhere: it counts all the same."""
-        self._runtime.observe()
-        if self._runtime.epoch == before:
-            self._runtime.touch()
 
     def _phase_timeout_of(self, request: Request) -> int:
         """Of a property alone nobody wants to know the phase."""
@@ -185,6 +179,16 @@ class Control:
                     continue  # a stop that timed out stays pending
                 raise
             return
+
+
+def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:
+    """Which core the request's one replace_core step puts in the place of which."""
+    replacing = [step for step in request.steps if step.kind == "replace_core"]
+    if len(replacing) != 1:
+        return "", ""
+    step = replacing[0]
+    present = [part.core for part in parts if part.name == step.target]
+    return (present[0], step.name) if present else ("", "")
 
 
 def _timeout_ns(request: Request) -> int:

@@ -15,7 +15,7 @@ from mauve_rt._kernel import ComponentDescription, PortDescription
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.words import shown
 from mauve_rt.node.executor_requests import Outcome, Report, Request
-from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_runtime import Observed, Runtime
 
 _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
 _MAX_PRIORITY = 255
@@ -59,15 +59,12 @@ def realtime_status(runtime: Runtime) -> Any:
     return RealtimeStatus(granted=status.granted, missing=list(status.missing))
 
 
-def architecture_state(runtime: Runtime, stamp: Any, *, error: str = "") -> Any:
-    """ArchitectureState as it is now; `error`: why the last lifecycle transition failed."""
-    epoch = (
-        runtime.epoch
-    )  # before the components: a change in between is published again, under its own epoch
+def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, error: str = "") -> Any:
+    """ArchitectureState as it was observed; `error`: why the last lifecycle transition failed."""
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
-        epoch=epoch,
+        epoch=observed.epoch,
         deployment_epoch_ns=runtime.deployment_epoch_ns(),
         components=[
             ComponentStatus(
@@ -76,7 +73,7 @@ def architecture_state(runtime: Runtime, stamp: Any, *, error: str = "") -> Any:
                 core=component.core,
                 fault=component.fault,
             )
-            for component in runtime.components()
+            for component in observed.components
         ],
         realtime=realtime_status(runtime),
         error=error,

@@ -2,9 +2,10 @@
 
 import threading
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mauve_rt._kernel import (
     Architecture,
@@ -40,6 +41,13 @@ class _Declared:
     cores: Mapping[str, str]
 
 
+class Observed(NamedTuple):
+    """The components at an epoch."""
+
+    epoch: int
+    components: list[ComponentDescription]
+
+
 class Runtime:
     """One architecture from configure() to cleanup().
 
@@ -48,7 +56,7 @@ class Runtime:
 
     | member        | written by                                 | guarded by      |
     | ------------- | ------------------------------------------ | --------------- |
-    | `_epoch` ...  | observe(), touch(): any thread             | `_lock`         |
+    | `_epoch` ...  | observe(): any thread                      | `_lock`         |
     | `_declared`   | configure(), declare(): one at a time      | exchanged whole |
     | `registry`    | who is in loading()                        | `_loading`      |
     | the others    | configure() ... cleanup(): one at a time   |                 |
@@ -72,8 +80,9 @@ class Runtime:
         self._deployer: Deployer | None = None
         self._lock = threading.Lock()
         self._epoch = 0
-        self._revision = 0
         self._seen: object = None
+        self._observed = Observed(0, [])
+        self._mark: object = None  # by which the kernel tells whether there is anything new to be seen
 
     # ---- life cycle
 
@@ -137,6 +146,7 @@ class Runtime:
         self.require_parked()
         self._model = None
         architecture, self._architecture, self._deployer = self._architecture, None, None
+        self._mark = None
         if architecture is not None:
             architecture.cleanup()
 
@@ -224,8 +234,10 @@ class Runtime:
         everybodys = DiagnosticsModel() if model is None else model.diagnostics
         return everybodys if declared is None else everybodys.overridden_by(declared.model.diagnostics)
 
-    def declare(self, *, added: Mapping[str, ComponentModel], removed: Iterable[str]) -> None:
+    def declare(self, *, added: Mapping[str, ComponentModel], removed: Collection[str]) -> None:
         """Note what a transaction added and removed."""
+        if not added and not removed:
+            return
         gone = set(removed)
         kept = {name: declared for name, declared in self._declared.items() if name not in gone}
         self._declared = {**kept, **self._with_cores(added)}
@@ -250,27 +262,28 @@ class Runtime:
         with self._lock:
             return self._epoch
 
-    def observe(self) -> bool:
-        """Compare the architecture with what it was at the last look; count a change. True: there was one."""
-        # A component held for a commit, or on its way to a stop, is on its way to something else that counts.
-        states = {"HELD": "RUNNING", "STOPPING": "RUNNING"}
+    def observe(self, *, changed_since: int | None = None) -> Observed:
+        """The components; a change since the last look is counted. Figures may be those of the last change.
+
+        `changed_since`: an epoch after which there was a change, which need not show: a core replaced by
+        another one of its kind, or a restart, counts all the same.
+        """
         with self._lock:
-            parts = [_facts(part, states.get(part.state, part.state)) for part in self.components()]
-            seen = (self.active, self._revision, parts, self.resources())
-            if seen == self._seen:
-                return False
-            self._seen = seen
-            self._epoch += 1
-            return True
-
-    def touch(self) -> None:
-        """Count a change that nothing shows, such as a core replaced by another one of its kind."""
-        with self._lock:
-            self._revision += 1
+            mark = (self._architecture, self.active, self.kernel_epoch())  # first: what comes after is news
+            if mark != self._mark or self._epoch == changed_since:
+                parts = self.components()
+                seen = (self.active, [_facts(part) for part in parts], self.resources())
+                if seen != self._seen or self._epoch == changed_since:
+                    self._seen = seen
+                    self._epoch += 1
+                self._mark, self._observed = mark, Observed(self._epoch, parts)
+            return self._observed
 
 
-def _facts(part: ComponentDescription, state: str) -> tuple[object, ...]:
+def _facts(part: ComponentDescription) -> tuple[object, ...]:
     """What is a change when it changes."""
+    # A component held for a commit, or on its way to a stop, is on its way to something else that counts.
+    state = "RUNNING" if part.state in ("HELD", "STOPPING") else part.state
     wiring = [(port.name, port.resource, port.service) for port in part.ports]
     properties = [(item.name, item.value) for item in part.properties]
     return (part.name, state, part.shell, part.core, part.fsm, part.fault, wiring, properties)

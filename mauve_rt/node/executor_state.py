@@ -13,7 +13,7 @@ from mauve_rt.node.executor_faults import FaultWatch
 from mauve_rt.node.executor_messages import architecture_state, reconfiguration_event
 from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_requests import Outcome, Request
-from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor_runtime import Observed, Runtime
 
 _WAIT_NS = 200_000_000  # how long a watching thread that should end may go on waiting
 _EVENT_DEPTH = 100
@@ -36,15 +36,16 @@ class StatePublisher:
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def refresh(self, *, again: bool = False) -> None:
+    def refresh(self, *, again: bool = False) -> Observed:
         """Publish the state if it changed since it was published last, or in any case `again`."""
         with self._lock:
-            self._runtime.observe()
-            if again or self._runtime.epoch != self._published_epoch:
+            observed = self._runtime.observe()
+            if again or observed.epoch != self._published_epoch:
                 stamp = self._node.get_clock().now().to_msg()
-                state = architecture_state(self._runtime, stamp, error=self.error)
-                self._published_epoch = state.epoch
+                state = architecture_state(self._runtime, observed, stamp, error=self.error)
+                self._published_epoch = observed.epoch
                 self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
+            return observed
 
     def event(self, request: Request, outcome: Outcome) -> None:
         """Publish what came of a request."""
@@ -70,11 +71,11 @@ class StatePublisher:
         while not self._ending.is_set():
             if not deployer.wait_change(_WAIT_NS):
                 continue
-            self.refresh()
-            for fault in watch.look(self._runtime.components()):
+            observed = self.refresh()
+            for fault in watch.look(observed.components):
                 self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
                 if fault.part.fell_back:
-                    self.event(*fault.event(self._runtime.epoch))
+                    self.event(*fault.event(observed.epoch))
 
     def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
         data = serialize_message(message)

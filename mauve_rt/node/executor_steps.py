@@ -45,8 +45,10 @@ class Bound:
 class Plan:
     """The transaction that a request asks for, and what it will have added and removed."""
 
-    def __init__(self, steps: Iterable[Step], runtime: Runtime) -> None:
-        """Check and translate every step; loads the plug-ins that they name.
+    def __init__(
+        self, steps: Iterable[Step], runtime: Runtime, parts: Iterable[ComponentDescription]
+    ) -> None:
+        """Check and translate every step for the present components; loads the plug-ins that they name.
 
         Raises:
             RefusalError: naming the step, where there are several.
@@ -56,7 +58,7 @@ class Plan:
         self.removed: set[str] = set()
         self.bound = Bound()
         self._runtime = runtime
-        self._sketches = {part.name: self._sketch_of(part) for part in runtime.components()}
+        self._sketches = {part.name: self._sketch_of(part) for part in parts}
         self._resources = set(runtime.resources())
         all_steps = tuple(steps)
         for number, step in enumerate(all_steps, start=1):

@@ -106,14 +106,14 @@ class SimulatedExecutor:
 
     def refresh(self) -> None:
         """Publish the state if it has changed, and that a fallback core took over."""
-        self._runtime.observe()
-        if self._runtime.epoch != self._published_epoch:
-            state = architecture_state(self._runtime, stamp(self._simulation.now_ns()))
+        observed = self._runtime.observe()
+        if observed.epoch != self._published_epoch:
+            state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
             self._published_epoch = state.epoch
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
-        for fault in self._faults.look(self._runtime.components()):
+        for fault in self._faults.look(observed.components):
             if fault.part.fell_back:
-                self._event(*fault.event(self._runtime.epoch))
+                self._event(*fault.event(observed.epoch))
 
     def carry(self) -> None:
         """Publish what was written to the resources that are bound to topics."""
