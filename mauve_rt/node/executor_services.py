@@ -1,5 +1,6 @@
 """~/list_components, ~/stop, ~/start, ~/replace_core, ~/reconfigure: the ROS face of `executor_control`."""
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +19,10 @@ _CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "repl
 
 
 class Services:
-    """The services of a node. Requests for changes wait for each other in `control_group`, lists do not."""
+    """The services of a node. Requests for changes wait for each other in `control_group`, lists do not.
+
+    Who asked is answered first; then ~/state and ~/events tell of it, before the next request is looked at.
+    """
 
     def __init__(
         self,
@@ -35,6 +39,7 @@ class Services:
         self._control = control
         self._state = state
         self._parameters = parameters
+        self._untold: deque[tuple[Request, Outcome]] = deque()  # of `control_group` only
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
         for service, name, translate in (
             (Stop, "~/stop", _stop),
@@ -42,17 +47,40 @@ class Services:
             (ReplaceCore, "~/replace_core", _replace_core),
             (Reconfigure, "~/reconfigure", _reconfigure),
         ):
-            node.create_service(service, name, self._handler(translate), callback_group=control_group)
+            handler = self._handler(translate)
+            self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
 
     def handle(self, request: Request) -> Outcome:
-        """Carry out a request, and tell of it. From any thread."""
+        """Carry out a request, and tell of it. In `control_group`."""
+        outcome = self._carry_out(request)
+        self._tell()
+        return outcome
+
+    def _carry_out(self, request: Request) -> Outcome:
         outcome = self._control.handle(request)
         if not outcome.replayed:
             if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
                 self._parameters.follow()
+            self._untold.append((request, outcome))
+        return outcome
+
+    def _tell_after(self, service: Any) -> None:
+        """Let a service tell when it has sent its reply."""
+        send_response = service.send_response
+
+        def send_and_tell(response: Any, header: Any) -> None:
+            try:
+                send_response(response, header)
+            finally:
+                self._tell()
+
+        service.send_response = send_and_tell
+
+    def _tell(self) -> None:
+        while self._untold:
+            request, outcome = self._untold.popleft()
             self._state.refresh()
             self._state.event(request, outcome)
-        return outcome
 
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
@@ -63,7 +91,7 @@ class Services:
 
     def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
         def handle(ros_request: Any, response: Any) -> Any:
-            outcome = self.handle(translate(ros_request))
+            outcome = self._carry_out(translate(ros_request))
             response.success = outcome.success
             response.code = int(outcome.code)
             response.message = outcome.message
