@@ -58,7 +58,7 @@ def allowed_parts(component: ComponentModel, kind: str, loader: PluginLoader) ->
     """The cores, fsms or shells (`kind`) that a component takes: its own first, then its alternatives."""
     own = {"core": component.core, "fsm": component.fsm, "shell": component.shell}[kind]
     if isinstance(component.alternatives, list):
-        others = [name for name in component.alternatives if kind in loader.part_kinds(name)]
+        others = [name for name in component.alternatives if loader.has(kind, name)]
     else:
         others = loader.index.names(kind)
     return list(dict.fromkeys([own, *others]))

@@ -123,13 +123,13 @@ class PluginLoader:
         """What is installed or built in."""
         return sorted({*self.index.names(kind), *self.registry.names(kind)})
 
+    def has(self, kind: str, name: str) -> bool:
+        """Whether something of that kind and name is installed or built in."""
+        return self.index.find(kind, name) is not None or name in self.registry.names(kind)
+
     def part_kinds(self, name: str) -> list[str]:
         """Which parts of a component have that name: of "core", "fsm" and "shell", none or more."""
-        return [
-            kind
-            for kind in ("core", "fsm", "shell")
-            if self.index.find(kind, name) or name in self.registry.names(kind)
-        ]
+        return [kind for kind in ("core", "fsm", "shell") if self.has(kind, name)]
 
     def shell_of(self, core: str) -> str:
         """The shell that a core was written for; nothing is loaded."""
