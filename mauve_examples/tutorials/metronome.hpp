@@ -36,6 +36,8 @@ class Metronome : public mauve::Core<MetronomeShell> {
       beats_ = metronome->beats_;
     }
   }
+  /// That is all there is to it: 50 us before a tick there is still time for it.
+  mauve::time_ns_t budget_ns() const noexcept override { return mauve::us_to_ns(50); }
 
  protected:
   std::int64_t ticks() const noexcept { return ticks_; }
