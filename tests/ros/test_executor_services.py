@@ -228,6 +228,21 @@ def test_event_tells_who_what_and_why(graph: Any) -> None:
     assert event.report == reply.report
 
 
+def test_the_reply_is_true_already_and_events_follow_in_order(graph: Any) -> None:
+    events = graph.hear_events(NODE)
+    replies = []
+    for core, service, name in (("Backwards", Stop, "stop"), ("Counter", Start, "start")) * 3:
+        part = f"executor_tests/{core}"
+        replies.append(graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core=part))
+        assert _component(graph, "counter").core == part
+        replies.append(graph.ask(service, f"{NODE}/{name}", component="sleepy"))
+    assert all(reply.success for reply in replies), [reply.message for reply in replies]
+    graph.spin_until(lambda: len(events) == len(replies), "an event for every request")
+    told = [(event.epoch, event.message) for event in events]
+    assert told == [(reply.epoch, reply.message) for reply in replies]
+    assert [epoch for epoch, _ in told] == sorted({epoch for epoch, _ in told}), "every change counts"
+
+
 def test_repeated_request_id_returns_the_first_outcome(graph: Any) -> None:
     first = graph.ask(Stop, f"{NODE}/stop", component="sleepy", request_id="a")
     assert first.success
