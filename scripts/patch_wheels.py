@@ -42,13 +42,20 @@ def patch(prefix: Path) -> int:
 
 
 def private_prefix(wheels: Path, prefix: Path) -> None:
-    """Make `prefix` a patched prefix of the wheels in `wheels`: CMake files are copied, all else linked."""
+    """Make `prefix` a patched prefix of the wheels in `wheels`: CMake files are copied, all else linked.
+
+    There lib64 is another name of lib, as in an environment. Where pip builds it is a folder of its own.
+    """
     (prefix / "lib").mkdir(parents=True)
-    for entry in [*wheels.iterdir(), *(wheels / "lib").iterdir()]:
+    (prefix / "lib64").symlink_to("lib")
+    folders = [wheels, wheels / "lib"]
+    if (wheels / "lib64").is_dir() and not (wheels / "lib64").is_symlink():
+        folders.append(wheels / "lib64")
+    for entry in (entry for folder in folders for entry in folder.iterdir()):
         relative = entry.relative_to(wheels)
         if relative in CMAKE_FOLDERS:
             shutil.copytree(entry, prefix / relative)
-        elif entry.name not in ("lib", "lib64"):  # lib64 is another name of lib
+        elif entry.name not in ("lib", "lib64"):
             (prefix / relative).symlink_to(entry)
     patch(prefix)
 
