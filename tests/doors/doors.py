@@ -36,6 +36,8 @@ CHEAP_BUILD = (
     "-DCMAKE_CXX_FLAGS_DEBUG=-DNDEBUG",
     "-DCMAKE_UNITY_BUILD=ON",
 )
+# A job for each processor. Left alone, colcon lets ninja start one only while the load is below that.
+ALL_JOBS = {"MAKEFLAGS": f"-j{os.cpu_count()}"}
 
 
 def source_files() -> set[str]:
