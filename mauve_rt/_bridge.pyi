@@ -1,8 +1,7 @@
 """Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge."""
 
-from typing import overload
-
 from collections.abc import Sequence
+from typing import overload
 
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""

@@ -15,6 +15,7 @@ from mauve_rt.model.schema import (
     QosModel,
     ResourceModel,
     SenderModel,
+    ServiceModel,
     ThresholdModel,
     TopicModel,
 )
@@ -124,19 +125,21 @@ _RESOURCE_SECTIONS: Sequence[type[BaseModel]] = (ResourceModel, TopicModel, QosM
 
 def _section(location: Location) -> type[BaseModel]:
     """The schema of the section that `location` is a key of."""
+    found: type[BaseModel] = FileModel
     match location[:-1]:
         case (*_, "diagnostics"):
-            return DiagnosticsModel
+            found = DiagnosticsModel
         case (*_, "diagnostics", _):
-            return ThresholdModel
+            found = ThresholdModel
         case ("executor", *rest):
-            return (ExecutorModel, SenderModel)[len(rest)]
+            found = (ExecutorModel, SenderModel)[len(rest)]
         case ("components", _):
-            return ComponentModel
+            found = ComponentModel
+        case ("resources", _, "service"):
+            found = ServiceModel
         case ("resources", _, *rest):
-            return _RESOURCE_SECTIONS[len(rest)]
-        case _:
-            return FileModel
+            found = _RESOURCE_SECTIONS[len(rest)]
+    return found
 
 
 def owner(location: Location) -> tuple[str, str]:

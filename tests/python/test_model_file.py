@@ -399,6 +399,12 @@ BAD = {
         "0}",
         "found 0",
     ),
+    "unknown key of a service": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, service: {name: x, offer: set}}\n  queue:",
+        "offer: set",
+        "did you mean offers?",
+    ),
     "client with a topic": (
         "  queue:",
         (
