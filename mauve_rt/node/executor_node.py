@@ -1,5 +1,6 @@
 """The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,8 @@ class ExecutorNode(LifecycleNode):
         query_group = MutuallyExclusiveCallbackGroup()
         self._data_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
+        # A signal may come while a transition starts or ends threads: nobody else may do that then.
+        self._starting_or_ending = threading.Lock()
         self._settings = self._declared()
         self._recording = Recording()
         self._bound = BoundResources(self)
@@ -126,9 +129,10 @@ class ExecutorNode(LifecycleNode):
         self._log_realtime()
 
     def _activate(self) -> None:
-        self._runtime.activate()
-        self._bound.start()
-        self._state.start(self._runtime.deployer)
+        with self._starting_or_ending:
+            self._runtime.activate()
+            self._bound.start()
+            self._state.start(self._runtime.deployer)
 
     def _end(self) -> None:
         self.quiesce()
@@ -173,11 +177,12 @@ class ExecutorNode(LifecycleNode):
 
     def quiesce(self) -> None:
         """Outputs safe, components parked, last words published, threads joined. May be called again."""
-        if self._runtime.active:
-            self._runtime.deactivate()
-            self._state.refresh()
-        self._state.stop()
-        self._bound.stop()
+        with self._starting_or_ending:
+            if self._runtime.active:
+                self._runtime.deactivate()
+                self._state.refresh()
+            self._state.stop()
+            self._bound.stop()
 
     def close(self) -> None:
         """End everything this node holds, in order: components, threads, bag, node.
