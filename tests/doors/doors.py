@@ -37,8 +37,6 @@ CHEAP_BUILD = (
     "-DCMAKE_CXX_FLAGS_DEBUG=-DNDEBUG",
     "-DCMAKE_UNITY_BUILD=ON",
 )
-# For what only computes: it leaves the processors to cases of other stages, which run meanwhile.
-IDLE = ("chrt", "--idle", "0")
 # A job for each processor. Left alone, colcon lets ninja start one only while the load is below that.
 ALL_JOBS = {"MAKEFLAGS": f"-j{os.cpu_count()}"}
 

@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from doors import ALL_JOBS, CHEAP_BUILD, IDLE, ROOT, copy_sources, installed_executor, run, shell_without
+from doors import ALL_JOBS, CHEAP_BUILD, ROOT, copy_sources, installed_executor, run, shell_without
 
 from mauve_rt import _kernel
 
@@ -19,7 +19,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     workspace = tmp_path_factory.mktemp("workspace")
     copy_sources(workspace / "src" / "mauve_rt")
     shutil.copytree(ROOT / "tests" / "downstream", workspace / "src" / "mauve_downstream")
-    command = [*IDLE, "colcon", "build", "--cmake-args", "-G", "Ninja", *CHEAP_BUILD]
+    command = ["colcon", "build", "--cmake-args", "-G", "Ninja", *CHEAP_BUILD]
     run(*command, cwd=workspace, environment=shell_without(INSTALLED) | ALL_JOBS)
     return workspace
 
