@@ -78,9 +78,11 @@ class Processes:
         """
         until = time.monotonic() + _START_S
         while word not in self.output(name):
-            for other, process in self._running.items():
-                if process.poll() is not None:
-                    raise BenchmarkError(f"{other} ended at its start: {self.output(other)}")
+            ended = [other for other, process in self._running.items() if process.poll() is not None]
+            if word in self.output(name):  # its last one
+                return
+            if ended:
+                raise BenchmarkError(f"{ended[0]} ended too early: {self.output(ended[0])}")
             if time.monotonic() > until:
                 raise BenchmarkError(f"no '{word}' of {name} within {_START_S:g} s: {self.output(name)}")
             time.sleep(0.1)
