@@ -48,6 +48,22 @@ struct SetBool {
   };
 };
 
+/// Without the report at the end.
+struct Stop {
+  struct Request {
+    mauve::BoundedString<16> request_id;
+    std::uint64_t expected_epoch{};
+    mauve::BoundedString<16> requested_by;
+    mauve::BoundedString<16> cause;
+    mauve::BoundedString<16> component;
+    double timeout_s{};
+  };
+  struct Response {
+    bool success{};
+    std::uint16_t code{};
+  };
+};
+
 struct Trigger {
   struct Request {};
   struct Response {
@@ -65,6 +81,10 @@ MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
 MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", data)
 MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
+MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_epoch,
+           requested_by, cause, component, timeout_s)
+MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code)
+MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")
 MAUVE_TYPE(executor_tests::Trigger::Request, "std_srvs/srv/Trigger_Request")
 MAUVE_TYPE(executor_tests::Trigger::Response, "std_srvs/srv/Trigger_Response", success, message)
 MAUVE_CALL_TYPE(executor_tests::Trigger, "std_srvs/srv/Trigger")
@@ -255,6 +275,31 @@ struct CallerFsm : mauve::Fsm<CallerShell, Caller> {
   }
 };
 
+/// Asks for the stop of a component whose name is no text; says the reply's code.
+struct StopperShell : mauve::Shell {
+  mauve::CallPort<mauve::CallOf<Stop>>& stop = call_port<Stop>("stop");
+  mauve::WritePort<Number>& count = write_port<Number>("count");
+};
+struct Stopper : mauve::Core<StopperShell> {
+  void act() {
+    Stop::Request request;
+    for (auto* text : {&request.component, &request.cause, &request.requested_by})
+      text->assign("\xff\xc3(\xf0\x9f");
+    Stop::Response response;
+    if (shell().stop(request, response) != mauve::CallOutcome::answered) return;
+    shell().count.write({static_cast<double>(response.success ? 0 : response.code)});
+  }
+};
+struct StopperFsm : mauve::Fsm<StopperShell, Stopper> {
+  void define() override {
+    mauve::State& run = execution("Ask", "act", &Stopper::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(50));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 /// A lamp to switch and to ask, by components and, where a file offers them, by ROS.
 class Lamp final : public mauve::Resource {
  public:
@@ -339,6 +384,11 @@ MAUVE_PLUGINS(registry) {
   registry.fsm<CalmFsm>("executor_tests/CalmFsm", shell);
   registry.fsm<EventFsm>("executor_tests/EventFsm", shell);
   registry.call_type<SetBool>();
+  registry.call_type<Stop>();
+  const std::string stopper = "executor_tests/StopperShell";
+  registry.shell<StopperShell>(stopper);
+  registry.core<Stopper>("executor_tests/Stopper", stopper);
+  registry.fsm<StopperFsm>("executor_tests/StopperFsm", stopper);
   registry.resource<Lamp>("executor_tests/Lamp");
   const std::string caller = "executor_tests/CallerShell";
   registry.shell<CallerShell>(caller);

@@ -106,6 +106,24 @@ def test_a_resources_call_is_a_ros_service(graph: Any) -> None:
     assert (values["side"], values["answered"], status.level) == ("server", "3", DiagnosticStatus.OK)
 
 
+def test_a_request_that_is_no_text_is_answered(
+    start_executor: Callable[..., Any], tmp_path: Path, graph: Any
+) -> None:
+    path = tmp_path / "calls.yaml"
+    stopper = CALLER.replace("/Caller", "/Stopper")
+    stop = "{kind: client, type: mauve_msgs/srv/Stop, service: {name: executor/stop, timeout_ms: 2000}}"
+    path.write_text(
+        FILE.replace(CALLER, stopper)
+        .replace("caller.lamp, lamp.call", "caller.stop, lamp.call")
+        .replace("{kind: client, type: std_srvs/srv/SetBool, service: {name: lamp, timeout_ms: 60}}", stop),
+        encoding="utf-8",
+    )
+    start_executor("-p", f"architecture:={path}")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 10, "ten replies")
+    assert {count.data for count in counts} == {float(Code.UNKNOWN_COMPONENT)}
+
+
 def _step(kind: str, target: str, name: str = "", value: str = "") -> Any:
     return ReconfigurationStep(kind=kind, target=target, name=name, value=value)
 
