@@ -16,7 +16,7 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kAtOnce = 64;  // requests of one service before the others have their turn
+constexpr int kRequestsAtOnce = 64;  // requests of one service before the others have their turn
 
 std::string described(const CallSettings& settings) {
   return "resource " + settings.resource + ", service " + settings.name;
@@ -162,7 +162,7 @@ bool OfferedService::has_arrived(const rcl_wait_set_t& set) const {
 
 void OfferedService::take() {
   rmw_request_id_t id{};
-  for (int taken = 0; taken < kAtOnce; ++taken) {
+  for (int taken = 0; taken < kRequestsAtOnce; ++taken) {
     if (!went_well(rcl_take_request(entity_.get(), &id, request_.get()))) return;
     const time_ns_t began = monotonic_now_ns();
     if (!answer(id)) {

@@ -12,7 +12,7 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kAtOnce = 64;  // messages of one topic before the others have their turn
+constexpr int kMessagesAtOnce = 64;  // messages of one topic before the others have their turn
 
 std::string described(const TopicSettings& settings) {
   return "resource " + settings.resource + ", topic " + settings.name;
@@ -49,7 +49,7 @@ OutgoingTopic::OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, st
 
 bool OutgoingTopic::send() {
   time_ns_t time_ns = 0;
-  for (int sent = 0; sent < kAtOnce; ++sent) {
+  for (int sent = 0; sent < kMessagesAtOnce; ++sent) {
     if (!resource().next_sample(message_, time_ns, seen_)) return false;
     // Sent from where it lies: rcl only reads it.
     const rcl_serialized_message_t serialized = borrowed(message_);
@@ -85,7 +85,7 @@ bool IncomingTopic::has_arrived(const rcl_wait_set_t& set) const {
 }
 
 void IncomingTopic::take() {
-  for (int taken = 0; taken < kAtOnce; ++taken) {
+  for (int taken = 0; taken < kMessagesAtOnce; ++taken) {
     rmw_message_info_t about = rmw_get_zero_initialized_message_info();
     if (rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr) != RCL_RET_OK) {
       rcl_reset_error();  // nothing left, which is no error
