@@ -53,7 +53,9 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     [wheel] = folder.glob("*.whl")
     run(UV, "venv", "--python", sys.executable, prefix, environment=shell)
     constraints = [f"-c{ROOT}/requirements/{name}.txt" for name in ("run", "ros-wheels", "constraints")]
-    run(UV, "pip", "install", "--python", prefix, *constraints, wheel, environment=shell)
+    # The system's certificates, as pip and scripts/setup use: a company's own may be among them.
+    install = (UV, "pip", "install", "--system-certs", "--python", prefix)
+    run(*install, *constraints, wheel, environment=shell)
     return Installation(sdist=sdist, prefix=prefix, shell=shell)
 
 
