@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -32,27 +33,31 @@ def service_rows(settings: Settings) -> Iterator[Row]:
     namespace = f"/bench_{os.getpid()}"
     with ExitStack() as stack:
         processes = stack.enter_context(Processes())
-        processes.spawn(
-            "executor",
-            *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={namespace}"),
-            *("-p", f"architecture:={ARCHITECTURE}"),
-        )
+        for name, timeout_s in (("executor", 1.0), ("brief", 0.0)):
+            processes.spawn(
+                name,
+                *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={namespace}/{name}"),
+                *("-p", f"architecture:={ARCHITECTURE}", "-p", f"report_phase_timeout_s:={timeout_s}"),
+            )
         trigger_name = f"{namespace}/trigger"
         processes.spawn("trigger", str(Path(__file__).with_name("trigger_server.py")), trigger_name)
         processes.await_output("trigger", "ready")
         calls = stack.enter_context(_SpunClient())
         trigger = calls.client(Trigger, trigger_name)
-        replace = calls.client(ReplaceCore, f"{namespace}/executor/replace_core")
+        replace = calls.client(ReplaceCore, f"{namespace}/executor/executor/replace_core")
+        replace_briefly = calls.client(ReplaceCore, f"{namespace}/brief/executor/replace_core")
 
-        def replacements(number: int) -> list[float]:
+        def replacements(client: Any, number: int) -> list[float]:
             cores = (_CORES[(number + index) % 2] for index in range(settings.service_calls))
             requests = (ReplaceCore.Request(component=COMPONENT, core=core) for core in cores)
-            return [calls.duration_ns(replace, request) for request in requests]
+            return [calls.duration_ns(client, request) for request in requests]
 
         def triggers(_: int) -> list[float]:
             return [calls.duration_ns(trigger, Trigger.Request()) for _ in range(settings.service_calls)]
 
-        rounds = native.interleaved(settings.rounds, replacements, triggers)
+        rounds = native.interleaved(
+            settings.rounds, partial(replacements, replace), triggers, partial(replacements, replace_briefly)
+        )
     for percent in (50, 99):
         pairs = [tuple(float(np.percentile(part, percent)) / 1e3 for part in found) for found in rounds]
         yield compared(
@@ -62,6 +67,12 @@ def service_rows(settings: Settings) -> Iterator[Row]:
             beside="a bare std_srvs/Trigger call",
             ratio_limit=2.0,
             note="the reply tells the phase of the release after the commit, for which it waits",
+        )
+        yield compared(
+            f"the same with report_phase_timeout_s 0, p{percent}",
+            [(pair[2], pair[1]) for pair in pairs],
+            unit="us",
+            beside="a bare std_srvs/Trigger call",
         )
 
 
