@@ -1,6 +1,5 @@
 """replace_core asked for over its ROS service, beside a bare Trigger call of the same client."""
 
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ import native
 import numpy as np
 import rclpy
 from busy_executor import ARCHITECTURE, COMPONENT
+from executor_process import ExecutorProcess
 from native import BenchmarkError
 from processes import Processes
 from rclpy.context import Context
@@ -30,22 +30,17 @@ _DISCOVERY_S = 20.0
 
 def service_rows(settings: Settings) -> Iterator[Row]:
     """Rounds of calls, one after the other, of a 1 kHz component's replacement and of Trigger."""
-    namespace = f"/bench_{os.getpid()}"
     with ExitStack() as stack:
         processes = stack.enter_context(Processes())
-        for name, timeout_s in (("executor", 1.0), ("brief", 0.0)):
-            processes.spawn(
-                name,
-                *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={namespace}/{name}"),
-                *("-p", f"architecture:={ARCHITECTURE}", "-p", f"report_phase_timeout_s:={timeout_s}"),
-            )
-        trigger_name = f"{namespace}/trigger"
+        executor = ExecutorProcess(processes, ARCHITECTURE)
+        brief = ExecutorProcess(processes, ARCHITECTURE, "report_phase_timeout_s:=0.0", name="brief")
+        trigger_name = f"{executor.namespace}/trigger"
         processes.spawn("trigger", str(Path(__file__).with_name("trigger_server.py")), trigger_name)
         processes.await_output("trigger", "ready")
         calls = stack.enter_context(_SpunClient())
         trigger = calls.client(Trigger, trigger_name)
-        replace = calls.client(ReplaceCore, f"{namespace}/executor/executor/replace_core")
-        replace_briefly = calls.client(ReplaceCore, f"{namespace}/brief/executor/replace_core")
+        replace = calls.client(ReplaceCore, f"{executor.namespace}/executor/replace_core")
+        replace_briefly = calls.client(ReplaceCore, f"{brief.namespace}/executor/replace_core")
 
         def replacements(client: Any, number: int) -> list[float]:
             cores = (_CORES[(number + index) % 2] for index in range(settings.service_calls))
