@@ -2,6 +2,7 @@
 // What all bindings of a resource to ROS are: opened on a name, then attached to the resource that they serve.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,17 +15,38 @@
 
 namespace mauve::bridge {
 
-/// How a topic fared. Counts of messages.
-struct TopicCounts {
+/// How a topic fared, or an offered service. Counts of messages.
+struct TrafficCounts {
   std::uint64_t passed{0};   // sent, or received and written
   std::uint64_t refused{0};  // by rcl, or by the resource: full, malformed, larger than it declares
+};
+
+/// The counts while one thread counts and others look.
+///
+/// | member            | written by       | order                                     |
+/// | ----------------- | ---------------- | ----------------------------------------- |
+/// | passed_, refused_ | the one thread   | relaxed: figures that nothing depends on  |
+class TrafficCounter {
+ public:
+  void count(bool passed) noexcept {
+    std::atomic<std::uint64_t>& counter = passed ? passed_ : refused_;
+    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  }
+  TrafficCounts counts() const noexcept {
+    return {.passed = passed_.load(std::memory_order_relaxed),
+            .refused = refused_.load(std::memory_order_relaxed)};
+  }
+
+ private:
+  std::atomic<std::uint64_t> passed_{0};
+  std::atomic<std::uint64_t> refused_{0};
 };
 
 /// What is known of a bound topic from outside.
 struct TopicReport {
   std::string resource;
   std::string topic;  // expanded and remapped
-  TopicCounts counts;
+  TrafficCounts counts;
   TopicTroubles troubles;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "calls.hpp"
 
-#include <rcl/error_handling.h>
 #include <rcl/graph.h>
 #include <rmw/rmw.h>
 
@@ -20,12 +19,6 @@ constexpr int kRequestsAtOnce = 64;  // requests of one service before the other
 
 std::string described(const CallSettings& settings) {
   return "resource " + settings.resource + ", service " + settings.name;
-}
-
-/// Whether rmw or rcl did it; what it says otherwise is for nobody.
-bool went_well(rcl_ret_t outcome) {
-  if (outcome != RCL_RET_OK) rcl_reset_error();
-  return outcome == RCL_RET_OK;
 }
 
 }  // namespace
@@ -165,11 +158,9 @@ void OfferedService::take() {
   for (int taken = 0; taken < kRequestsAtOnce; ++taken) {
     if (!went_well(rcl_take_request(entity_.get(), &id, request_.get()))) return;
     const time_ns_t began = monotonic_now_ns();
-    if (!answer(id)) {
-      refused_.fetch_add(1, std::memory_order_relaxed);
-      continue;
-    }
-    answered_.fetch_add(1, std::memory_order_relaxed);
+    const bool answered = answer(id);
+    counter_.count(answered);
+    if (!answered) continue;
     const time_ns_t lasted = monotonic_now_ns() - began;
     if (lasted > longest_ns_.load(std::memory_order_relaxed))
       longest_ns_.store(lasted, std::memory_order_relaxed);
@@ -187,11 +178,12 @@ bool OfferedService::answer(rmw_request_id_t& id) {
 }
 
 void OfferedService::report(BridgeReport& report) const {
+  const TrafficCounts requests = counter_.counts();
   report.calls.push_back({.resource = resource_name(),
                           .service = rcl_service_get_service_name(entity_.get()),
                           .is_offered = true,
-                          .counts = {.answered = answered_.load(std::memory_order_relaxed),
-                                     .other = refused_.load(std::memory_order_relaxed),
+                          .counts = {.answered = requests.passed,
+                                     .other = requests.refused,
                                      .longest_ns = longest_ns_.load(std::memory_order_relaxed)}});
 }
 

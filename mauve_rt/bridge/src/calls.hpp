@@ -79,9 +79,9 @@ class CalledService final : public Binding, private Arrival {
 
 /// Offers a resource's call as a ROS service. A request that the call refuses gets no answer: ROS has none for that.
 ///
-/// | member  | written by           | read by | order                                    |
-/// | ------- | -------------------- | ------- | ---------------------------------------- |
-/// | counts_ | the receiving thread | anyone  | relaxed: figures that nothing depends on |
+/// | member      | written by           | read by | order                                 |
+/// | ----------- | -------------------- | ------- | ------------------------------------- |
+/// | longest_ns_ | the receiving thread | anyone  | relaxed: a figure, nothing depends on |
 class OfferedService final : public Binding, private Arrival {
  public:
   /// `offered`: the resource's service. Throws Error when the type is not installed or rcl refuses. [non-rt]
@@ -107,9 +107,8 @@ class OfferedService final : public Binding, private Arrival {
   TypedMessage response_;
   OwnedMessage message_;
   std::vector<std::byte> reply_;
-  std::size_t place_{0};  // in the wait set
-  std::atomic<std::uint64_t> answered_{0};
-  std::atomic<std::uint64_t> refused_{0};
+  std::size_t place_{0};    // in the wait set
+  TrafficCounter counter_;  // of requests
   std::atomic<time_ns_t> longest_ns_{0};
 };
 

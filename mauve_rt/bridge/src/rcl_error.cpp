@@ -13,6 +13,11 @@ std::string take_rcl_message() {
   return message.substr(0, message.find(", at "));
 }
 
+bool went_well(rcl_ret_t outcome) {
+  if (outcome != RCL_RET_OK) rcl_reset_error();
+  return outcome == RCL_RET_OK;
+}
+
 void check(rcl_ret_t outcome, const std::string& what, const std::string& element) {
   if (outcome == RCL_RET_OK) return;
   throw Error(ErrorCode::invalid_argument, what, {.element = element, .found = take_rcl_message()});

@@ -14,4 +14,7 @@ std::string take_rcl_message();
 /// Throws Error (invalid_argument) unless rcl said it went well. [non-rt]
 void check(rcl_ret_t outcome, const std::string& what, const std::string& element);
 
+/// Whether rcl or rmw did it; what they say otherwise is for nobody. [non-rt]
+bool went_well(rcl_ret_t outcome);
+
 }  // namespace mauve::bridge

@@ -53,8 +53,7 @@ bool OutgoingTopic::send() {
     if (!resource().next_sample(message_, time_ns, seen_)) return false;
     // Sent from where it lies: rcl only reads it.
     const rcl_serialized_message_t serialized = borrowed(message_);
-    const bool passed = rcl_publish_serialized_message(publisher_.get(), &serialized, nullptr) == RCL_RET_OK;
-    if (!passed) rcl_reset_error();
+    const bool passed = went_well(rcl_publish_serialized_message(publisher_.get(), &serialized, nullptr));
     count(passed, monotonic_now_ns(), message_);
   }
   return true;
@@ -87,10 +86,8 @@ bool IncomingTopic::has_arrived(const rcl_wait_set_t& set) const {
 void IncomingTopic::take() {
   for (int taken = 0; taken < kMessagesAtOnce; ++taken) {
     rmw_message_info_t about = rmw_get_zero_initialized_message_info();
-    if (rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr) != RCL_RET_OK) {
-      rcl_reset_error();  // nothing left, which is no error
-      return;
-    }
+    if (!went_well(rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr)))
+      return;  // nothing left, which is no error
     const time_ns_t now = monotonic_now_ns();
     count(resource().write_sample(message_.bytes(), now), now, message_.bytes());
   }

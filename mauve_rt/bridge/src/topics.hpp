@@ -5,7 +5,6 @@
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
 
-#include <atomic>
 #include <string>
 
 #include "binding.hpp"
@@ -13,27 +12,6 @@
 #include "topic_log.hpp"
 
 namespace mauve::bridge {
-
-/// The counts while one thread counts and others look.
-///
-/// | member            | written by       | order                                     |
-/// | ----------------- | ---------------- | ----------------------------------------- |
-/// | passed_, refused_ | the one thread   | relaxed: figures that nothing depends on  |
-class TopicCounter {
- public:
-  void count(bool passed) noexcept {
-    std::atomic<std::uint64_t>& counter = passed ? passed_ : refused_;
-    counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-  }
-  TopicCounts counts() const noexcept {
-    return {.passed = passed_.load(std::memory_order_relaxed),
-            .refused = refused_.load(std::memory_order_relaxed)};
-  }
-
- private:
-  std::atomic<std::uint64_t> passed_{0};
-  std::atomic<std::uint64_t> refused_{0};
-};
 
 /// What both directions are made from.
 struct TopicSettings {
@@ -61,7 +39,7 @@ class BoundTopic : public Binding {
  private:
   TopicLog& log_;
   std::size_t number_;
-  TopicCounter counter_;
+  TrafficCounter counter_;
 };
 
 /// Publishes what is written to a resource. For one thread at a time.
