@@ -11,7 +11,7 @@ from processes import Processes
 
 from mauve_rt.cli.client import Client, connected
 from mauve_rt.model import load_architecture
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.trace import Trace
 
 COMPONENT = "metronome"
@@ -75,4 +75,4 @@ class BusyExecutor:
         self._processes.end("load")
         self.load_report = self._processes.output("load").strip().splitlines()[-1]
         self._executor.end()
-        return read_bag(self._bag)
+        return open_trace(self._bag)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from mauve_examples.mission.coverage import CoverageTracker
 from mauve_examples.mission.facts import BoolGrid, MissionArea, MissionFacts
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.trace import Trace
 
 COVERAGE_PERIOD_NS = 250_000_000
@@ -59,7 +59,7 @@ def read_robot(directory: Path, robot: str, facts: MissionFacts) -> RobotEvidenc
     Raises:
         TraceError: it is no bag, or cannot be read.
     """
-    trace = read_bag(directory)
+    trace = open_trace(directory)
     topics = {
         name: f"/{robot}/{name}"
         for name in ("pose", "goal", "map_updates", "executor/events", "supervisor/decisions")

@@ -26,7 +26,7 @@ from mauve_examples.mission.figure_style import (
 from mauve_examples.mission.swaps import Swap
 from mauve_rt.trace.reconfigurations import Reconfiguration
 from mauve_rt.trace.records import Kind, ReconfigurationPhase, Records
-from mauve_rt.trace.statistics import Span, state_spans
+from mauve_rt.trace.statistics import Spans, state_spans
 from mauve_rt.trace.trace import Trace
 
 _WIDE_NS = (600_000_000, 900_000_000)
@@ -95,7 +95,7 @@ def _under_glass(one: Reconfiguration) -> _Window:
 
 def _at_work(trace: Trace, window: _Window, always: str) -> list[str]:
     """Components that execute something in the window, and one that is shown in any case."""
-    return [name for name in trace.components if name == always or _executed(trace, name, window)]
+    return [name for name in trace.components if name == always or len(_executed(trace, name, window))]
 
 
 def _within(records: Records, begin_ns: int, end_ns: int) -> Records:
@@ -108,12 +108,13 @@ def _states(trace: Trace, component: str) -> list[int]:
     return [int(name) for name in names[np.argsort(first)]]
 
 
-def _executed(trace: Trace, component: str, window: _Window) -> list[Span]:
+def _executed(trace: Trace, component: str, window: _Window) -> Spans:
     """Return the executions of states that reach into the window."""
     margin_ns = _LONGEST_STATE_NS
     records = _within(trace.of(component), window.begin_ns - margin_ns, window.end_ns + margin_ns)
     spans = state_spans(records)
-    return [span for span in spans if span.end_ns >= window.begin_ns and span.begin_ns <= window.end_ns]
+    inside: Spans = spans[(spans["end_ns"] >= window.begin_ns) & (spans["begin_ns"] <= window.end_ns)]
+    return inside
 
 
 def _draw_rows(axes: Axes, trace: Trace, components: list[str], window: _Window) -> None:
@@ -125,9 +126,9 @@ def _draw_rows(axes: Axes, trace: Trace, components: list[str], window: _Window)
         axes.scatter(window.at(late), late * 0 + row - 0.38, marker="x", s=26, color=LINK_DOWN_INK, zorder=6)
         states = _states(trace, component)
         for span in _executed(trace, component, window):
-            colour = STATES[states.index(span.name) % len(STATES)]
+            colour = STATES[states.index(span["name"]) % len(STATES)]
             axes.broken_barh(
-                [(window.at(span.begin_ns), (span.end_ns - span.begin_ns) / window.unit_ns)],
+                [(window.at(span["begin_ns"]), (span["end_ns"] - span["begin_ns"]) / window.unit_ns)],
                 (row - _HALF_BOX, 2 * _HALF_BOX),
                 facecolor=colour,
                 edgecolor=colour,

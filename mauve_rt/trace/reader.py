@@ -1,171 +1,292 @@
-"""Reads a recorded trace back by rosbags and the definitions stored in the bag; needs no message package."""
+"""Reads a recorded trace back by the definitions stored in the bag; needs no message package.
 
-import struct
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
-from heapq import merge
+Files are read from their begin and not by their summary, so that the bag of a recorder that runs, or that was
+killed, gives all it has. metadata.yaml is not consulted: the files tell the same, and are never older.
+"""
+
+import heapq
+import re
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.rosbag2 import Reader, ReaderError
+from mcap.records import Channel
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from mauve_rt.trace.architecture import ComponentInfo
 from mauve_rt.trace.cdr import Batch, decode_batch
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_scan import McapScan
+from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.records import RECORD, Records
-from mauve_rt.trace.trace import Loss, Message, Trace
+from mauve_rt.trace.trace import BagFile, Deployment, Loss, Message, Trace
 
-_BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
-_NAMES_TYPE = "mauve_msgs/msg/TraceNames"
-_UNREADABLE = (
-    ReaderError, OSError, AssertionError, TypeError, ValueError, KeyError, IndexError, OverflowError,
-    MemoryError, EOFError, struct.error,
-)  # fmt: skip
-"""What rosbags raises for damaged files."""
+_PACKAGE = "mauve_msgs/msg"
+_BATCH_TYPE = f"{_PACKAGE}/TraceBatch"
+_NAMES_TYPE = f"{_PACKAGE}/TraceNames"
+_ARCHITECTURE_TYPE = f"{_PACKAGE}/TraceArchitecture"
+_OWN_TYPES = (_BATCH_TYPE, _NAMES_TYPE, _ARCHITECTURE_TYPE)
+_DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
+_NOTHING = Batch(0, 0, (), (), b"")
+_RECORD_FIELDS = [
+    ("uint64", "sequence"), ("int64", "time_ns"), ("int64", "a"), ("int64", "b"), ("int64", "c"),
+    ("uint32", "name"), ("uint16", "kind"), ("uint16", "component"),
+]  # fmt: skip
+_RECORD_PART = re.compile(
+    r"^MSG: mauve_msgs/(?:msg/)?TraceRecord\n(.*?)(?:^=+$|\Z)", re.MULTILINE | re.DOTALL
+)
+_FIELD = re.compile(r"^\s*([a-z]\w*)\s+([a-z]\w*)\s*(?:#.*)?$", re.MULTILINE)
 
 
-def read_bag(path: str | Path) -> Trace:
+def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
     """Read the trace in a bag: a rosbag2 folder with MCAP files, or one such file.
 
-    metadata.yaml is not consulted: the files tell the same, and are never older. The bag of a running
-    recorder is whole between two flushes; who meets one finds it damaged, and may try again.
+    Also of a recorder that runs. What a kill left half-written is left out, and told in `Trace.files`.
 
     Raises:
-        TraceError: not a bag, a bag without a trace or with several executors', or one that cannot be read.
+        TraceError: not a bag, a bag without a trace or with several executors', one of another version of
+        mauve_rt, or one that cannot be read.
 
     """
-    files = _files(Path(path))
-    batches: list[Batch] = []
-    words: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    topics: set[str] = set()
-    for file in files:
-        with _OpenFile(file) as bag:
-            topics.update(bag.topics(_BATCH_TYPE))
-            batches += [decode_batch(data) for _, _, data in bag.raw(_BATCH_TYPE)]
-            for connection, _, data in bag.raw(_NAMES_TYPE):
-                said = bag.decoded(connection, data)
-                words = (tuple(said.components), tuple(said.names))
-    if len(topics) != 1:
-        found = " and ".join(sorted(topics)) or f"no topic of type {_BATCH_TYPE}"
-        msg = f"bag {path}: expected the trace of one executor, found {found}"
-        raise TraceError(msg)
-    pairs = np.array([(batch.monotonic_ns, batch.realtime_ns) for batch in batches], np.int64).reshape(-1, 2)
-    pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
-    records, losses = _per_component(batches, words[0])
-
-    def messages(wanted: tuple[str, ...]) -> Iterator[Message]:
-        return _messages(files, wanted, pairs)
-
-    return Trace(records, words[1], losses, pairs, messages)
+    files = bag_files(Path(path))
+    content = _Content(Path(path))
+    sizes = [file.stat().st_size for file in files]
+    done = 0
+    for file, size in zip(files, sizes, strict=True):
+        with McapScan(file) as scan:
+            for channel, message in scan.messages():
+                content.add(scan, channel, message.data)
+                progress((done + scan.whole_bytes) / max(sum(sizes), 1), "reading")
+            content.files.append(BagFile(file, scan.header.library, scan.whole_bytes, scan.damage))
+        done += size
+    return content.trace(files)
 
 
-class _OpenFile:
-    """One MCAP file of a bag, with its message types."""
+def bag_files(path: Path) -> list[Path]:
+    """Return the MCAP files of a bag in their order.
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._reader = Reader(path)
-        self._store: Typestore = get_typestore(Stores.EMPTY)
+    Raises:
+        TraceError: there is none; says what is there instead.
 
-    def __enter__(self) -> Self:
-        try:
-            self._reader.open()
-        except _UNREADABLE as error:
-            msg = f"bag file {self._path}: cannot be read ({error})"
-            raise TraceError(msg) from error
-        types: dict[str, Any] = {}
-        for connection in self._reader.connections:
-            if connection.msgdef.format == MessageDefinitionFormat.MSG:
-                types.update(get_types_from_msg(connection.msgdef.data, connection.msgtype))
-        self._store.register(types)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._reader.close()
-
-    def topics(self, type_name: str) -> set[str]:
-        """Topics of one type."""
-        return {item.topic for item in self._reader.connections if item.msgtype == type_name}
-
-    def raw(self, type_name: str) -> Iterator[tuple[Connection, int, bytes]]:
-        """Messages of one type, by log time."""
-        return self.raw_of([item for item in self._reader.connections if item.msgtype == type_name])
-
-    def raw_of_topics(self, topics: Iterable[str]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Messages of these topics; of all but the trace's own when there is none."""
-        wanted = set(topics)
-        own = {_BATCH_TYPE, _NAMES_TYPE}
-        chosen = [
-            item
-            for item in self._reader.connections
-            if (item.topic in wanted if wanted else item.msgtype not in own)
-        ]
-        return self.raw_of(chosen)
-
-    def raw_of(self, connections: list[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        if not connections:  # to rosbags an empty list means all
-            return
-        try:
-            yield from self._reader.messages(connections)
-        except _UNREADABLE as error:
-            msg = f"bag file {self._path}: cannot be read ({error})"
-            raise TraceError(msg) from error
-
-    def decoded(self, connection: Connection, data: bytes) -> Any:
-        """Return the message as an object of a class that rosbags made from the bag's definition."""
-        return self._store.deserialize_cdr(data, connection.msgtype)
-
-
-def _files(path: Path) -> list[Path]:
+    """
     if path.is_file() and path.suffix == ".mcap":
         return [path]
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name)) if path.is_dir() else []
     if not found:
-        what = "no .mcap file in it" if path.is_dir() else "not a folder" if path.exists() else "not there"
-        msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {what}"
+        msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {_instead(path)}"
         raise TraceError(msg)
     return found
 
 
+def _instead(path: Path) -> str:
+    if path.is_dir():
+        if any(path.glob("*.db3")):
+            return "its storage is sqlite3: `ros2 bag convert` makes an MCAP bag of it"
+        return "no .mcap file in it"
+    if not path.exists():
+        return "not there"
+    return "not a folder"
+
+
+class _Content:
+    """What was read of a bag, message by message."""
+
+    def __init__(self, path: Path) -> None:
+        self.files: list[BagFile] = []
+        self._path = path
+        self._topics: set[str] = set()
+        self._others: set[str] = set()
+        self._batches: list[Batch] = []
+        self._components: tuple[str, ...] = ()
+        self._names: tuple[str, ...] = ()
+        self._architecture: tuple[ComponentInfo, ...] = ()
+        self._first_grids: dict[str, Deployment] | None = None
+        self._known: set[tuple[Path, int]] = set()
+        self._types = _Types()
+
+    def add(self, scan: McapScan, channel: Channel, data: bytes) -> None:
+        type_name = scan.type_of(channel)
+        if type_name not in _OWN_TYPES:
+            self._others.add(f"{channel.topic} ({type_name or 'without a type'})")
+            return
+        if (scan.path, channel.id) not in self._known:
+            self._known.add((scan.path, channel.id))
+            _check_layout(scan, channel)
+        try:
+            if type_name == _BATCH_TYPE:
+                self._topics.add(channel.topic)
+                self._batches.append(decode_batch(data))
+            elif type_name == _NAMES_TYPE:
+                said = self._types.decoded(scan, channel, data)
+                self._components, self._names = tuple(said.components), tuple(said.names)
+            else:
+                self._add_architecture(self._types.decoded(scan, channel, data))
+        except TraceError as error:
+            msg = f"bag file {scan.path}: {error}"
+            raise TraceError(msg) from error
+
+    def _add_architecture(self, said: Any) -> None:
+        self._architecture = tuple(ComponentInfo.of_message(component) for component in said.components)
+        if self._first_grids is None:  # later ones are told by the records themselves
+            self._first_grids = {
+                component.name: Deployment(0, int(epoch_ns), component.offset_ns, component.period_ns)
+                for component, epoch_ns in zip(self._architecture, said.epochs_ns, strict=False)
+                if epoch_ns
+            }
+
+    def trace(self, files: list[Path]) -> Trace:
+        if len(self._topics) != 1:
+            found = " and ".join(sorted(self._topics)) or f"no topic of type {_BATCH_TYPE}"
+            if not self._topics and self._others:
+                libraries = {file.library for file in self.files if file.library}
+                by = f" (written by {', '.join(sorted(libraries))})" if libraries else ""
+                found += f" but {', '.join(sorted(self._others)[:3])}{by}"
+            msg = f"bag {self._path}: expected the trace of one executor, found {found}"
+            raise TraceError(msg)
+        pairs = np.array([(one.monotonic_ns, one.realtime_ns) for one in self._batches], np.int64)
+        pairs = pairs.reshape(-1, 2)
+        pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
+        records, losses = _per_component(self._batches, self._components)
+        return Trace(
+            records,
+            self._names,
+            losses,
+            pairs,
+            lambda topics: _messages(files, topics, pairs),
+            architecture=self._architecture,
+            first_grids=self._first_grids or {},
+            files=tuple(self.files),
+        )
+
+
+class _Types:
+    """Classes that rosbags makes of the definitions in a bag."""
+
+    def __init__(self) -> None:
+        self._stores: dict[tuple[str, bytes], Typestore] = {}
+
+    def decoded(self, scan: McapScan, channel: Channel, data: bytes) -> Any:
+        """Return a message as an object.
+
+        Raises:
+            TraceError: the definition or the message is not what it should be.
+
+        """
+        schema = scan.schemas.get(channel.schema_id)
+        if schema is None or schema.encoding != "ros2msg" or channel.message_encoding != "cdr":
+            msg = f"topic {channel.topic}: expected CDR with a ros2msg definition"
+            raise TraceError(msg)
+        key = (schema.name, schema.data)
+        try:
+            if key not in self._stores:
+                store = get_typestore(Stores.EMPTY)
+                store.register(get_types_from_msg(schema.data.decode(), schema.name))
+                self._stores[key] = store
+            return self._stores[key].deserialize_cdr(data, schema.name)
+        except Exception as error:  # rosbags raises whatever its parts raise
+            msg = f"topic {channel.topic}: a message cannot be read as {schema.name} ({error})"
+            raise TraceError(msg) from error
+
+
+def _check_layout(scan: McapScan, channel: Channel) -> None:
+    """See that the bag's records are those that this version reads.
+
+    Raises:
+        TraceError: they are not.
+
+    """
+    schema = scan.schemas[channel.schema_id]
+    if schema.name != _BATCH_TYPE:
+        return
+    part = _RECORD_PART.search(schema.data.decode(errors="replace"))
+    found = _FIELD.findall(part[1]) if part else []
+    if found != _RECORD_FIELDS:
+        shown = ", ".join(" ".join(field) for field in found) or "no TraceRecord"
+        expected = ", ".join(" ".join(field) for field in _RECORD_FIELDS)
+        msg = (
+            f"bag file {scan.path}: topic {channel.topic} was written by another version of mauve_rt "
+            f"('{scan.header.library}'): expected records of {expected}; found {shown}; read it with that one"
+        )
+        raise TraceError(msg)
+
+
 def _per_component(
-    batches: list[Batch], components: tuple[str, ...]
+    batches: Sequence[Batch], components: tuple[str, ...]
 ) -> tuple[dict[str, Records], dict[str, Loss]]:
-    arrays = [np.frombuffer(batch.records, RECORD) for batch in batches]
-    everything: Records = np.concatenate(arrays or [np.empty(0, RECORD)])
-    last = max(batches, key=lambda batch: batch.monotonic_ns) if batches else Batch(0, 0, (), (), b"")
-    named = len(last.written)
-    highest = int(everything["component"].max(initial=0)) if len(everything) else -1
-    names = [*components, *(f"component {i}" for i in range(len(components), max(named, highest + 1)))]
+    parts: dict[int, list[Records]] = {}
+    for batch in batches:
+        rows = np.frombuffer(batch.records, RECORD)
+        numbers = rows["component"]
+        cuts = [0, *(np.flatnonzero(numbers[1:] != numbers[:-1]) + 1).tolist(), len(rows)]
+        for begin, end in pairwise(cuts):
+            if end > begin:
+                parts.setdefault(int(numbers[begin]), []).append(rows[begin:end])
+    first = min(batches, key=lambda batch: batch.monotonic_ns)
+    last = max(batches, key=lambda batch: batch.monotonic_ns)
+    known = max(len(last.written), *(number + 1 for number in parts), len(components))
+    names = [*components, *(f"component {number}" for number in range(len(components), known))]
     records: dict[str, Records] = {}
     losses: dict[str, Loss] = {}
-    for index, name in enumerate(names):
-        rows = everything[everything["component"] == index]
-        rows = rows[np.argsort(rows["sequence"], kind="stable")]
-        gaps = int(rows["sequence"][-1]) + 1 - len(rows) if len(rows) else 0
-        written = last.written[index] if index < named else 0
-        dropped = last.dropped[index] if index < len(last.dropped) else 0
+    for number, name in enumerate(names):
+        rows = np.concatenate(parts.get(number, [np.empty(0, RECORD)]))
+        rows = _in_order(rows)
+        loss = _loss(rows, number, first, last)
         if name in records:  # removed and added again: the same component's next life
             rows = np.concatenate([records[name], rows])
-            before = losses[name]
-            written, dropped, gaps = before.written + written, before.dropped + dropped, before.gaps + gaps
-        records[name] = rows
-        losses[name] = Loss(written, len(rows), dropped, gaps)
+            loss = losses[name].plus(loss)
+        records[name], losses[name] = rows, loss
     return records, losses
 
 
-def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.int64]) -> Iterator[Message]:
-    def of_file(bag: _OpenFile) -> Iterator[Message]:
-        for connection, log_time_ns, data in bag.raw_of_topics(topics):
-            monotonic_ns = _monotonic_ns(log_time_ns, pairs)
-            yield Message(connection.topic, log_time_ns, monotonic_ns, bag.decoded(connection, data))
+def _in_order(rows: Records) -> Records:
+    """Return the records by sequence number."""
+    sequence = rows["sequence"]
+    if np.all(sequence[1:] > sequence[:-1]):
+        return rows
+    return rows[np.argsort(sequence, kind="stable")]
 
-    with ExitStack() as stack:
-        sources = [of_file(stack.enter_context(_OpenFile(file))) for file in files]
-        yield from merge(*sources, key=lambda message: message.log_time_ns)
+
+def _loss(rows: Records, number: int, first: Batch, last: Batch) -> Loss:
+    # A file that does not begin with the trace begins with a batch without records: what was before it.
+    before = first if not len(first.records) else _NOTHING
+    base_written, base_dropped = _of(before.written, number), _of(before.dropped, number)
+    gaps = int(rows["sequence"][-1]) + 1 - base_written - len(rows) if len(rows) else 0
+    return Loss(
+        written=max(_of(last.written, number) - base_written, len(rows)),
+        received=len(rows),
+        dropped=_of(last.dropped, number) - base_dropped,
+        gaps=max(gaps, 0),
+    )
+
+
+def _of(counts: Sequence[int], number: int) -> int:
+    return counts[number] if number < len(counts) else 0
+
+
+def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.int64]) -> Iterator[Message]:
+    """Yield decoded messages by log time."""
+    types = _Types()
+    waiting: list[tuple[int, int, Message]] = []
+    count = 0
+    for file in files:
+        with McapScan(file) as scan:
+            for channel, message in scan.messages():
+                if not (channel.topic in topics if topics else scan.type_of(channel) not in _OWN_TYPES):
+                    continue
+                log_time_ns = message.log_time
+                said = types.decoded(scan, channel, message.data)
+                monotonic_ns = _monotonic_ns(log_time_ns, pairs)
+                one = Message(channel.topic, log_time_ns, monotonic_ns, said)
+                heapq.heappush(waiting, (log_time_ns, count, one))
+                count += 1
+                while waiting[0][0] < log_time_ns - _DISORDER_NS:
+                    yield heapq.heappop(waiting)[-1]
+    while waiting:
+        yield heapq.heappop(waiting)[-1]
 
 
 def _monotonic_ns(log_time_ns: int, pairs: npt.NDArray[np.int64]) -> int:

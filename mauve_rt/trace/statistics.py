@@ -1,11 +1,12 @@
 """Statistics of a trace per component: wake-up latency, response and execution times, phase error."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.records import Kind, Records
 from mauve_rt.trace.trace import Trace
 
@@ -24,13 +25,11 @@ class Distribution:
     max_ns: int
 
 
-class Span(NamedTuple):
-    """One execution of a state."""
+SPAN = np.dtype([("name", "<u4"), ("begin_ns", "<i8"), ("end_ns", "<i8")])
+"""One execution of a state, or one call of a service; `name` is an index into Trace.names."""
 
-    name: int
-    """Index into Trace.names."""
-    begin_ns: int
-    end_ns: int
+Spans = npt.NDArray[Any]
+"""A structured array of dtype SPAN."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +37,12 @@ class ComponentStatistics:
     """What a component did."""
 
     component: str
+    period_ns: int
+    """g as last deployed; 0: sporadic, or not told."""
+    duration_ns: int
+    """From the first record to the last."""
+    load: float
+    """Share of the duration that passed in execution states, preemption included; 0 to 1."""
     releases: int
     overruns: int
     skipped: int
@@ -51,6 +56,10 @@ class ComponentStatistics:
     """Actual release - the nearest instant of the deployment's grid, where the initial state was released."""
     execution: dict[str, Distribution]
     """Per state: from its begin to its end, preemption included."""
+    services: dict[str, Distribution]
+    """Per resource.service: from the call's begin to its end."""
+    contention: dict[str, Distribution]
+    """Per resource: waiting for a lock that another thread held."""
     lost_records: int
     """Records known to be missing: when not 0, the counts above are lower bounds."""
 
@@ -65,8 +74,15 @@ def component_statistics(trace: Trace, component: str) -> ComponentStatistics:
     records = trace.of(component)
     releases = records[records["kind"] == Kind.RELEASE]
     overruns = records[records["kind"] == Kind.OVERRUN]
+    contended = records[records["kind"] == Kind.CONTENDED]
+    grids = trace.deployments(component)
+    states = state_spans(records)
+    duration_ns = int(np.ptp(records["time_ns"])) if len(records) else 0
     return ComponentStatistics(
         component=component,
+        period_ns=grids[-1].period_ns if grids else 0,
+        duration_ns=duration_ns,
+        load=int(_lengths(states).sum()) / duration_ns if duration_ns else 0.0,
         releases=len(releases),
         overruns=len(overruns),
         skipped=int(overruns["c"].sum()),
@@ -74,14 +90,20 @@ def component_statistics(trace: Trace, component: str) -> ComponentStatistics:
         wakeup=distribution(releases["b"] - releases["a"]),
         response=distribution(response_times(records)),
         phase_error=distribution(_phase_errors(trace, component, records)),
-        execution=_execution_times(trace, records),
+        execution=_by_name(trace, states["name"], _lengths(states)),
+        services=_by_name(trace, (calls := service_spans(records))["name"], _lengths(calls)),
+        contention=_by_name(trace, contended["name"], contended["b"]),
         lost_records=trace.losses[component].lost,
     )
 
 
-def all_statistics(trace: Trace) -> dict[str, ComponentStatistics]:
+def all_statistics(trace: Trace, *, progress: Progress = silent) -> dict[str, ComponentStatistics]:
     """Statistics of every component of the trace."""
-    return {component: component_statistics(trace, component) for component in trace.components}
+    found: dict[str, ComponentStatistics] = {}
+    for index, component in enumerate(trace.components):
+        progress(index / len(trace.components), "measuring")
+        found[component] = component_statistics(trace, component)
+    return found
 
 
 def distribution(values: Values) -> Distribution:
@@ -94,19 +116,34 @@ def distribution(values: Values) -> Distribution:
 
 def response_times(records: Records) -> Values:
     """Of each release of one component: entry of its next wait - its nominal instant; ns, in order."""
-    release, following = _pairs(records, Kind.RELEASE, (Kind.WAIT, Kind.OVERRUN), (Kind.RELEASE, Kind.STOP))
+    release, following = pairs(records, Kind.RELEASE, (Kind.WAIT, Kind.OVERRUN), (Kind.RELEASE, Kind.STOP))
     return np.asarray(following["time_ns"] - release["a"], np.int64)
 
 
-def state_spans(records: Records) -> list[Span]:
+def state_spans(records: Records) -> Spans:
     """Executions of states of one component, in order."""
-    begin, end = _pairs(records, Kind.STATE_BEGIN, (Kind.STATE_END,), (Kind.STATE_BEGIN,))
+    return _spans(*pairs(records, Kind.STATE_BEGIN, (Kind.STATE_END,), (Kind.STATE_BEGIN,)))
+
+
+def service_spans(records: Records) -> Spans:
+    """Calls of services by one component, in order. Of calls within calls the innermost."""
+    return _spans(*pairs(records, Kind.SERVICE_BEGIN, (Kind.SERVICE_END,), (Kind.SERVICE_BEGIN,)))
+
+
+def _spans(begin: Records, end: Records) -> Spans:
     same = begin["name"] == end["name"]
-    columns = (begin["name"][same], begin["time_ns"][same], end["time_ns"][same])
-    return [Span(*map(int, row)) for row in zip(*columns, strict=True)]
+    spans: Spans = np.empty(np.count_nonzero(same), SPAN)
+    spans["name"], spans["begin_ns"] = begin["name"][same], begin["time_ns"][same]
+    spans["end_ns"] = end["time_ns"][same]
+    return spans
 
 
-def _pairs(
+def _lengths(spans: Spans) -> Values:
+    lengths: Values = spans["end_ns"] - spans["begin_ns"]
+    return lengths
+
+
+def pairs(
     records: Records, first: Kind, then: tuple[Kind, ...], unless: tuple[Kind, ...]
 ) -> tuple[Records, Records]:
     """Each record of kind `first` with the next of kind `then`, unless `unless` or a gap is in between."""
@@ -124,16 +161,15 @@ def _pairs(
 
 def _releases_of_initial_state(records: Records) -> Records:
     """Releases into the initial state (the one begun first after a start): only these are on the grid."""
-    _, first = _pairs(records, Kind.START, (Kind.STATE_BEGIN,), (Kind.STOP,))
-    release, begun = _pairs(records, Kind.RELEASE, (Kind.STATE_BEGIN,), (Kind.RELEASE, Kind.STOP))
+    _, first = pairs(records, Kind.START, (Kind.STATE_BEGIN,), (Kind.STOP,))
+    release, begun = pairs(records, Kind.RELEASE, (Kind.STATE_BEGIN,), (Kind.RELEASE, Kind.STOP))
     return release[np.isin(begun["name"], first["name"])] if len(first) else release
 
 
-def _execution_times(trace: Trace, records: Records) -> dict[str, Distribution]:
-    times: dict[int, list[int]] = {}
-    for span in state_spans(records):
-        times.setdefault(span.name, []).append(span.end_ns - span.begin_ns)
-    return {trace.name(name): distribution(np.array(values, np.int64)) for name, values in times.items()}
+def _by_name(trace: Trace, names: npt.NDArray[np.uint32], values: Values) -> dict[str, Distribution]:
+    """Distributions by the word that each value's name stands for, in the order in which they first came."""
+    present, first = np.unique(names, return_index=True)
+    return {trace.name(int(name)): distribution(values[names == name]) for name in present[np.argsort(first)]}
 
 
 def _phase_errors(trace: Trace, component: str, records: Records) -> Values:

@@ -3,11 +3,13 @@
 import heapq
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.architecture import ComponentInfo
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.records import Kind, Records
 
@@ -35,7 +37,7 @@ class Loss(NamedTuple):
     """What is known about records that are not in the bag."""
 
     written: int
-    """Records the component ever offered, by the last batch."""
+    """Records the component offered since the bag began, by the last batch."""
     received: int
     dropped: int
     """Of the written ones, lost because the ring was full, by the last batch."""
@@ -46,6 +48,22 @@ class Loss(NamedTuple):
     def lost(self) -> int:
         """Records known to be lost."""
         return max(self.dropped, self.gaps)
+
+    def plus(self, other: "Loss") -> "Loss":
+        """Return both together, field by field."""
+        return Loss(*(mine + others for mine, others in zip(self, other, strict=True)))
+
+
+class BagFile(NamedTuple):
+    """A file that a trace was read from."""
+
+    path: Path
+    library: str
+    """What wrote it, by its own words."""
+    whole_bytes: int
+    """How much of it could be read."""
+    damage: str
+    """Why not all; empty when it could."""
 
 
 class Message(NamedTuple):
@@ -74,6 +92,12 @@ class Trace:
     clock_pairs: npt.NDArray[np.int64]
     """(n, 2): CLOCK_MONOTONIC and CLOCK_REALTIME at each drain."""
     message_source: MessageSource = field(repr=False, default=lambda _: iter(()))
+    architecture: tuple[ComponentInfo, ...] = ()
+    """As last told in the bag; empty when it does not tell."""
+    first_grids: Mapping[str, Deployment] = field(default_factory=dict)
+    """Grids of components that were deployed before the recording began."""
+    files: tuple[BagFile, ...] = ()
+    """What it was read from."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -106,7 +130,8 @@ class Trace:
     def deployments(self, component: str) -> list[Deployment]:
         """Grids of a component in the order of time; a component deployed again has more than one."""
         rows = self.of(component, Kind.DEPLOYMENT)
-        return [Deployment(int(r["time_ns"]), int(r["a"]), int(r["b"]), int(r["c"])) for r in rows]
+        told = [Deployment(int(r["time_ns"]), int(r["a"]), int(r["b"]), int(r["c"])) for r in rows]
+        return [self.first_grids[component], *told] if component in self.first_grids else told
 
     def deployment_at(self, component: str, time_ns: int) -> Deployment | None:
         """Return the grid in force at a time: the last before it, else the first; None when there is none."""
@@ -150,7 +175,22 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         return heapq.merge(*sources, key=lambda message: message.log_time_ns)
 
     pairs = np.concatenate([trace.clock_pairs for trace in traces.values()] or [np.empty((0, 2), np.int64)])
-    return Trace(records, names, losses, pairs[np.argsort(pairs[:, 1], kind="stable")], messages)
+    return Trace(
+        records,
+        names,
+        losses,
+        pairs[np.argsort(pairs[:, 1], kind="stable")],
+        messages,
+        architecture=tuple(
+            component.prefixed(key) for key, trace in traces.items() for component in trace.architecture
+        ),
+        first_grids={
+            f"{key}/{component}": grid
+            for key, trace in traces.items()
+            for component, grid in trace.first_grids.items()
+        },
+        files=tuple(file for trace in traces.values() for file in trace.files),
+    )
 
 
 def _clock_offset_ns(trace: Trace) -> int:

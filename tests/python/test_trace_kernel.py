@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mauve_rt import _kernel
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.reconfigurations import reconfigurations
 from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
@@ -50,7 +50,7 @@ class Run:
         deployer.shutdown()
         recorder.stop()
         self.components = {one.name: one for one in architecture.components()}
-        self.trace: Trace = read_bag(directory)
+        self.trace: Trace = open_trace(directory)
 
 
 @pytest.fixture(scope="module")

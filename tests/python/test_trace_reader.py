@@ -1,13 +1,15 @@
 """Reading a bag back: what is in it, what is missing from it, and what is not a bag with a trace."""
 
 import shutil
+import time
 from pathlib import Path
 
 import pytest
 
+import mauve_rt.trace
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag import BagWriter
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.synthetic import SyntheticSource
@@ -25,7 +27,7 @@ def record(source: SyntheticSource, directory: Path) -> Trace:
     recorder = Recorder(source, directory, node_name="/robot/executor")
     recorder.start()
     recorder.stop()
-    return read_bag(directory)
+    return open_trace(directory)
 
 
 def test_a_bag_moved_elsewhere_needs_nothing_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -34,7 +36,7 @@ def test_a_bag_moved_elsewhere_needs_nothing_installed(tmp_path: Path, monkeypat
     record(source, tmp_path / "bag")
     (tmp_path / "bag" / "metadata.yaml").unlink()
     monkeypatch.setenv("AMENT_PREFIX_PATH", "")
-    (row,) = read_bag(shutil.move(tmp_path / "bag", tmp_path / "else")).of("a", Kind.MARK)
+    (row,) = open_trace(shutil.move(tmp_path / "bag", tmp_path / "else")).of("a", Kind.MARK)
     assert [int(row[key]) for key in ("time_ns", "a", "b", "c")] == [7, 1, -2, 3]
 
 
@@ -101,18 +103,47 @@ def test_robots_of_different_clocks_do_not_merge(tmp_path: Path):
 
 def test_what_is_no_bag_is_refused(tmp_path: Path):
     with pytest.raises(TraceError, match="not there"):
-        read_bag(tmp_path / "nothing")
+        open_trace(tmp_path / "nothing")
     with pytest.raises(TraceError, match=r"no \.mcap file in it"):
-        read_bag(tmp_path)
+        open_trace(tmp_path)
     (tmp_path / "x.mcap").write_bytes(b"something else entirely, and long enough for a footer")
-    with pytest.raises(TraceError, match=r"x\.mcap: cannot be read"):
-        read_bag(tmp_path / "x.mcap")
+    with pytest.raises(TraceError, match=r"x\.mcap: not an MCAP file"):
+        open_trace(tmp_path / "x.mcap")
     (tmp_path / "y.mcap").write_bytes(b"\x89MCAP0\r\n")
-    with pytest.raises(TraceError, match=r"y\.mcap: cannot be read"):
-        read_bag(tmp_path / "y.mcap")
+    with pytest.raises(TraceError, match=r"y\.mcap: the MCAP header cannot be read"):
+        open_trace(tmp_path / "y.mcap")
 
 
 def test_a_bag_without_a_trace_is_refused(tmp_path: Path):
     BagWriter(tmp_path / "bag").close()
     with pytest.raises(TraceError, match="found no topic of type mauve_msgs/msg/TraceBatch"):
-        read_bag(tmp_path / "bag")
+        open_trace(tmp_path / "bag")
+
+
+def test_a_bag_cut_off_anywhere_gives_what_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("mauve_rt.trace.mcap_scan._PAUSE_S", 0)
+    source = SyntheticSource(["a"])
+    recorder = Recorder(source, tmp_path / "bag", node_name="/e", flush_period_s=0.001, drain_period_s=0.001)
+    recorder.start()
+    for index in range(20):
+        source.add("a", Kind.MARK, index)
+        time.sleep(0.003)
+    recorder.stop()
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    whole = file.read_bytes()
+    data_end = mauve_rt.trace.open(file).files[0].whole_bytes + 13  # behind the DataEnd record
+    seen = set()
+    for size in range(100, len(whole), 41):
+        file.write_bytes(whole[:size])
+        try:
+            trace = mauve_rt.trace.open(file)
+        except TraceError:  # cut off before the first batch
+            assert not seen
+            continue
+        rows = trace.of("a") if trace.records else ()
+        assert [int(row["sequence"]) for row in rows] == list(range(len(rows)))
+        (told,) = trace.files
+        assert told.whole_bytes <= size
+        assert bool(told.damage) == (size < data_end)
+        seen.add(len(rows))
+    assert {1, 20} <= seen

@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.recorder import DROPPED_MESSAGES, Recorder
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.synthetic import SyntheticSource
@@ -64,7 +64,7 @@ def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None
 def records_in(directory: Path, component: str) -> int:
     """How many of a component are in the bag; 0 as well while a flush is under way."""
     try:
-        return len(read_bag(directory).records.get(component, ()))
+        return len(open_trace(directory).records.get(component, ()))
     except TraceError:
         return 0
 
@@ -81,7 +81,7 @@ def test_records_and_words_are_in_the_bag(recorder: Recorder, source: SyntheticS
     wait_until(lambda: records_in(recorder.directory, "control") == 4)
     source.cycle("guidance", 2000, states={"planning": 7}, wait_ns=100)
     recorder.stop()
-    trace = read_bag(recorder.directory)
+    trace = open_trace(recorder.directory)
     assert trace.components == ("control", "guidance")
     assert [Kind(kind).name for kind in trace.of("guidance")["kind"]] == [
         "RELEASE", "STATE_BEGIN", "STATE_END", "WAIT",
@@ -96,7 +96,7 @@ def test_messages_lie_on_the_time_base_of_the_records(recorder: Recorder, source
     recorder.start()
     assert recorder.record("/robot_1/words", TEXT, HELLO, monotonic_ns=4_999_000)
     recorder.stop()
-    (message,) = read_bag(recorder.directory).messages()
+    (message,) = open_trace(recorder.directory).messages()
     assert (message.topic, message.msg.data) == ("/robot_1/words", "hello")
     assert message.log_time_ns == 4_999_000 + source.realtime_offset_ns
     assert message.monotonic_ns == 4_999_000
@@ -115,7 +115,7 @@ def test_messages_from_many_threads_all_arrive(recorder: Recorder):
     for thread in threads:
         thread.join()
     recorder.stop()
-    found = [message.topic for message in read_bag(recorder.directory).messages()]
+    found = [message.topic for message in open_trace(recorder.directory).messages()]
     assert len(found) + recorder.dropped_messages == 200
     assert len(set(found)) == 4
 
@@ -128,7 +128,7 @@ def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path: Path, source: S
     recorder.stop()
     assert taken == [True, True, False, False, False]
     assert recorder.dropped_messages == 3
-    assert len(list(read_bag(recorder.directory).messages())) == 2
+    assert len(list(open_trace(recorder.directory).messages())) == 2
     assert custom_data(recorder.directory) == {DROPPED_MESSAGES: "3"}
 
 
@@ -143,7 +143,7 @@ def test_a_type_that_is_not_installed_is_told_once_and_the_rest_is_recorded(
     assert len(errors) == 1
     assert "topic /w is not recorded: message type 'far/msg/Away'" in errors[0]
     assert recorder.dropped_messages == 3
-    assert len(list(read_bag(recorder.directory).messages())) == 3
+    assert len(list(open_trace(recorder.directory).messages())) == 3
 
 
 def test_a_full_disk_ends_the_recording_and_says_so_once(
@@ -165,7 +165,7 @@ def test_a_full_disk_ends_the_recording_and_says_so_once(
     assert len(errors) == 1
     assert "recording stopped: bag file" in errors[0]
     assert "File too large" in errors[0]
-    assert len(read_bag(recorder.directory).records["control"]) >= 2
+    assert len(open_trace(recorder.directory).records["control"]) >= 2
 
 
 def test_a_fault_of_the_source_ends_the_recording_only(
@@ -180,7 +180,7 @@ def test_a_fault_of_the_source_ends_the_recording_only(
     wait_until(lambda: errors)
     assert errors == ["recording stopped: no deployer"]
     assert not recorder.recording
-    read_bag(recorder.directory)
+    open_trace(recorder.directory)
 
 
 def test_stop_may_come_twice_or_without_a_start(tmp_path: Path, source: SyntheticSource):

@@ -131,7 +131,7 @@ def test_spans_come_back_as_written(executions: list[tuple[str, int]]):
         expected.append((state, now_ns, now_ns + execution_ns))
         now_ns += execution_ns
     trace = trace_of(source)
-    spans = [(trace.name(span.name), span.begin_ns, span.end_ns) for span in state_spans(trace.of("c"))]
+    spans = [(trace.name(name), begin, end) for name, begin, end in state_spans(trace.of("c")).tolist()]
     assert spans == expected
 
 

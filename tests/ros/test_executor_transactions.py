@@ -16,7 +16,7 @@ from mauve_msgs.msg import (
 )
 from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 
 NODE = "/robot_1/executor"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -163,7 +163,7 @@ def test_a_removed_component_keeps_its_number_in_the_bag(
     assert graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=third).success
     executor.process.terminate()
     assert executor.wait() == 0
-    trace = read_bag(tmp_path / "bag")
+    trace = open_trace(tmp_path / "bag")
     assert list(trace.components)[-2:] == ["second", "third"]
     assert len(trace.of("second")) > 0
     assert len(trace.of("third")) > 0

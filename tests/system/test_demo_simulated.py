@@ -9,7 +9,7 @@ from bag_reading import messages, topics
 from demo_harness import Demo, Starter
 from rosbags.highlevel import AnyReader
 
-from mauve_rt.trace.reader import read_bag
+from mauve_rt.trace.reader import open_trace
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
 ROBOTS = ("robot_1", "robot_2")
@@ -24,7 +24,7 @@ def simulate(start: Starter, name: str, *arguments: str) -> Demo:
 
 
 def records(demo: Demo, robot: str) -> bytes:
-    of_components = read_bag(demo.out / "bag" / robot).records
+    of_components = open_trace(demo.out / "bag" / robot).records
     return b"".join(name.encode() + rows.tobytes() for name, rows in of_components.items())
 
 

@@ -1,0 +1,243 @@
+"""Reads an MCAP file from its begin to where it is whole; needs neither its end nor its summary.
+
+So the bag of a process that was killed in the middle of a write, or that is still writing, is read up to
+its last whole chunk. Records are taken apart by the mcap library; this only finds them.
+"""
+
+import io
+import os
+import struct
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, MessageIndex, Schema
+from mcap.stream_reader import CRCValidationError, breakup_chunk
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_file import MAGIC
+
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_FOOTER_BYTES = _HEAD.size + 20
+_ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
+_UNREADABLE = (
+    McapError,
+    ValueError,
+    KeyError,
+    IndexError,
+    EOFError,
+    struct.error,
+    OverflowError,
+    MemoryError,
+)
+_READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
+    Opcode.HEADER: Header.read,
+    Opcode.SCHEMA: Schema.read,
+    Opcode.CHANNEL: Channel.read,
+    Opcode.CHUNK: Chunk.read,
+    Opcode.MESSAGE_INDEX: MessageIndex.read,
+    Opcode.DATA_END: DataEnd.read,
+    Opcode.FOOTER: Footer.read,
+}
+
+
+class Found(NamedTuple):
+    """A record of the data section, and where it is."""
+
+    offset: int
+    end: int
+    record: McapRecord
+
+
+class McapScan:
+    """One pass over a file. `header`, `schemas` and `channels` fill up as it goes."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file.
+
+        Raises:
+            TraceError: it cannot be read, or is no MCAP file.
+
+        """
+        self.path = path
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.whole_bytes = 0
+        """The file is whole up to here: behind the last whole record of the data section."""
+        self.data_end: DataEnd | None = None
+        """The record that ends the data, once the pass has come to it."""
+        self.damage = ""
+        """Why the pass ended early; empty when it did not."""
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            msg = f"bag file {path}: cannot be read ({error.strerror})"
+            raise TraceError(msg) from error
+        try:
+            self.header = self._read_header()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Return the pass itself: the file is open from its construction."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self._file.close()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file now."""
+        return os.fstat(self._file.fileno()).st_size
+
+    def found(self) -> Iterator[Found]:
+        """Yield the records of the data section up to its end or the first damage; chunks fit their CRC."""
+        while self.data_end is None:
+            offset = self.whole_bytes
+            try:
+                found = self._next(offset)
+            except _UNREADABLE as error:
+                self.damage = f"byte {offset:,}: {_reason(error)}"
+                return
+            self.whole_bytes = found.end
+            if isinstance(found.record, DataEnd):
+                self.data_end = found.record
+                self.whole_bytes = found.offset
+            yield found
+
+    def messages(self) -> Iterator[tuple[Channel, Message]]:
+        """Yield all messages in the order of the file."""
+        for found in self.found():
+            for record in self.inside(found.record):
+                if isinstance(record, Message):
+                    yield self.channels[record.channel_id], record
+
+    def inside(self, record: McapRecord) -> list[McapRecord]:
+        """Return the records of a chunk, or the record itself; schemas and channels are noted."""
+        records = breakup_chunk(record) if isinstance(record, Chunk) else [record]
+        for one in records:
+            if isinstance(one, Schema):
+                self.schemas[one.id] = one
+            elif isinstance(one, Channel):
+                self.channels[one.id] = one
+        return records
+
+    def type_of(self, channel: Channel) -> str:
+        """Type of a channel's messages, package/msg/Name."""
+        schema = self.schemas.get(channel.schema_id)
+        return "" if schema is None else schema.name
+
+    def summary_damage(self) -> str:
+        """What is wrong behind the data section, which other readers need; empty when nothing is."""
+        if self.data_end is None:
+            return "the end is missing"
+        size = self.size
+        try:
+            tail = os.pread(self._file.fileno(), size - self.whole_bytes, self.whole_bytes)
+            if not tail.endswith(MAGIC):
+                return "the closing magic bytes are missing"
+            at = len(tail) - len(MAGIC) - _FOOTER_BYTES
+            footer = _record(Opcode.FOOTER, tail[at + _HEAD.size : -len(MAGIC)])
+            if tail[at] != Opcode.FOOTER or not isinstance(footer, Footer):
+                return "the footer is missing"
+            begin = footer.summary_start - self.whole_bytes if footer.summary_start else at
+            crc = zlib.crc32(tail[begin : at + _FOOTER_BYTES - 4])
+            if footer.summary_crc not in (0, crc):
+                return "the summary's CRC does not fit"
+        except (*_UNREADABLE, OSError) as error:
+            return f"the summary cannot be read ({_reason(error)})"
+        return ""
+
+    def _read_header(self) -> Header:
+        if self._file.read(len(MAGIC)) != MAGIC:
+            msg = f"bag file {self.path}: not an MCAP file (it does not begin with the magic bytes of one)"
+            raise TraceError(msg)
+        try:
+            found = self._once(len(MAGIC))
+        except _UNREADABLE as error:
+            msg = f"bag file {self.path}: the MCAP header cannot be read ({_reason(error)})"
+            raise TraceError(msg) from error
+        if not isinstance(found.record, Header):
+            msg = f"bag file {self.path}: expected an MCAP header, found a {type(found.record).__name__}"
+            raise TraceError(msg)
+        self.whole_bytes = found.end
+        return found.record
+
+    def _next(self, offset: int) -> Found:
+        """Read the record there; again when it is not whole, for a recorder may be just writing it."""
+        for _ in range(_ATTEMPTS - 1):
+            try:
+                return self._once(offset)
+            except _UNREADABLE:
+                time.sleep(_PAUSE_S)
+        return self._once(offset)
+
+    def _once(self, offset: int) -> Found:
+        self._file.seek(offset)
+        head = self._file.read(_HEAD.size)
+        if len(head) < _HEAD.size:
+            msg = "the file ends in the middle of a record"
+            raise EOFError(msg)
+        opcode, length = _HEAD.unpack(head)
+        end = offset + _HEAD.size + length
+        if end > self.size:
+            msg = f"a record of {length:,} bytes does not fit into the file's {self.size:,}"
+            raise EOFError(msg)
+        if opcode == 0:
+            msg = "no record begins here"
+            raise ValueError(msg)
+        data = self._file.read(length)
+        if len(data) < length:
+            msg = "the file became shorter"
+            raise EOFError(msg)
+        record = _record(opcode, data)
+        if isinstance(record, Chunk):
+            _check(record)
+        return Found(offset, end, record)
+
+
+class OtherRecord(McapRecord):
+    """A record that the trace does not use: an attachment, metadata, one of a later version of the format."""
+
+    def __init__(self, opcode: int) -> None:
+        self.opcode = opcode
+
+
+def _record(opcode: int, data: bytes) -> McapRecord:
+    stream = ReadDataStream(io.BytesIO(data))
+    if opcode == Opcode.MESSAGE:
+        message: McapRecord = Message.read(stream, len(data))  # which mcap leaves unannotated
+        return message
+    read = _READ.get(opcode)
+    record: McapRecord = OtherRecord(opcode) if read is None else read(stream)
+    return record
+
+
+def _check(chunk: Chunk) -> None:
+    """See that a chunk is what its head promises.
+
+    Raises:
+        ValueError: it is not.
+
+    """
+    if not chunk.compression:  # as all of ours: without a copy
+        crc = zlib.crc32(chunk.data)
+        if chunk.uncompressed_crc not in (0, crc):
+            raise CRCValidationError(expected=chunk.uncompressed_crc, actual=crc, record=chunk)
+        return
+    try:
+        breakup_chunk(chunk, validate_crc=True)
+    except Exception as error:  # each compression has an error of its own
+        msg = f"a chunk cannot be unpacked ({_reason(error)})"
+        raise ValueError(msg) from error
+
+
+def _reason(error: BaseException) -> str:
+    return str(error) or type(error).__name__
