@@ -127,7 +127,7 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
         "overrun": component.overrun,
         "max_backlog": component.max_backlog,
         "stack_bytes": component.stack_bytes,
-        "trace_records": component.trace_records,
+        "trace_records": component.trace_records or 0,
         "alternatives": [core for core in allowed_parts(component, "core", loader) if core != component.core],
         "reconfigurable": component.reconfigurable,
     }

@@ -18,7 +18,8 @@
 
 `alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
 `installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
-`trace_records` is the room for its trace until it is drained; what does not fit is counted as lost.
+`trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
+does not fit is counted as lost.
 
 From which figures on /diagnostics warns, for all components and for each one:
 
@@ -246,7 +247,7 @@ class ComponentModel(_Section):
     overrun: Literal["skip", "catch_up", "fault"] = "skip"
     max_backlog: Annotated[int, Field(ge=1, le=1_000_000)] = 10
     stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 524_288
-    trace_records: Annotated[int, Field(ge=2, le=MAX_TRACE_RECORDS)] = 2048
+    trace_records: Annotated[int, Field(ge=2, le=MAX_TRACE_RECORDS)] | None = None  # None: by the period
     reconfigurable: bool = True
     properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
     diagnostics: DiagnosticsModel = DiagnosticsModel()

@@ -174,10 +174,13 @@ class BoundResources:
 
     # ---- as a MessageSource of the recorder, which is stopped before close()
 
-    def keep_messages(self) -> None:
-        """Keep every message from now on until take_messages()."""
-        if self._bridge is not None:
-            self._bridge.log(on=True)
+    def keep_messages(self, *, on: bool) -> None:
+        """Keep every message from now on until take_messages(), or none any more."""
+        bridge = self._bridge
+        if bridge is not None:
+            bridge.log(on=on)
+            if not on:
+                bridge.take_log()
 
     def take_messages(self) -> Sequence[SentMessage]:
         """What was sent or received since the last call."""

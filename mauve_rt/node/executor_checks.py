@@ -5,13 +5,16 @@ import math
 from mauve_rt._kernel import ComponentDescription
 from mauve_rt.model.steps import STEP_KINDS
 from mauve_rt.model.words import did_you_mean, shown
-from mauve_rt.node.executor_requests import Code, RefusalError, Request, Step
+from mauve_rt.node.executor_requests import Code, RecordingOrder, RefusalError, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000
 MAX_VALUE = 20_000
 MAX_STEPS = 100
+MAX_TOPICS = 100
+MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
+MIN_SPLIT_BYTES = 100_000
 
 
 def check_form(request: Request) -> None:
@@ -32,6 +35,9 @@ def check_form(request: Request) -> None:
         raise RefusalError(Code.INVALID, f"a text of the request is longer than {MAX_TEXT} characters")
     if any(len(step.value) > MAX_VALUE for step in request.steps):
         raise RefusalError(Code.INVALID, f"the value of a step is longer than {MAX_VALUE} characters")
+    if request.recording is not None:
+        _check_recording(request.recording)
+        return
     if not 1 <= len(request.steps) <= MAX_STEPS:
         found = f"of {len(request.steps)} steps" if request.steps else "without a step"
         raise RefusalError(Code.INVALID, f"a transaction {found}: expected 1 to {MAX_STEPS}")
@@ -53,10 +59,34 @@ def check_time(request: Request, runtime: Runtime) -> None:
         needed = "configure" if only_properties else "activate"
         text = f"the executor is not active; {needed} it first (lifecycle)"
         raise RefusalError(Code.NOT_ACTIVE, text)
+    check_epoch(request, runtime)
+
+
+def check_epoch(request: Request, runtime: Runtime) -> None:
+    """Whether the architecture is at the epoch that the request expects.
+
+    Raises:
+        RefusalError: WRONG_EPOCH.
+    """
     epoch = runtime.epoch
     if request.expected_epoch not in (0, epoch):
         text = f"the architecture is at epoch {epoch}, the request expected {request.expected_epoch}"
         raise RefusalError(Code.WRONG_EPOCH, f"{text}; look at ~/state and decide again")
+
+
+def _check_recording(order: RecordingOrder) -> None:
+    texts = [order.bag, *order.topics]
+    if len(order.topics) > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
+        text = f"expected at most {MAX_TOPICS} topics, and no text longer than {MAX_TEXT} characters"
+        raise RefusalError(Code.INVALID, text)
+    if "\0" in order.bag:
+        raise RefusalError(Code.INVALID, "bag: a folder's name has no null character")
+    if order.split_s != 0 and not MIN_SPLIT_S <= order.split_s <= MAX_SPLIT_S:
+        text = f"bad split_s: expected 0 (the default) or {MIN_SPLIT_S:g} to {MAX_SPLIT_S:g} s"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.split_s:g}")
+    if order.split_bytes != 0 and order.split_bytes < MIN_SPLIT_BYTES:
+        text = f"bad split_bytes: expected 0 (any size) or at least {MIN_SPLIT_BYTES:,}"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.split_bytes:,}")
 
 
 def check_state(step: Step, component: ComponentDescription) -> None:

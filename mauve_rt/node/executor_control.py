@@ -15,11 +15,12 @@ from mauve_rt._kernel import (
 )
 from mauve_rt.errors import MauveError, error_code, one_line
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.node.executor_checks import check_form, check_state, check_time
+from mauve_rt.node.executor_checks import check_epoch, check_form, check_state, check_time
 from mauve_rt.node.executor_requests import (
     NOT_MEASURED,
     Code,
     Outcome,
+    RecordingOrder,
     RefusalError,
     Report,
     Request,
@@ -56,18 +57,36 @@ class Outside(Protocol):
         """These are gone."""
 
 
+class Recordings(Protocol):
+    """What starts and stops recordings; see `executor_recording`."""
+
+    def carry_out(self, order: RecordingOrder) -> tuple[str, str]:
+        """Start or stop; returns what was done, in words, and the bag's folder.
+
+        Raises:
+            RefusalError: and nothing was started or stopped.
+        """
+
+
 class Control:
     """Carries out one request at a time. handle() may be called from any thread."""
 
     def __init__(
-        self, runtime: Runtime, *, phase_timeout_s: float = 1.0, outside: Outside | None = None
+        self,
+        runtime: Runtime,
+        *,
+        phase_timeout_s: float = 1.0,
+        outside: Outside | None = None,
+        recordings: Recordings | None = None,
     ) -> None:
         """The reply to a commit waits up to `phase_timeout_s` for the next release, to report its phase.
 
-        Without an `outside`, a request that binds a resource to a topic or service is refused.
+        Without an `outside`, a request that binds a resource to a topic or service is refused; without
+        `recordings`, one that records.
         """
         self._runtime = runtime
         self._outside = outside
+        self._recordings = recordings
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
         self._lock = threading.Lock()
@@ -91,7 +110,10 @@ class Control:
         from_core, to_core = _replaced_core(request, parts)
         try:
             check_form(request)
-            outcome = self._carry_out(request, parts, kernel_epoch=kernel_epoch)
+            if request.recording is not None:
+                outcome = self._order(request, request.recording)
+            else:
+                outcome = self._carry_out(request, parts, kernel_epoch=kernel_epoch)
         except RefusalError as refusal:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
@@ -100,7 +122,7 @@ class Control:
             text = one_line(f"internal error: {type(error).__name__}: {error}")
             outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
         after = self._runtime.observe(
-            changed_since=epoch if outcome.success and not request.dry_run else None
+            changed_since=epoch if outcome.success and request.steps and not request.dry_run else None
         )
         return replace(outcome, epoch=after.epoch, from_core=from_core, to_core=to_core)
 
@@ -129,6 +151,13 @@ class Control:
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
         self._runtime.declare(added=plan.added, removed=plan.removed)
         return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
+
+    def _order(self, request: Request, order: RecordingOrder) -> Outcome:
+        check_epoch(request, self._runtime)
+        if self._recordings is None:
+            raise RefusalError(Code.UNSUPPORTED, "this executor does not record by request")
+        message, bag = self._recordings.carry_out(order)
+        return Outcome(code=Code.OK, message=message, bag=bag)
 
     @contextmanager
     def _bound(self, bound: Bound, *, dry_run: bool) -> Iterator[None]:

@@ -12,6 +12,7 @@ from mauve_rt._bridge import CallReport, TopicReport
 from mauve_rt._kernel import ComponentDescription, RecentMaxima, allocation_counting
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor_bound_resources import BoundResources
+from mauve_rt.node.executor_recording import Recording, RecordingStatus
 from mauve_rt.node.executor_runtime import Runtime
 
 _ONE = ThresholdModel(warn=1)
@@ -20,12 +21,15 @@ _PYTHON_DEFAULTS = DiagnosticsModel(overruns=_ONE)  # the interpreter allocates 
 
 
 class Diagnostics:
-    """/diagnostics: a status per component, bound topic and service, and the process's. On the timer only."""
+    """/diagnostics: a status per component, bound topic and service, the bag, the process. On the timer."""
 
-    def __init__(self, node: LifecycleNode, runtime: Runtime, bound: BoundResources) -> None:
+    def __init__(
+        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, recording: Recording
+    ) -> None:
         self._node = node
         self._runtime = runtime
         self._bound = bound
+        self._recording = recording
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -39,6 +43,8 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
+        if (recording := self._recording.status()) is not None:
+            array.status.append(self._bag(recording))
         array.status.append(self._process(error))
         self._publisher.publish(array)
 
@@ -141,6 +147,19 @@ class Diagnostics:
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(f"service {report.service}", level, "; ".join(remarks) or "no trouble", values)
+
+    def _bag(self, status: RecordingStatus) -> Any:
+        remarks = self._grown("recording", {"messages dropped": status.dropped})
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        message = "; ".join(remarks) or ("recording" if status.recording else "stopped")
+        if status.error:
+            level, message = DiagnosticStatus.ERROR, status.error
+        values: dict[str, object] = {
+            "bag": status.bag,
+            "messages": status.messages,
+            "dropped_messages": status.dropped,
+        }
+        return self._status("recording", level, message, values)
 
     def _grown(self, name: str, counts: Mapping[str, int]) -> list[str]:
         """Those of these counts that grew since the last status, in words."""

@@ -10,6 +10,7 @@ from mauve_msgs.msg import (
     RealtimeStatus,
     ReconfigurationEvent,
     StepReport,
+    TraceArchitecture,
 )
 from mauve_rt._kernel import ComponentDescription, PortDescription
 from mauve_rt.model.schema import PropertyValue
@@ -49,6 +50,16 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
 def component_infos(runtime: Runtime) -> list[Any]:
     """ComponentInfo of every component."""
     return [component_info(part, alternatives=runtime.cores_of(part)) for part in runtime.components()]
+
+
+def trace_architecture(runtime: Runtime, observed: Observed) -> Any:
+    """TraceArchitecture as it was observed."""
+    return TraceArchitecture(
+        epoch_ns=runtime.deployment_epoch_ns(),
+        components=[
+            component_info(part, alternatives=runtime.cores_of(part)) for part in observed.components
+        ],
+    )
 
 
 def realtime_status(runtime: Runtime) -> Any:

@@ -16,17 +16,21 @@ from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_diagnostics import Diagnostics
 from mauve_rt.node.executor_parameter_services import ParameterServices
 from mauve_rt.node.executor_parameters import Parameters
-from mauve_rt.node.executor_recording import Recording
+from mauve_rt.node.executor_recording import Recording, RecordingOrders
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_state import StatePublisher
 from mauve_rt.trace import TraceError
+from mauve_rt.trace.recorder import Split
 
 NODE_NAME = "executor"
 MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
 _PARAMETERS: dict[str, tuple[Any, str]] = {
     "architecture": ("", "architecture file"),
-    "bag": ("", "folder of the bag to record, which must not exist yet; empty: record nothing"),
+    "bag": ("", "folder of the bag to record from the start, which must not exist yet; empty: none"),
+    "bags": ("", "folder below which ~/start_recording makes bags; empty: the working directory"),
+    "bag_split_s": (60.0, "a recording goes on in a new file after so long; 0: never"),
+    "bag_split_bytes": (0, "a recording goes on in a new file when one is so large; 0: never"),
     "autostart": (True, "configure and activate at the start"),
     "require_realtime": (False, "refuse to start without real-time rights"),
     "trace": (True, "component threads write traces"),
@@ -56,18 +60,20 @@ class ExecutorNode(LifecycleNode):
         self._answer_every_transition()
         self.control_group = control_group = MutuallyExclusiveCallbackGroup()
         query_group = MutuallyExclusiveCallbackGroup()
-        self._data_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         # A signal may come while a transition starts or ends threads: nobody else may do that then.
         self._starting_or_ending = threading.Lock()
         self._settings = self._declared()
-        self._recording = Recording()
         self._bound = BoundResources(self)
+        self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording)
-        self._diagnostics = Diagnostics(self, runtime, self._bound)
+        self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording)
         self._properties = Parameters(self, runtime)
         control = Control(
-            runtime, phase_timeout_s=self._settings["report_phase_timeout_s"], outside=self._bound
+            runtime,
+            phase_timeout_s=self._settings["report_phase_timeout_s"],
+            outside=self._bound,
+            recordings=RecordingOrders(self._recording, runtime, folder=Path(self._settings["bags"])),
         )
         services = Services(
             self,
@@ -123,9 +129,10 @@ class ExecutorNode(LifecycleNode):
         self._bound.configure(self._runtime.model, self._runtime.architecture)
         bag = str(self.get_parameter("bag").value)
         if bag:
-            self._bound.keep_messages()
-            self._recording.start(self, self._runtime.deployer, Path(bag), messages=self._bound)
-            self._recording.add_topics(self, self._settings["record_topics"], self._data_group)
+            split = Split(
+                after_s=self._settings["bag_split_s"], after_bytes=self._settings["bag_split_bytes"]
+            )
+            self._recording.start(Path(bag), self._settings["record_topics"], split=split)
         self._log_realtime()
 
     def _activate(self) -> None:
@@ -194,13 +201,13 @@ class ExecutorNode(LifecycleNode):
             self._release()
         except MauveError as error:
             self.get_logger().error(str(error))
-            self._recording.stop(self)
+            self._recording.stop()
             self._bound.close()
         self.destroy_node()
 
     def _release(self) -> None:
         self._runtime.require_parked()
-        self._recording.stop(self)
+        self._recording.stop()
         self._bound.close()
         self._runtime.cleanup()
         self._properties.follow()
@@ -224,7 +231,7 @@ class ExecutorNode(LifecycleNode):
                 for name, (default, description) in _PARAMETERS.items()
             }
             strings = ParameterDescriptor(
-                description="further topics to record, name:package/msg/Type or name:package/msg/Type:qos",
+                description="topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos",
                 type=ParameterType.PARAMETER_STRING_ARRAY,
             )
             topics = self.declare_parameter("record_topics", Parameter.Type.STRING_ARRAY, strings).value
@@ -235,6 +242,11 @@ class ExecutorNode(LifecycleNode):
         if not 0.0 <= phase_timeout_s <= MAX_PHASE_TIMEOUT_S:
             expected = f"expected 0 to {MAX_PHASE_TIMEOUT_S:g} s, found {phase_timeout_s:g}"
             raise ParameterError(f"report_phase_timeout_s: {expected}")
+        for name in ("bag_split_s", "bag_split_bytes"):
+            if not settings[name] >= 0:
+                raise ParameterError(
+                    f"parameter {name}: expected 0 (never) or more, found {settings[name]:g}"
+                )
         if self.get_parameter("use_sim_time").value:
             raise ParameterError(
                 "use_sim_time: expected false: components run by the monotonic clock; leave it out"

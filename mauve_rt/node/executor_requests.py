@@ -11,6 +11,7 @@ __all__ = [
     "NOT_MEASURED",
     "Code",
     "Outcome",
+    "RecordingOrder",
     "RefusalError",
     "Report",
     "Request",
@@ -103,10 +104,27 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
-    """What somebody asked for, whichever service it came by."""
+class RecordingOrder:
+    """Start to record, or stop; as mauve_msgs/srv/StartRecording."""
 
-    steps: tuple[Step, ...]
+    start: bool
+    bag: str = ""
+    topics: tuple[str, ...] = ()
+    split_s: float = 0.0  # 0: the default
+    split_bytes: int = 0
+
+    def __str__(self) -> str:
+        return (
+            " ".join(("start_recording", self.bag, *self.topics)).strip() if self.start else "stop_recording"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What somebody asked for, whichever service it came by: steps, or an order to the recording."""
+
+    steps: tuple[Step, ...] = ()
+    recording: RecordingOrder | None = None
     request_id: str = ""
     expected_epoch: int = 0
     requested_by: str = ""
@@ -116,6 +134,8 @@ class Request:
     clock_ns: int = 0  # of a start: reference instant of the grid, 0: the deployment's
 
     def __str__(self) -> str:
+        if self.recording is not None:
+            return str(self.recording)
         words = "; ".join(str(step) for step in self.steps)
         return f"{words} (dry run)" if self.dry_run else words
 
@@ -143,6 +163,7 @@ class Outcome:
     report: tuple[Report, ...] = ()
     from_core: str = ""
     to_core: str = ""
+    bag: str = ""  # of an order to the recording
     replayed: bool = field(default=False, compare=False)  # the first outcome of a repeated request_id
 
     @property

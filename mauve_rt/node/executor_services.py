@@ -1,4 +1,4 @@
-"""~/list_components, ~/stop, ~/start, ~/replace_core, ~/reconfigure: the ROS face of `executor_control`."""
+"""An executor's services, such as ~/list_components and ~/replace_core: `executor_control`'s ROS face."""
 
 from collections import deque
 from collections.abc import Callable
@@ -7,11 +7,19 @@ from typing import Any
 from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
 
-from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
+from mauve_msgs.srv import (
+    ListComponents,
+    Reconfigure,
+    ReplaceCore,
+    Start,
+    StartRecording,
+    Stop,
+    StopRecording,
+)
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_messages import component_infos, realtime_status, step_reports
 from mauve_rt.node.executor_parameters import Parameters
-from mauve_rt.node.executor_requests import Outcome, Request, Step
+from mauve_rt.node.executor_requests import Outcome, RecordingOrder, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_state import StatePublisher
 
@@ -46,6 +54,8 @@ class Services:
             (Start, "~/start", _start),
             (ReplaceCore, "~/replace_core", _replace_core),
             (Reconfigure, "~/reconfigure", _reconfigure),
+            (StartRecording, "~/start_recording", _start_recording),
+            (StopRecording, "~/stop_recording", _stop_recording),
         ):
             handler = self._handler(translate)
             self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
@@ -98,6 +108,8 @@ class Services:
             response.instance_id = self._runtime.instance_id
             response.epoch = outcome.epoch
             response.report = step_reports(outcome)
+            if hasattr(response, "bag"):
+                response.bag = outcome.bag
             return response
 
         return handle
@@ -119,6 +131,21 @@ def _replace_core(ros: Any) -> Request:
 def _reconfigure(ros: Any) -> Request:
     steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
     return Request(steps=steps, dry_run=ros.dry_run, timeout_s=ros.commit_timeout_s, **_common(ros))
+
+
+def _start_recording(ros: Any) -> Request:
+    order = RecordingOrder(
+        start=True,
+        bag=ros.bag,
+        topics=tuple(ros.topics),
+        split_s=ros.split_s,
+        split_bytes=ros.split_bytes,
+    )
+    return Request(recording=order, **_common(ros))
+
+
+def _stop_recording(ros: Any) -> Request:
+    return Request(recording=RecordingOrder(start=False), **_common(ros))
 
 
 def _common(ros: Any) -> dict[str, Any]:

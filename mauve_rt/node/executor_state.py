@@ -44,6 +44,7 @@ class StatePublisher:
                 stamp = self._node.get_clock().now().to_msg()
                 state = architecture_state(self._runtime, observed, stamp, error=self.error)
                 self._published_epoch = observed.epoch
+                self._recording.tell_architecture(observed)
                 self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
             return observed
 

@@ -126,7 +126,7 @@ class SimulatedExecutor:
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
         waiting, self._waiting = self._waiting, []
-        self._refused += self._bag.write(waiting, whole=True)
+        self._refused += self._bag.write(self._runtime.simulated.drain_trace(), waiting, whole=True)
         self._bag.tell_dropped(self._refused)
 
     def flush(self) -> None:

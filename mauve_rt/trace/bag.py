@@ -1,20 +1,19 @@
-"""A rosbag2 directory around an MCAP file: metadata.yaml, message definitions, topics."""
+"""A rosbag2 directory around MCAP files: metadata.yaml, message definitions, topics."""
 
-import json
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from mauve_rt import __version__
+from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write_metadata
 from mauve_rt.trace.definitions import Definition, find_definition
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.mcap_chunk import Counts
 from mauve_rt.trace.mcap_file import McapFile
 
-_METADATA = "metadata.yaml"
-_METADATA_VERSION = 9  # what Jazzy writes
 _FOREVER = "{sec: 9223372036, nsec: 854775807}"  # RMW_DURATION_INFINITE
 
 
@@ -46,10 +45,10 @@ class _Topic:
 
 
 class BagWriter:
-    """A bag that is a finished one at every flush. For one thread at a time.
+    """A bag that is a finished one at every flush, in one file or, by split(), in several.
 
-    The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the file (a kill
-    between the two) promises less than the file holds, and readers open both.
+    The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the files (a
+    kill between the two) promises less than they hold, and readers open both. For one thread at a time.
     """
 
     def __init__(self, directory: Path, *, ros_distro: str = "jazzy") -> None:
@@ -64,7 +63,8 @@ class BagWriter:
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
         self._topics: dict[str, _Topic] = {}
-        self._stale = True  # metadata.yaml does not tell what the file holds
+        self._complete: list[BagFileCounts] = []  # files that were split off
+        self._stale = True  # metadata.yaml does not tell what the files hold
         if self.directory.exists():
             msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
             raise TraceError(msg)
@@ -76,8 +76,7 @@ class BagWriter:
             msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
         try:
-            path = unfinished / f"{self.directory.name}_0.mcap"
-            self._file = McapFile(path, profile="ros2", library="mauve_rt")
+            self._file = self._new_file(unfinished)
             self._write_metadata(unfinished)
             unfinished.rename(self.directory)
         except TraceError:
@@ -93,7 +92,17 @@ class BagWriter:
     @property
     def message_count(self) -> int:
         """Messages flushed so far."""
-        return self._file.flushed.messages
+        return sum(file.counts.messages for file in self._files())
+
+    @property
+    def file_bytes(self) -> int:
+        """Bytes of the present file."""
+        return self._file.size
+
+    @property
+    def file_start_ns(self) -> int:
+        """Log time of the present file's first flushed message; 0 when there is none."""
+        return self._file.flushed.start_ns
 
     def add_topic(self, name: str, type_name: str, *, qos: TopicQos | None = None) -> None:
         """Declare a topic by absolute name and type (package/msg/Name); doing so again does nothing.
@@ -114,19 +123,11 @@ class BagWriter:
             raise TraceError(msg)
         if type_name not in self._schemas:
             definition = find_definition(type_name)
-            schema_id = self._file.add_schema(
-                definition.type_name, encoding="ros2msg", data=definition.text.encode()
-            )
-            self._schemas[type_name] = (schema_id, definition)
+            self._schemas[type_name] = (_declare_schema(self._file, definition), definition)
         schema_id, definition = self._schemas[type_name]
-        offered = (qos or TopicQos()).as_yaml()
-        channel_id = self._file.add_channel(
-            name,
-            schema_id=schema_id,
-            encoding="cdr",
-            metadata={"offered_qos_profiles": offered, "topic_type_hash": definition.type_hash},
-        )
-        self._topics[name] = _Topic(name, definition, offered, channel_id)
+        topic = _Topic(name, definition, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
+        _declare_channel(self._file, topic, schema_id)
+        self._topics[name] = topic
 
     def write(self, topic: str, log_time_ns: int, data: bytes) -> None:
         """Keep a message (CDR with its header) for the next flush; log time in ns of CLOCK_REALTIME.
@@ -147,6 +148,23 @@ class BagWriter:
             self._custom_data[key] = value
             self._stale = True
 
+    def split(self) -> None:
+        """Go on in a new file, which declares the same topics. What waits is flushed before.
+
+        Raises:
+            TraceError: as flush; or the new file cannot be created.
+
+        """
+        self.flush()
+        self._complete.append(BagFileCounts(self._file.path.name, self._file.flushed))
+        self._file.close()
+        self._file = self._new_file(self.directory)
+        for _, definition in self._schemas.values():  # in the same order: they get the same numbers
+            _declare_schema(self._file, definition)
+        for topic in self._topics.values():
+            _declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
+        self._stale = True
+
     def flush(self) -> None:
         """Make the bag on disk hold everything written so far.
 
@@ -161,7 +179,7 @@ class BagWriter:
             try:
                 self._write_metadata(self.directory)
             except OSError as error:
-                msg = f"bag {self.directory}: {_METADATA} cannot be written ({error.strerror})"
+                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror})"
                 raise TraceError(msg) from error
             self._stale = False
 
@@ -197,49 +215,29 @@ class BagWriter:
         else:
             self.abort()
 
+    def _files(self) -> list[BagFileCounts]:
+        return [*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)]
+
+    def _new_file(self, directory: Path) -> McapFile:
+        path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
+        return McapFile(path, profile="ros2", library=f"mauve_rt {__version__}")
+
     def _write_metadata(self, directory: Path) -> None:
-        temporary = directory / f".{_METADATA}.new"
-        text = _metadata(self._file.path.name, self._file.flushed, self._topics, self._custom_data)
-        temporary.write_text(text + f"  ros_distro: {self._ros_distro}\n", encoding="utf-8")
-        temporary.replace(directory / _METADATA)
+        topics = [_counted(topic, self._files()) for topic in self._topics.values()]
+        write_metadata(
+            directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
+        )
 
 
-def _metadata(file_name: str, counts: Counts, topics: dict[str, _Topic], custom_data: dict[str, str]) -> str:
-    """Text of metadata.yaml, written by hand: at every flush a YAML library would be most of the cost."""
-    span = [
-        f"starting_time: {{nanoseconds_since_epoch: {counts.start_ns}}}",
-        f"duration: {{nanoseconds: {counts.end_ns - counts.start_ns}}}",
-        f"message_count: {counts.messages}",
-    ]
-    lines = [
-        "rosbag2_bagfile_information:",
-        f"  version: {_METADATA_VERSION}",
-        "  storage_identifier: mcap",
-        *(f"  {line}" for line in span),
-        "  topics_with_message_count:" if topics else "  topics_with_message_count: []",
-    ]
-    for topic in topics.values():
-        lines += [
-            "    - topic_metadata:",
-            f"        name: {_quoted(topic.name)}",
-            f"        type: {topic.definition.type_name}",
-            "        serialization_format: cdr",
-            f"        offered_qos_profiles: {topic.qos}",
-            f"        type_description_hash: {_quoted(topic.definition.type_hash)}",
-            f"      message_count: {counts.by_channel.get(topic.channel_id, 0)}",
-        ]
-    custom = ", ".join(f"{_quoted(key)}: {_quoted(value)}" for key, value in custom_data.items())
-    lines += [
-        '  compression_format: ""',
-        '  compression_mode: ""',
-        f"  relative_file_paths: [{_quoted(file_name)}]",
-        "  files:",
-        f"    - path: {_quoted(file_name)}",
-        *(f"      {line}" for line in span),
-        f"  custom_data: {{{custom}}}",
-    ]
-    return "\n".join(lines) + "\n"
+def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:
+    messages = sum(file.counts.by_channel.get(topic.channel_id, 0) for file in files)
+    return BagTopic(topic.name, topic.definition.type_name, topic.qos, topic.definition.type_hash, messages)
 
 
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)  # a JSON string is a YAML string
+def _declare_schema(file: McapFile, definition: Definition) -> int:
+    return file.add_schema(definition.type_name, encoding="ros2msg", data=definition.text.encode())
+
+
+def _declare_channel(file: McapFile, topic: _Topic, schema_id: int) -> None:
+    metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.definition.type_hash}
+    file.add_channel(topic.name, schema_id=schema_id, encoding="cdr", metadata=metadata)

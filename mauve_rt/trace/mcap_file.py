@@ -21,7 +21,9 @@ messages are not.
 import os
 import struct
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -66,11 +68,16 @@ class McapFile:
         self._descriptor = -1
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-            _write_all(self._descriptor, start + self._tail, 0)
+            write_all(self._descriptor, start + self._tail, 0)
         except OSError as error:
             self.abort()
             msg = f"bag file {path}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
+
+    @property
+    def size(self) -> int:
+        """Bytes on disk."""
+        return self._data_end + len(self._tail)
 
     @property
     def pending_bytes(self) -> int:
@@ -121,7 +128,7 @@ class McapFile:
         self._chunk_count += 1
         tail = self._build_tail(flushed, data_end, data_crc)
         try:
-            _write_all(self._descriptor, block + tail, self._data_end)
+            write_all(self._descriptor, block + tail, self._data_end)
         except OSError as error:
             del self._chunk_indexes[old_indexes:]
             self._chunk_count -= 1
@@ -150,49 +157,67 @@ class McapFile:
             os.close(descriptor)
 
     def _build_tail(self, counts: Counts, data_end: int, data_crc: int) -> bytes:
-        end = serialized(DataEnd(data_crc))
-        summary_start = data_end + len(end)
-        groups = (
-            (Opcode.SCHEMA, serialized(*self._schemas)),
-            (Opcode.CHANNEL, serialized(*self._channels)),
-            (Opcode.STATISTICS, serialized(self._statistics(counts))),
-            (Opcode.CHUNK_INDEX, bytes(self._chunk_indexes)),
+        summary = Summary(
+            self._schemas, self._channels, counts, self._chunk_count, bytes(self._chunk_indexes)
         )
-        at = summary_start
-        offsets = []
-        for opcode, group in groups:
-            if group:
-                offsets.append(SummaryOffset(group_opcode=opcode, group_start=at, group_length=len(group)))
-            at += len(group)
-        summary = b"".join(group for _, group in groups) + serialized(*offsets)
-        footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
-        crc = zlib.crc32(footer, zlib.crc32(summary))
-        return b"".join((end, summary, footer, struct.pack("<I", crc), MAGIC))
-
-    def _statistics(self, counts: Counts) -> Statistics:
-        return Statistics(
-            attachment_count=0,
-            channel_count=len(self._channels),
-            channel_message_counts=counts.by_channel,
-            chunk_count=self._chunk_count,
-            message_count=counts.messages,
-            message_end_time=counts.end_ns,
-            message_start_time=counts.start_ns,
-            metadata_count=0,
-            schema_count=len(self._schemas),
-        )
+        return build_tail(summary, data_end=data_end, data_crc=data_crc)
 
     def _restore_tail(self) -> str:
         """Put the old tail back after a write that failed halfway (its blocks are there already)."""
         try:
-            _write_all(self._descriptor, self._tail, self._data_end)
+            write_all(self._descriptor, self._tail, self._data_end)
             os.ftruncate(self._descriptor, self._data_end + len(self._tail))
         except OSError as error:
             return f"the old end could not be put back either ({error.strerror}): the file needs repair"
         return f"the file is complete up to the flush before, {self.flushed.messages} messages"
 
 
-def _write_all(descriptor: int, data: bytes, offset: int) -> None:
+class Summary(NamedTuple):
+    """What the end of a file tells of its data section."""
+
+    schemas: Sequence[Schema]
+    channels: Sequence[Channel]
+    counts: Counts
+    chunk_count: int
+    chunk_indexes: bytes
+    """ChunkIndex records, one behind the other."""
+    attachment_count: int = 0
+    metadata_count: int = 0
+
+
+def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
+    """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known."""
+    end = serialized(DataEnd(data_crc))
+    statistics = Statistics(
+        attachment_count=summary.attachment_count,
+        channel_count=len(summary.channels),
+        channel_message_counts=summary.counts.by_channel,
+        chunk_count=summary.chunk_count,
+        message_count=summary.counts.messages,
+        message_end_time=summary.counts.end_ns,
+        message_start_time=summary.counts.start_ns,
+        metadata_count=summary.metadata_count,
+        schema_count=len(summary.schemas),
+    )
+    groups = (
+        (Opcode.SCHEMA, serialized(*summary.schemas)),
+        (Opcode.CHANNEL, serialized(*summary.channels)),
+        (Opcode.STATISTICS, serialized(statistics)),
+        (Opcode.CHUNK_INDEX, summary.chunk_indexes),
+    )
+    at = summary_start = data_end + len(end)
+    offsets = []
+    for opcode, group in groups:
+        if group:
+            offsets.append(SummaryOffset(group_opcode=opcode, group_start=at, group_length=len(group)))
+        at += len(group)
+    body = b"".join(group for _, group in groups) + serialized(*offsets)
+    footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
+    crc = zlib.crc32(footer, zlib.crc32(body))
+    return b"".join((end, body, footer, struct.pack("<I", crc), MAGIC))
+
+
+def write_all(descriptor: int, data: bytes, offset: int) -> None:
     """One pwrite; more only where the system took less (a full disk, which then says so, or over 2 GB)."""
     rest = memoryview(data)
     while rest:

@@ -132,10 +132,10 @@ class _Content:
     def _add_architecture(self, said: Any) -> None:
         self._architecture = tuple(ComponentInfo.of_message(component) for component in said.components)
         if self._first_grids is None:  # later ones are told by the records themselves
+            epoch_ns = int(said.epoch_ns)
             self._first_grids = {
-                component.name: Deployment(0, int(epoch_ns), component.offset_ns, component.period_ns)
-                for component, epoch_ns in zip(self._architecture, said.epochs_ns, strict=False)
-                if epoch_ns
+                one.name: Deployment(0, epoch_ns, one.offset_ns, one.period_ns)
+                for one in (self._architecture if epoch_ns else ())
             }
 
     def trace(self, files: list[Path]) -> Trace:

@@ -6,36 +6,52 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mauve_rt.trace.bag import TopicQos
+from mauve_rt.trace.cdr import RECORD_BYTES
 from mauve_rt.trace.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
     NAMES,
     Drain,
+    Drained,
     MessageSource,
     SentMessage,
+    Split,
     TraceBag,
     TraceSource,
 )
 
-__all__ = ["BATCHES", "DROPPED_MESSAGES", "NAMES", "Drain", "MessageSource", "Recorder", "TraceSource"]
+__all__ = [
+    "BATCHES",
+    "DROPPED_MESSAGES",
+    "NAMES",
+    "Drain",
+    "MessageSource",
+    "Recorder",
+    "Split",
+    "TraceSource",
+]
 
 
 _JOIN_TIMEOUT_S = 2.0
 
 
 class Recorder:
-    """Writes a bag from a thread of its own, which drains the rings often and flushes the bag less often.
+    """Writes a bag by two threads: one empties the rings often, one writes what came less often.
 
-    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. A
-    failure to write (a full disk) ends the recording, is told once through `on_error`, and leaves the bag
-    as the flush before left it.
+    So a disk that makes the writer wait costs no records, as long as the queue between them has room. When it
+    has none the rings are not emptied, which counts what they lose. A failure to write (a full disk) ends the
+    recording, is told once through `on_error`, and leaves the bag as the flush before left it.
 
-    | member        | written by                     | guarded by |
-    | ------------- | ------------------------------ | ---------- |
-    | `_waiting`    | record(), the recorder thread  | `_lock`    |
-    | `_dropped`    | record(), the recorder thread  | `_lock`    |
-    | `_recording`  | start(), the recorder thread   | `_lock`    |
-    | `_bag`        | the recorder thread            |            |
+    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
+
+    | member          | written by                     | guarded by    |
+    | --------------- | ------------------------------ | ------------- |
+    | `_waiting` ...  | record(), the writer           | `_lock`       |
+    | `_dropped`      | record(), the writer           | `_lock`       |
+    | `_recording`    | start(), the writer            | `_lock`       |
+    | `_architecture` | tell_architecture()            | `_lock`       |
+    | `_drains` ...   | both threads                   | `_drain_lock` |
+    | `_bag`          | start(), then the writer       |               |
     """
 
     def __init__(
@@ -44,9 +60,10 @@ class Recorder:
         directory: Path,
         *,
         node_name: str,
-        flush_period_s: float = 0.2,
-        drain_period_s: float = 0.04,
+        flush_period_s: float = 0.1,
+        drain_period_s: float = 0.02,
         queue_bytes: int = 64 * 1024 * 1024,
+        split: Split | None = None,
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
     ) -> None:
@@ -56,28 +73,37 @@ class Recorder:
             source: the deployer.
             directory: the bag's folder, which must not exist yet.
             node_name: absolute name of the executor's node, e.g. /robot_1/executor; the trace is below it.
-            flush_period_s: at most so much is lost by a kill.
-            drain_period_s: the rings (4,096 records each) must not fill up within it.
-            queue_bytes: messages that may wait for a flush; what exceeds it is dropped and counted.
-            on_error: called at most once for each cause, with one line, on the recorder thread.
-            messages: asked, on the recorder thread, for messages beside those given to record().
+            flush_period_s: so much, and what a flush takes, is lost by a kill at most.
+            drain_period_s: the rings must not fill up within it.
+            queue_bytes: messages that may wait for a flush, and as many bytes of records; what exceeds it is
+                dropped and counted.
+            split: when the bag goes on in a new file; after a minute unless said otherwise.
+            on_error: called at most once for each cause, with one line, on the writer's thread.
+            messages: asked, on the writer's thread, for messages beside those given to record().
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
+        self._source = source
         self._flush_period_s = flush_period_s
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
         self._messages = messages
-        self._bag = TraceBag(source, directory, node_name=node_name, on_error=self._report)
+        self._dropped_before = messages.dropped_messages() if messages is not None else 0
+        self._bag = TraceBag(source, directory, node_name=node_name, on_error=self._report, split=split)
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
         self._waiting_bytes = 0
         self._dropped = 0
         self._recording = False
+        self._architecture = b""
+        self._drain_lock = threading.Lock()
+        self._drains: list[Drain] = []
+        self._drained_bytes = 0
         self._stop = threading.Event()
+        self._drainer = threading.Thread(target=self._drain_often, name="trace_drain", daemon=True)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     @property
@@ -92,17 +118,35 @@ class Recorder:
             return self._recording
 
     @property
+    def message_count(self) -> int:
+        """Messages in the bag, the trace's own among them."""
+        return self._bag.message_count
+
+    @property
     def dropped_messages(self) -> int:
         """Messages that were to be recorded and did not get into the bag."""
         elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
         with self._lock:
-            return self._dropped + elsewhere
+            return self._dropped + elsewhere - self._dropped_before
 
-    def start(self) -> None:
-        """Start the thread. Once only."""
+    def start(self, *, discard: bool = False) -> None:
+        """Start the threads. Once only.
+
+        Args:
+            discard: leave out what the rings hold already, from before.
+
+        """
+        if discard:
+            self._bag.discard(self._source.drain_trace())
         with self._lock:
             self._recording = True
+        self._drainer.start()
         self._thread.start()
+
+    def tell_architecture(self, data: bytes) -> None:
+        """Record a serialized mauve_msgs/msg/TraceArchitecture with the next flush. From any thread."""
+        with self._lock:
+            self._architecture = data
 
     def record(
         self, topic: str, type_name: str, data: bytes, *, monotonic_ns: int, qos: TopicQos | None = None
@@ -129,26 +173,41 @@ class Recorder:
             return True
 
     def stop(self) -> None:
-        """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
+        """Drain and flush a last time, close the bag. Returns within 4 s; may be called again."""
         self._stop.set()
         if self._thread.ident is None:
             self._bag.abort()
-        elif self._thread is not threading.current_thread():
-            self._thread.join(_JOIN_TIMEOUT_S)
+            return
+        for thread in (self._drainer, self._thread):
+            if thread is not threading.current_thread():
+                thread.join(_JOIN_TIMEOUT_S)
+
+    def _drain_often(self) -> None:
+        next_s = time.monotonic()
+        while not self._stop.wait(max(0.0, next_s - time.monotonic())) and self.recording:
+            try:
+                self._drain()
+            except Exception:  # noqa: BLE001 - the writer meets it too, and tells
+                return
+            next_s = max(next_s + self._drain_period_s, time.monotonic())
+
+    def _drain(self) -> None:
+        with self._drain_lock:
+            if self._drained_bytes <= self._queue_bytes:
+                drain = self._source.drain_trace()
+                self._drains.append(drain)
+                self._drained_bytes += len(drain.records) + RECORD_BYTES
 
     def _run(self) -> None:
         try:
-            next_drain_s = next_flush_s = time.monotonic()
-            while not self._stop.wait(max(0.0, next_drain_s - time.monotonic())):
-                now_s = time.monotonic()
-                self._drain(whole=now_s >= next_flush_s)
-                if now_s >= next_flush_s:
-                    self._bag.flush()
-                    next_flush_s = max(next_flush_s + self._flush_period_s, now_s)
-                next_drain_s = max(next_drain_s + self._drain_period_s, time.monotonic())
+            next_s = time.monotonic()
+            while not self._stop.wait(max(0.0, next_s - time.monotonic())):
+                self._write()
+                self._bag.flush()
+                next_s = max(next_s + self._flush_period_s, time.monotonic())
             with self._lock:
                 self._recording = False
-            self._drain(whole=True)
+            self._write()
             self._bag.close()
         except Exception as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
             with self._lock:
@@ -156,12 +215,21 @@ class Recorder:
             self._bag.abort()
             self._report(f"recording stopped: {error}")
 
-    def _drain(self, *, whole: bool) -> None:
+    def _write(self) -> None:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
+            architecture = self._architecture
         if self._messages is not None:
             waiting += self._messages.take_messages()
-        refused = self._bag.write(waiting, whole=whole)
+        self._drain()
+        with self._drain_lock:
+            drains, self._drains, self._drained_bytes = self._drains, [], 0
+        last = drains[-1]
+        records = b"".join(drain.records for drain in drains)
+        drained = Drained(records, last.written, last.dropped, last.monotonic_ns, last.realtime_ns)
+        if architecture:
+            self._bag.tell_architecture(architecture, drained)
+        refused = self._bag.write(drained, waiting, whole=True)
         with self._lock:
             self._dropped += refused
         self._bag.tell_dropped(self.dropped_messages)

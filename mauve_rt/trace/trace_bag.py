@@ -1,6 +1,7 @@
 """The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -10,11 +11,13 @@ from mauve_rt.trace.errors import TraceError
 
 BATCHES = "trace/batches"
 NAMES = "trace/names"
+ARCHITECTURE = "trace/architecture"
 DROPPED_MESSAGES = "mauve_dropped_messages"
 """Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
 _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
-_NAMES_QOS = TopicQos(depth=1, transient_local=True)
+_ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
+_LATCHED = TopicQos(depth=1, transient_local=True)
 
 
 class Drain(Protocol):
@@ -39,6 +42,16 @@ class Drain(Protocol):
     @property
     def realtime_ns(self) -> int:
         """The same instant, CLOCK_REALTIME."""
+
+
+class Drained(NamedTuple):
+    """Several drains as one."""
+
+    records: bytes
+    written: list[int]
+    dropped: list[int]
+    monotonic_ns: int
+    realtime_ns: int
 
 
 class TraceSource(Protocol):
@@ -74,14 +87,30 @@ class MessageSource(Protocol):
         """Messages that found no room to wait, ever."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Split:
+    """When a bag goes on in a new file: whichever comes first; 0: never for that reason."""
+
+    after_s: float = 60.0
+    after_bytes: int = 0
+
+
 class TraceBag:
     """Writes what a trace source yields, and messages on the same time base.
 
-    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
+    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. Each file
+    begins with the words, the architecture, and a batch without records where there were records before it:
+    so it can be read alone.
     """
 
     def __init__(
-        self, source: TraceSource, directory: Path, *, node_name: str, on_error: Callable[[str], None]
+        self,
+        source: TraceSource,
+        directory: Path,
+        *,
+        node_name: str,
+        on_error: Callable[[str], None],
+        split: Split | None = None,
     ) -> None:
         """Create the bag; nothing is drained yet.
 
@@ -90,23 +119,28 @@ class TraceBag:
             directory: the bag's folder, which must not exist yet.
             node_name: absolute name of the executor's node; the trace is below it.
             on_error: called at most once for each type that cannot be recorded, with one line.
+            split: when it goes on in a new file; after a minute unless said otherwise.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
         self._source = source
+        self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
         self._bag = BagWriter(directory)
         try:
-            self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_NAMES_QOS)
+            self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
+            self._bag.add_topic(self._topic(ARCHITECTURE), _ARCHITECTURE_TYPE, qos=_LATCHED)
             self._bag.flush()
         except TraceError:
             self._bag.abort()
             raise
-        self._names_written: tuple[Sequence[str], Sequence[str]] | None = None
+        self._names: tuple[Sequence[str], Sequence[str]] | None = None
+        self._latched: dict[str, bytes] = {}  # each file begins with these
+        self._last: Drain | None = None
         self._refused_types: set[tuple[str, str]] = set()
 
     @property
@@ -114,26 +148,45 @@ class TraceBag:
         """The bag's folder."""
         return self._bag.directory
 
-    def write(self, messages: Sequence[SentMessage], *, whole: bool) -> int:
-        """Drain the trace and move all into the bag's buffer; returns how many messages were refused.
+    @property
+    def message_count(self) -> int:
+        """Messages in it, the trace's own among them."""
+        return self._bag.message_count
 
-        A batch without records (it tells of losses) is written if `whole`. No message may be later than now.
+    def write(self, drain: Drain, messages: Sequence[SentMessage], *, whole: bool) -> int:
+        """Move what was drained, and messages from before, into the buffer; returns how many were refused.
+
+        A batch without records (it tells of losses) is written if `whole`.
         """
-        drain = self._source.drain_trace()
+        self._last = drain
         self._write_names(drain.realtime_ns)
         if drain.records or messages or whole:
-            batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, drain.records)
-            self._bag.write(self._topic(BATCHES), drain.realtime_ns, encode_batch(batch))
+            self._write_batch(drain, drain.records)
         offset_ns = drain.realtime_ns - drain.monotonic_ns
         return sum(not self._write_message(message, message.monotonic_ns + offset_ns) for message in messages)
+
+    def discard(self, drain: Drain) -> None:
+        """Leave out what was recorded before this bag; only how much it was gets into it."""
+        self._last = drain
+        self._write_names(drain.realtime_ns)
+        self._write_batch(drain, b"")
+
+    def tell_architecture(self, data: bytes, drain: Drain) -> None:
+        """Write a serialized mauve_msgs/msg/TraceArchitecture, unless it is the last one again."""
+        self._write_latched(ARCHITECTURE, data, drain.realtime_ns)
 
     def tell_dropped(self, messages: int) -> None:
         """Note with the next flush how many messages did not get into the bag."""
         self._bag.set_custom_data(DROPPED_MESSAGES, str(messages))
 
     def flush(self) -> None:
-        """Make the bag a finished one that holds all that was written."""
+        """Make the bag a finished one of all that was written; go on in a new file when it is time."""
         self._bag.flush()
+        if self._last is not None and self._is_time_to_split(self._last.realtime_ns):
+            self._bag.split()
+            for topic, data in self._latched.items():
+                self._bag.write(self._topic(topic), self._last.realtime_ns, data)
+            self._write_batch(self._last, b"")
 
     def close(self) -> None:
         """Flush a last time."""
@@ -143,12 +196,25 @@ class TraceBag:
         """Leave the bag as the last flush left it."""
         self._bag.abort()
 
+    def _is_time_to_split(self, now_ns: int) -> bool:
+        age_s = (now_ns - (self._bag.file_start_ns or now_ns)) / 1e9
+        return 0 < self._split.after_s <= age_s or 0 < self._split.after_bytes <= self._bag.file_bytes
+
+    def _write_batch(self, drain: Drain, records: bytes) -> None:
+        batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, records)
+        self._bag.write(self._topic(BATCHES), drain.realtime_ns, encode_batch(batch))
+
     def _write_names(self, log_time_ns: int) -> None:
         """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
         words = (self._source.trace_components(), self._source.trace_names())
-        if words != self._names_written:
-            self._names_written = words
-            self._bag.write(self._topic(NAMES), log_time_ns, encode_names(*words))
+        if words != self._names:
+            self._names = words
+            self._write_latched(NAMES, encode_names(*words), log_time_ns)
+
+    def _write_latched(self, topic: str, data: bytes, log_time_ns: int) -> None:
+        if self._latched.get(topic) != data:
+            self._latched[topic] = data
+            self._bag.write(self._topic(topic), log_time_ns, data)
 
     def _write_message(self, message: SentMessage, log_time_ns: int) -> bool:
         try:

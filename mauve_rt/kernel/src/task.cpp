@@ -15,6 +15,16 @@ namespace {
 /// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
 
+/// Room for what a component with this period writes while nobody drains: at most 3 MiB.
+std::size_t ring_capacity(time_ns_t period_ns) {
+  constexpr time_ns_t kUndrained = ms_to_ns(100);
+  constexpr time_ns_t kRecordsPerRelease = 16;
+  constexpr time_ns_t kMost = 65'536;
+  if (period_ns <= 0) return TraceRing::kDefaultCapacity;
+  const time_ns_t wanted = kUndrained / period_ns * kRecordsPerRelease;
+  return std::max(TraceRing::kDefaultCapacity, static_cast<std::size_t>(std::min(wanted, kMost)));
+}
+
 }  // namespace
 
 std::string_view to_string(ComponentState state) noexcept {
@@ -82,7 +92,8 @@ void Task::begin_trace(bool trace) {
   if (!trace) {
     ring_.reset();
   } else if (ring_ == nullptr) {
-    ring_ = std::make_unique<TraceRing>(number_, settings_.trace_records);
+    const std::size_t wanted = settings_.trace_records;
+    ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid_.period_ns));
   }
   if (ring_ != nullptr) ring_->set_clock(simulated_ ? clock_ : nullptr);
 }

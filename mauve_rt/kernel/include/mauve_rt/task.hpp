@@ -43,7 +43,7 @@ struct TaskSettings {
   OverrunPolicy overrun{OverrunPolicy::skip};
   std::int64_t max_backlog{10};
   std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 64 KiB are prefaulted
-  std::size_t trace_records{2048};                   // room in the trace's ring until it is drained
+  std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
 };
 
 /// What the kernel gave the thread, read back from it.

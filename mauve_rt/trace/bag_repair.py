@@ -1,0 +1,160 @@
+"""Whole bags: what is wrong with one, and making it right."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write_metadata
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_repair import FileState, examine
+from mauve_rt.trace.progress import Progress, part, silent
+from mauve_rt.trace.reader import bag_files
+
+_INFORMATION = "rosbag2_bagfile_information"
+
+
+@dataclass(frozen=True)
+class BagState:
+    """What a pass over all files of a bag found."""
+
+    path: Path
+    files: tuple[FileState, ...]
+    metadata_damage: str
+    """What is wrong with metadata.yaml; empty when nothing is, or when a single file was asked about."""
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether every reader opens it."""
+        return not self.metadata_damage and all(file.is_finished for file in self.files)
+
+    def damages(self) -> list[str]:
+        """What is wrong, a line for each file."""
+        lines = [
+            f"{file.path.name}: no finished MCAP file ({file.damage}); its first {file.whole_bytes:,} bytes "
+            f"are whole, with {file.counts.messages:,} messages, not the {file.left_out_bytes:,} bytes after"
+            for file in self.files
+            if not file.is_finished
+        ]
+        return [*lines, *([f"{METADATA}: {self.metadata_damage}"] if self.metadata_damage else [])]
+
+
+def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
+    """Read a whole bag (a folder, or one MCAP file), and tell what is wrong with it.
+
+    Raises:
+        TraceError: it is no bag, or cannot be read.
+
+    """
+    files = bag_files(path)
+    states = []
+    for index, file in enumerate(files):
+        progress_here = part(progress, index / len(files), (index + 1) / len(files))
+        states.append(examine(file, progress=progress_here))
+    return BagState(path, tuple(states), _metadata_damage(path, states) if path.is_dir() else "")
+
+
+def repair_bag(state: BagState) -> None:
+    """Make a finished bag of it: what is whole stays, what a kill left half-written is cut off.
+
+    Raises:
+        TraceError: it cannot be written.
+
+    """
+    for file in state.files:
+        if not file.is_finished:
+            file.repair()
+    if state.metadata_damage:
+        _write_metadata(state)
+
+
+def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
+    """Tell where metadata.yaml promises other than the files hold."""
+    try:
+        told = _read_metadata(path)
+    except TraceError as error:
+        return str(error)
+    names = [Path(str(name)).name for name in told.get("relative_file_paths", [])]
+    if names != [file.path.name for file in files]:
+        found = ", ".join(file.path.name for file in files)
+        return f"names the files {', '.join(names) or '(none)'}, there are {found}"
+    messages = sum(file.counts.messages for file in files)
+    if told.get("message_count") != messages:
+        return f"tells of {told.get('message_count')} messages, there are {messages}"
+    return ""
+
+
+def _read_metadata(path: Path) -> Mapping[str, Any]:
+    """Return what rosbag2 wrote.
+
+    Raises:
+        TraceError: it is not there, or is something else; says only that.
+
+    """
+    try:
+        read = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        msg = "not there"
+        raise TraceError(msg) from error
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        msg = f"cannot be read ({str(error).splitlines()[0]})"
+        raise TraceError(msg) from error
+    told = read.get(_INFORMATION) if isinstance(read, dict) else None
+    if not isinstance(told, dict):
+        msg = f"has no {_INFORMATION}"
+        raise TraceError(msg)
+    return told
+
+
+def _write_metadata(state: BagState) -> None:
+    try:
+        before = _read_metadata(state.path)
+    except TraceError:
+        before = {}
+    custom = before.get("custom_data") or {}
+    files = [BagFileCounts(file.path.name, file.counts) for file in state.files]
+    try:
+        write_metadata(
+            state.path,
+            files,
+            _topics(state.files),
+            custom_data={str(key): str(value) for key, value in dict(custom).items()},
+            ros_distro=str(before.get("ros_distro") or "jazzy"),
+        )
+    except OSError as error:
+        msg = f"bag {state.path}: {METADATA} cannot be written ({error.strerror})"
+        raise TraceError(msg) from error
+
+
+def _topics(files: Sequence[FileState]) -> list[BagTopic]:
+    found: dict[str, BagTopic] = {}
+    for file in files:
+        types = {schema.id: schema.name for schema in file.schemas}
+        for channel in file.channels:
+            count = file.counts.by_channel.get(channel.id, 0)
+            before = found.get(channel.topic)
+            found[channel.topic] = BagTopic(
+                channel.topic,
+                types.get(channel.schema_id, ""),
+                _one_line(channel.metadata.get("offered_qos_profiles", "")),
+                channel.metadata.get("topic_type_hash", ""),
+                count + (before.messages if before else 0),
+            )
+    return list(found.values())
+
+
+def _one_line(yaml: str) -> str:
+    """Return the profiles as flow YAML on one line, as they go into metadata.yaml."""
+    if "\n" not in yaml.strip():
+        return yaml.strip() or "[]"
+    from io import StringIO  # noqa: PLC0415
+
+    writer = YAML(typ="safe")
+    writer.default_flow_style = True
+    writer.width = 1_000_000
+    out = StringIO()
+    writer.dump(YAML(typ="safe").load(yaml), out)
+    return out.getvalue().strip()

@@ -1,0 +1,210 @@
+"""Tells whether an MCAP file is a finished one, and makes one of it that is whole up to some place only."""
+
+import os
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Schema
+from mcap.stream_reader import get_chunk_data_stream
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_chunk import Counts, serialized
+from mauve_rt.trace.mcap_file import Summary, build_tail, write_all
+from mauve_rt.trace.mcap_scan import Found, McapScan, OtherRecord
+from mauve_rt.trace.progress import Progress, silent
+
+_BLOCK_BYTES = 1 << 20
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE = struct.Struct("<H4xQ")  # channel, (sequence), log time
+
+
+Entries = dict[int, list[tuple[int, int]]]
+"""Per channel: log time of each message, and its offset in the chunk."""
+
+
+class _ChunkSeen:
+    """A chunk of the data section, and the message indexes behind it."""
+
+    def __init__(self, found: Found, chunk: Chunk) -> None:
+        self.messages: Entries = {}
+        """As the chunk itself tells."""
+        self.indexed: Entries = {}
+        """As the indexes tell."""
+        self.end = found.end
+        data = chunk.data if not chunk.compression else _unpacked(chunk)
+        self._index = ChunkIndex(
+            chunk_length=found.end - found.offset,
+            chunk_start_offset=found.offset,
+            compression=chunk.compression,
+            compressed_size=len(chunk.data),
+            message_end_time=chunk.message_end_time,
+            message_index_length=0,
+            message_index_offsets={},
+            message_start_time=chunk.message_start_time,
+            uncompressed_size=chunk.uncompressed_size,
+        )
+        at = 0
+        while at + _HEAD.size <= len(data):
+            opcode, length = _HEAD.unpack_from(data, at)
+            if opcode == Opcode.MESSAGE:
+                channel, log_time = _MESSAGE.unpack_from(data, at + _HEAD.size)
+                self.messages.setdefault(channel, []).append((log_time, at))
+            at += _HEAD.size + length
+
+    def add_index(self, offset: int, end: int, index: MessageIndex) -> None:
+        """Take note of a message index behind it."""
+        self.indexed[index.channel_id] = index.records
+        self._index.message_index_offsets[index.channel_id] = offset
+        self._index.message_index_length = end - self.end
+
+    def is_indexed(self) -> bool:
+        """Whether the indexes behind it are those of this chunk."""
+        found = {channel: sorted(entries) for channel, entries in self.indexed.items() if entries}
+        return found == self.messages
+
+    def index_again(self) -> bytes:
+        """Return message indexes to be written right behind it."""
+        self._index.message_index_offsets = {}
+        out = b""
+        for channel, entries in self.messages.items():
+            self._index.message_index_offsets[channel] = self.end + len(out)
+            out += serialized(MessageIndex(channel, entries))
+        self._index.message_index_length = len(out)
+        return out
+
+    def entry(self) -> bytes:
+        """Return its record in the summary."""
+        return serialized(self._index)
+
+
+@dataclass
+class FileState:
+    """What a pass over a file found."""
+
+    path: Path
+    library: str
+    damage: str
+    """Why it is no finished file; empty when it is one."""
+    size: int
+    whole_bytes: int
+    """Bytes of the data section that are whole."""
+    schemas: list[Schema]
+    channels: list[Channel]
+    counts: Counts
+    _chunk_indexes: bytes
+    _chunk_count: int
+    _missing_indexes: bytes
+    """What has to be written behind the last chunk."""
+    _attachments: int
+    _metadata: int
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether every reader opens it."""
+        return not self.damage
+
+    @property
+    def left_out_bytes(self) -> int:
+        """Bytes that a repair cuts off, but for the file's old end."""
+        return max(self.size - self.whole_bytes, 0)
+
+    def repair(self) -> None:
+        """Write what closes the file behind what is whole of it.
+
+        Raises:
+            TraceError: it cannot be written.
+
+        """
+        try:
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CLOEXEC)
+            try:
+                crc = _crc(descriptor, self.whole_bytes)
+                data_end = self.whole_bytes + len(self._missing_indexes)
+                summary = Summary(
+                    self.schemas,
+                    self.channels,
+                    self.counts,
+                    self._chunk_count,
+                    self._chunk_indexes,
+                    self._attachments,
+                    self._metadata,
+                )
+                crc = zlib.crc32(self._missing_indexes, crc)
+                tail = self._missing_indexes + build_tail(summary, data_end=data_end, data_crc=crc)
+                write_all(descriptor, tail, self.whole_bytes)
+                os.ftruncate(descriptor, self.whole_bytes + len(tail))
+            finally:
+                os.close(descriptor)
+        except OSError as error:
+            msg = f"bag file {self.path}: cannot be repaired ({error.strerror}); it is damaged still"
+            raise TraceError(msg) from error
+
+
+def examine(path: Path, *, progress: Progress = silent) -> FileState:
+    """Read a whole file, and tell what is wrong with it.
+
+    Raises:
+        TraceError: it cannot be read, or is no MCAP file.
+
+    """
+    counts = Counts()
+    chunks: list[bytes] = []  # entries of the summary, but for that of the last one
+    last: _ChunkSeen | None = None
+    others = {Opcode.ATTACHMENT: 0, Opcode.METADATA: 0}
+    with McapScan(path) as scan:
+        for found in scan.found():
+            record = found.record
+            if isinstance(record, MessageIndex) and last is not None:
+                last.add_index(found.offset, found.end, record)
+                continue
+            if isinstance(record, Chunk):
+                if last is not None:
+                    chunks.append(last.entry())
+                last = _ChunkSeen(found, record)
+            if isinstance(record, OtherRecord) and record.opcode in others:
+                others[Opcode(record.opcode)] += 1
+            for one in scan.inside(record):
+                if isinstance(one, Message):
+                    counts.add(one.channel_id, one.log_time)
+            progress(scan.whole_bytes / max(scan.size, 1), "examining")
+        damage = scan.damage or scan.summary_damage()
+        whole_bytes, missing = scan.whole_bytes, b""
+        if last is not None:
+            if damage and not last.is_indexed():
+                whole_bytes, missing = last.end, last.index_again()
+            chunks.append(last.entry())
+        return FileState(
+            path=path,
+            library=scan.header.library,
+            damage=damage,
+            size=scan.size,
+            whole_bytes=whole_bytes,
+            schemas=list(scan.schemas.values()),
+            channels=list(scan.channels.values()),
+            counts=counts,
+            _chunk_indexes=b"".join(chunks),
+            _chunk_count=len(chunks),
+            _missing_indexes=missing,
+            _attachments=others[Opcode.ATTACHMENT],
+            _metadata=others[Opcode.METADATA],
+        )
+
+
+def _unpacked(chunk: Chunk) -> bytes:
+    stream, length = get_chunk_data_stream(chunk)
+    return bytes(stream.read(length))
+
+
+def _crc(descriptor: int, size: int) -> int:
+    """Return the CRC of a file's first bytes."""
+    crc = at = 0
+    while at < size:
+        block = os.pread(descriptor, min(_BLOCK_BYTES, size - at), at)
+        if not block:
+            break
+        crc = zlib.crc32(block, crc)
+        at += len(block)
+    return crc
