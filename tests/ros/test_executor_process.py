@@ -92,7 +92,7 @@ def test_bad_architecture(
                 "-p",
                 "record_topics:=['talk:std_msgs/msg/Flaot64']",
             ],
-            "parameter record_topics: expected name:package/msg/Type of an installed message",
+            "topic to record: expected name, name:package/msg/Type of an installed message",
         ),
         (["-p", "architecture:=FILE", "-p", "conter.step:=1"], "unknown component; did you mean counter?"),
     ],
