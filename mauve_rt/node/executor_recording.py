@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import monotonic_ns
-from mauve_rt.errors import ParameterError
+from mauve_rt.errors import ParameterError, one_line
 from mauve_rt.model import message_class
 from mauve_rt.model.schema import QOS_NAMES
 from mauve_rt.node.executor_bound_resources import BoundResources
@@ -165,8 +165,12 @@ class Recording:
 
     def _chosen(self, topic: str) -> ChosenTopic:
         name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]
-        full_name = self._node.resolve_topic_name(name) if name else ""
-        if name and not type_name:
+        try:
+            full_name = self._node.resolve_topic_name(name)
+        except Exception as error:  # rclpy has an exception class of its own for each mistake
+            expected = f"expected a name, found '{name}': {one_line(str(error))}"
+            raise ParameterError(f"topic to record: {expected}") from error
+        if not type_name:
             known = dict(self._node.get_topic_names_and_types()).get(full_name, [])
             if len(known) != 1:
                 found = f"used with the types {' and '.join(known)}" if known else "used by nobody now"
@@ -175,7 +179,7 @@ class Recording:
                 )
             type_name = known[0]
         message = message_class(type_name)
-        if not name or message is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
+        if message is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
             expected = "name, name:package/msg/Type of an installed message, and perhaps one of"
             expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
             raise ParameterError(f"topic to record: expected {expected}; found '{topic}'")

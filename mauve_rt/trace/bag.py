@@ -65,16 +65,18 @@ class BagWriter:
         self._topics: dict[str, _Topic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._stale = True  # metadata.yaml does not tell what the files hold
-        if self.directory.exists():
-            msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
-            raise TraceError(msg)
         # Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it.
         unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
         try:
-            unfinished.mkdir(parents=True)
+            exists = self.directory.exists()
+            if not exists:
+                unfinished.mkdir(parents=True)
         except OSError as error:
             msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
+        if exists:
+            msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
+            raise TraceError(msg)
         try:
             self._file = self._new_file(unfinished)
             self._write_metadata(unfinished)

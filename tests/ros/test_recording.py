@@ -1,0 +1,159 @@
+"""Bags begun and ended while the executor runs, by service; and what is refused."""
+
+import resource
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from ros_processes import ExecutorProcess
+from rosbags.highlevel import AnyReader
+from std_msgs.msg import Float64
+
+import mauve_rt.trace
+from mauve_msgs.srv import ReplaceCore, StartRecording, StopRecording
+from mauve_rt.trace.bag_repair import examine_bag
+from mauve_rt.trace.reconfigurations import reconfigurations
+from mauve_rt.trace.statistics import component_statistics
+
+EXECUTOR = "/robot_1/executor"
+Starter = Callable[..., ExecutorProcess]
+
+
+@pytest.fixture
+def executor(architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path) -> ExecutorProcess:
+    made = start_executor("-p", f"architecture:={architecture}", "-p", f"bags:={tmp_path}")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    return made
+
+
+def start(graph: Any, **fields: Any) -> Any:
+    return graph.ask(StartRecording, f"{EXECUTOR}/start_recording", **fields)
+
+
+def stop(graph: Any) -> Any:
+    return graph.ask(StopRecording, f"{EXECUTOR}/stop_recording")
+
+
+def topics_of(bag: Path) -> dict[str, int]:
+    with AnyReader([bag]) as reader:
+        return {connection.topic: connection.msgcount for connection in reader.connections}
+
+
+def test_a_bag_begun_and_ended_while_the_executor_runs(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    voice = graph.node.create_publisher(Float64, "/robot_1/talk", 10)
+    replies: list[Any] = []
+
+    def started() -> bool:  # once the executor has discovered the publisher, and so the type
+        replies.append(start(graph, bag="first", topics=["talk"], cause="to see"))
+        return bool(replies[-1].success)
+
+    graph.spin_until(started, "a recording")
+    assert replies[-1].bag == str(tmp_path / "first")
+    graph.spin_until(lambda: voice.get_subscription_count() > 0, "the recorder's subscription")
+    events = graph.hear_events(EXECUTOR)
+    again = start(graph, bag="other")
+    assert (again.success, again.code) == (False, StartRecording.Response.ALREADY_RUNNING)
+    for number in range(3):
+        voice.publish(Float64(data=float(number)))
+    swapped = graph.ask(
+        ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core="executor_tests/Backwards"
+    )
+    assert swapped.success, swapped.message
+    graph.spin_until(lambda: any("Backwards" in event.request for event in events), "the event")
+    running = mauve_rt.trace.open(tmp_path / "first")  # while it is written
+    assert running.architecture
+    reply = stop(graph)
+    assert reply.success, reply.message
+    assert examine_bag(tmp_path / "first").is_finished
+    trace = mauve_rt.trace.open(tmp_path / "first")
+    assert trace.lost == 0
+    found = {component.name: component for component in trace.architecture}
+    assert found["counter"].core == "executor_tests/Backwards"
+    assert ("count", "write", "count") in [(p.name, p.kind, p.resource) for p in found["counter"].ports]
+    (swap,) = reconfigurations(trace)
+    assert (swap.missed_releases, swap.phase_nominal_ns) == (0, 0)  # the grid is older than the bag
+    statistics = component_statistics(trace, "counter")
+    assert statistics.phase_error.count == statistics.releases > 0
+    topics = topics_of(tmp_path / "first")
+    assert topics["/robot_1/talk"] > 0
+    assert topics["/robot_1/count"] > 0
+    assert topics[f"{EXECUTOR}/events"] >= 1
+    assert {message.msg.request for message in trace.messages(f"{EXECUTOR}/events")} >= {
+        "start_recording first talk",
+        "replace_core counter executor_tests/Backwards",
+    }
+
+
+def test_one_bag_after_the_other(executor: ExecutorProcess, graph: Any):
+    bags = []
+    for _ in range(2):
+        reply = start(graph, bag=f"bags/number_{len(bags)}")
+        assert reply.success, reply.message
+        bags.append(Path(reply.bag))
+        counts = graph.hear(Float64, "/robot_1/count")
+        graph.spin_until(lambda: len(counts) > 5, "counts")  # noqa: B023 - called at once
+        assert stop(graph).success
+    for bag in bags:
+        trace = mauve_rt.trace.open(bag)
+        assert trace.lost == 0
+        assert component_statistics(trace, "counter").releases > 3
+        assert topics_of(bag)["/robot_1/count"] > 3
+    assert start(graph).bag.startswith(str(bags[0].parents[1] / "mauve_20"))
+
+
+REFUSED = [
+    ({"bag": "../outside"}, "INVALID", "expected a folder below"),
+    ({"bag": "/outside"}, "INVALID", "expected a folder below"),
+    ({"bag": "."}, "INVALID", "expected a folder below"),
+    ({"bag": "x" * 2000}, "INVALID", "no text longer than"),
+    ({"bag": "x" * 500}, "PREPARE_FAILED", "cannot be created (File name too long)"),
+    ({"bag": "there"}, "PREPARE_FAILED", "exists already"),
+    ({"topics": ["nobody_knows"]}, "INVALID", "used by nobody now; give its type"),
+    ({"topics": ["talk:std_msgs/msg/Flaot64"]}, "INVALID", "found 'talk:std_msgs/msg/Flaot64'"),
+    ({"topics": ["talk:std_msgs/msg/Float64:wrong"]}, "INVALID", "found 'talk:std_msgs/msg/Float64:wrong'"),
+    ({"topics": ["a b"]}, "INVALID", "'a b'"),
+    ({"topics": [""]}, "INVALID", "expected a name, found ''"),
+    ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
+    ({"split_s": float("nan")}, "INVALID", "bad split_s"),
+    ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
+    ({"expected_epoch": 1000}, "WRONG_EPOCH", "expected 1000"),
+]
+
+
+def test_what_is_refused_starts_nothing(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    (tmp_path / "there").mkdir()
+    for fields, code, message in REFUSED:
+        reply = start(graph, **{"bag": "new", **fields})
+        assert not reply.success, fields
+        assert reply.code == getattr(StartRecording.Response, code), reply.message
+        assert message in reply.message
+        assert not (tmp_path / "new").exists()
+    stopped = stop(graph)
+    assert (stopped.success, stopped.code) == (False, StopRecording.Response.NOT_RUNNING)
+
+
+def test_a_full_disk_ends_the_recording_with_a_diagnostic(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+):
+    assert start(graph, bag="bag").success
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.prlimit(executor.process.pid, resource.RLIMIT_FSIZE, (30_000, hard))
+    told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def failed() -> bool:
+        statuses = [status for array in told for status in array.status if "recording" in status.name]
+        return any(
+            one.level == DiagnosticStatus.ERROR and "File too large" in one.message for one in statuses
+        )
+
+    graph.spin_until(failed, "the diagnostic")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 5, "counts of an executor that goes on")
+    reply = stop(graph)
+    assert reply.success
+    assert "it had ended by itself: recording stopped" in reply.message
+    assert examine_bag(tmp_path / "bag").is_finished
+    assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0
