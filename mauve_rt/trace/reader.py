@@ -275,7 +275,8 @@ def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.
     for file in files:
         with McapScan(file) as scan:
             for channel, message in scan.messages():
-                if not (channel.topic in topics if topics else scan.type_of(channel) not in _OWN_TYPES):
+                type_name = scan.type_of(channel)
+                if not ({channel.topic, type_name} & set(topics) if topics else type_name not in _OWN_TYPES):
                     continue
                 log_time_ns = message.log_time
                 said = types.decoded(scan, channel, message.data)

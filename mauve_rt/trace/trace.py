@@ -140,7 +140,7 @@ class Trace:
         return earlier[-1] if earlier else next(iter(grids), None)
 
     def messages(self, *topics: str) -> Iterator[Message]:
-        """Messages of these topics (all but the trace's own when none is named), by log time."""
+        """Messages of these topics or types (all but the trace's own when none is named), by log time."""
         return self.message_source(topics)
 
 
