@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.pairs import following, nested
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.records import Kind, Records
 from mauve_rt.trace.trace import Trace
@@ -126,8 +127,9 @@ def state_spans(records: Records) -> Spans:
 
 
 def service_spans(records: Records) -> Spans:
-    """Calls of services by one component, in order. Of calls within calls the innermost."""
-    return _spans(*pairs(records, Kind.SERVICE_BEGIN, (Kind.SERVICE_END,), (Kind.SERVICE_BEGIN,)))
+    """Calls of services by one component, in order; those within others too."""
+    begins, ends = nested(records, Kind.SERVICE_BEGIN, Kind.SERVICE_END)
+    return _spans(records[begins], records[ends])
 
 
 def _spans(begin: Records, end: Records) -> Spans:
@@ -147,16 +149,8 @@ def pairs(
     records: Records, first: Kind, then: tuple[Kind, ...], unless: tuple[Kind, ...]
 ) -> tuple[Records, Records]:
     """Each record of kind `first` with the next of kind `then`, unless `unless` or a gap is in between."""
-    (starts,) = np.nonzero(records["kind"] == first)
-    (ends,) = np.nonzero(np.isin(records["kind"], then))
-    barrier = np.isin(records["kind"], unless)
-    barrier[1:] |= np.diff(records["sequence"].astype(np.int64)) != 1
-    passed = np.cumsum(barrier)
-    found = np.searchsorted(ends, starts)
-    starts, found = starts[found < len(ends)], found[found < len(ends)]
-    matches = ends[found]
-    clear = passed[matches] == passed[starts]
-    return records[starts[clear]], records[matches[clear]]
+    starts, matches = following(records, first, then, unless)
+    return records[starts], records[matches]
 
 
 def _releases_of_initial_state(records: Records) -> Records:

@@ -95,6 +95,19 @@ def test_nothing_is_measured_across_a_gap():
     assert found.lost_records == 4
 
 
+def test_calls_within_calls_count():
+    source = source_of_one()
+    for kind, time_ns, name in (
+        (Kind.SERVICE_BEGIN, 10, "map.update"),
+        (Kind.SERVICE_BEGIN, 20, "pose.read"),
+        (Kind.SERVICE_END, 25, "pose.read"),
+        (Kind.SERVICE_END, 90, "map.update"),
+    ):
+        source.add("c", kind, time_ns, name=name)
+    services = component_statistics(trace_of(source), "c").services
+    assert {name: found.max_ns for name, found in services.items()} == {"map.update": 80, "pose.read": 5}
+
+
 def test_a_stop_ends_nothing():
     source = source_of_one()
     source.add("c", Kind.RELEASE, FIRST_NS, name="wait", a=FIRST_NS, b=FIRST_NS)
