@@ -22,6 +22,7 @@ MODULES = {
     "mcap": ("mcap-ros2-support", "mcap"),  # rosdep has no key for it alone
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
+    "pandas": ("python3-pandas", "pandas"),
     "pydantic": ("python3-pydantic", "pydantic"),
     "pydantic_core": ("python3-pydantic", "pydantic"),
     "pytest": ("python3-pytest", "pytest"),
