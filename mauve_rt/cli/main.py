@@ -15,7 +15,8 @@ from collections.abc import Sequence
 import argcomplete
 
 from mauve_rt import __version__
-from mauve_rt.cli.verbs import VERBS, run
+from mauve_rt.cli.verb import run
+from mauve_rt.cli.verbs import VERBS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

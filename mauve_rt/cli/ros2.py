@@ -11,7 +11,8 @@ from typing import Any
 from ros2cli.command import CommandExtension, add_subparsers_on_demand
 from ros2cli.plugin_system import PLUGIN_SYSTEM_VERSION, satisfies_version
 
-from mauve_rt.cli.verbs import OK, VERBS, Verb, run
+from mauve_rt.cli.verb import OK, Verb, run
+from mauve_rt.cli.verbs import VERBS
 
 
 class MauveCommand(CommandExtension):

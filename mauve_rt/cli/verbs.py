@@ -2,35 +2,12 @@
 
 import argparse
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
-
-OK, REFUSED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
-
-
-@dataclass(frozen=True)
-class Verb:
-    """One verb of the command."""
-
-    name: str
-    help: str
-    add_arguments: Callable[[argparse.ArgumentParser], None]
-    main: Callable[[argparse.Namespace], int]
-
-
-def run(verb: Verb, args: argparse.Namespace) -> int:
-    """Run a verb, under `mauve` or `ros2 mauve`; returns the exit status, errors are told on stderr."""
-    try:
-        return verb.main(args)
-    except MauveError as error:
-        print(f"mauve: {one_line(str(error))}", file=sys.stderr)
-        return BAD_USAGE
-    except KeyboardInterrupt:
-        return INTERRUPTED
+from mauve_rt.cli import trace_verb
+from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
+from mauve_rt.errors import ArchitectureFileError, one_line
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:
@@ -267,5 +244,6 @@ VERBS = (
     Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
     Verb("nodes", "show the executors", _add_json, _nodes),
     Verb("check", "check an architecture file without starting anything", _add_file, _check),
+    Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

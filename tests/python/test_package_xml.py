@@ -23,6 +23,7 @@ MODULES = {
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
     "pandas": ("python3-pandas", "pandas"),
+    "perfetto": ("", "perfetto"),  # rosdep has no key, and says so: its use is optional
     "pydantic": ("python3-pydantic", "pydantic"),
     "pydantic_core": ("python3-pydantic", "pydantic"),
     "pytest": ("python3-pytest", "pytest"),
@@ -83,7 +84,7 @@ def _modules(folders: tuple[str, ...]) -> set[str]:
 
 
 def _keys(modules: set[str]) -> set[str]:
-    return {MODULES[module][0] if module in MODULES else module for module in modules}
+    return {MODULES[module][0] if module in MODULES else module for module in modules} - {""}
 
 
 def _types_by_name() -> set[str]:

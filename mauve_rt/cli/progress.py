@@ -1,0 +1,28 @@
+"""Progress of long work on a terminal: a bar on standard error that is gone at the end. Nothing elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+from mauve_rt.trace.progress import Progress, silent
+
+
+@contextmanager
+def shown() -> Iterator[Progress]:
+    """What to call with the progress."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield silent
+        return
+    columns = (BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def show(done: float, what: str) -> None:
+            bar.update(task, completed=done, description=escape(what))
+
+        yield show

@@ -1,0 +1,86 @@
+"""`mauve trace ...`: what can be done with recorded traces. Its sub-verbs are the table at the end."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import mauve_rt.trace
+from mauve_rt.cli.verb import OK, Verb
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.progress import Progress, part
+
+if TYPE_CHECKING:  # numpy takes its time to load
+    from mauve_rt.trace.trace import Trace
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the sub-verbs."""
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for verb in SUB_VERBS:
+        subparser = verbs.add_parser(verb.name, help=verb.help, description=verb.help)
+        verb.add_arguments(subparser)
+        subparser.set_defaults(trace_verb=verb)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the sub-verb; returns the exit status."""
+    verb: Verb = args.trace_verb
+    return verb.main(args)
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "bags", nargs="+", type=Path, metavar="BAG", help="folder of a bag; several are merged"
+    )
+    parser.add_argument(
+        "--format",
+        choices=("perfetto", "csv"),
+        default="perfetto",
+        help="for ui.perfetto.dev (default), or CSV",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="PATH", help="default: BAG.pftrace, or folder BAG_csv, here"
+    )
+    parser.add_argument("--force", action="store_true", help="replace what is there")
+
+
+def _export(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415 - only this verb draws, and pandas is slow to load
+
+    name = args.bags[0].resolve().name if len(args.bags) == 1 else "traces"
+    with shown() as progress:
+        traces = _open(args.bags, part(progress, 0.0, 0.5))
+        writing = part(progress, 0.5, 1.0)
+        if args.format == "csv":
+            from mauve_rt.trace.export_csv import export_csv  # noqa: PLC0415
+            from mauve_rt.trace.trace import merge_traces  # noqa: PLC0415
+
+            out = args.out or Path(f"{name}_csv")
+            trace = merge_traces(traces) if len(traces) > 1 else traces[name]
+            export_csv(trace, out, force=args.force, progress=writing)
+        else:
+            from mauve_rt.trace.export_perfetto import export_perfetto  # noqa: PLC0415
+
+            out = args.out or Path(f"{name}.pftrace")
+            export_perfetto(traces, out, force=args.force, progress=writing)
+    print(out)
+    return OK
+
+
+def _open(bags: list[Path], progress: Progress) -> "dict[str, Trace]":
+    """The traces by the names of their bags."""
+    traces: dict[str, Trace] = {}
+    for number, bag in enumerate(bags):
+        name = bag.resolve().name
+        if name in traces:
+            raise TraceError(
+                f"bag {bag}: another one is named {name}, too; export them one by one or rename it"
+            )
+        progress_of_one = part(progress, number / len(bags), (number + 1) / len(bags))
+        traces[name] = mauve_rt.trace.open(bag, progress=progress_of_one)
+    return traces
+
+
+SUB_VERBS = (
+    Verb("export", "write a trace as a file for ui.perfetto.dev, or as CSV files", _add_export, _export),
+)

@@ -1,0 +1,32 @@
+"""What a verb of `mauve` is, and how one is run."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mauve_rt.errors import MauveError, one_line
+from mauve_rt.trace.errors import TraceError
+
+OK, REFUSED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb of the command, or of a verb that has some of its own."""
+
+    name: str
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    main: Callable[[argparse.Namespace], int]
+
+
+def run(verb: Verb, args: argparse.Namespace) -> int:
+    """Run a verb, under `mauve` or `ros2 mauve`; returns the exit status, errors are told on stderr."""
+    try:
+        return verb.main(args)
+    except (MauveError, TraceError) as error:
+        print(f"mauve: {one_line(str(error))}", file=sys.stderr)
+        return BAD_USAGE
+    except KeyboardInterrupt:
+        return INTERRUPTED
