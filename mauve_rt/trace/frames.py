@@ -6,6 +6,7 @@ categories. A figure that is not known, such as one that lost records would be n
 
 from collections.abc import Iterable
 from dataclasses import fields
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -201,3 +202,56 @@ def _of_releases(rows: Records, which: Indices, values: _Int64s) -> tuple[_Int64
     all_values[which], known[which] = values, True
     releases = rows["kind"] == Kind.RELEASE
     return all_values[releases], known[releases]
+
+
+class Frames:
+    """The data frames of one trace, each made when it is first looked at."""
+
+    def __init__(self, trace: Trace) -> None:
+        """Take the trace."""
+        self._trace = trace
+
+    @cached_property
+    def releases(self) -> pd.DataFrame:
+        """As frames.releases."""
+        return releases(self._trace)
+
+    @cached_property
+    def states(self) -> pd.DataFrame:
+        """As frames.states."""
+        return states(self._trace)
+
+    @cached_property
+    def services(self) -> pd.DataFrame:
+        """As frames.services."""
+        return services(self._trace)
+
+    @cached_property
+    def contention(self) -> pd.DataFrame:
+        """As frames.contention."""
+        return contention(self._trace)
+
+    @cached_property
+    def overruns(self) -> pd.DataFrame:
+        """As frames.overruns."""
+        return overruns(self._trace)
+
+    @cached_property
+    def marks(self) -> pd.DataFrame:
+        """As frames.marks."""
+        return marks(self._trace)
+
+    @cached_property
+    def deployments(self) -> pd.DataFrame:
+        """As frames.deployments."""
+        return deployments(self._trace)
+
+    @cached_property
+    def reconfigurations(self) -> pd.DataFrame:
+        """As frames.reconfigurations."""
+        return reconfigurations(self._trace)
+
+    @cached_property
+    def records(self) -> pd.DataFrame:
+        """As frames.records."""
+        return records(self._trace)

@@ -3,8 +3,9 @@
 import heapq
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,10 @@ import numpy.typing as npt
 from mauve_rt.trace.architecture import ComponentInfo
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.records import Kind, Records
+
+if TYPE_CHECKING:
+    from mauve_rt.trace.frames import Frames
+    from mauve_rt.trace.typed_records import Record
 
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
 
@@ -138,6 +143,24 @@ class Trace:
         grids = self.deployments(component)
         earlier = [grid for grid in grids if grid.time_ns <= time_ns]
         return earlier[-1] if earlier else next(iter(grids), None)
+
+    @cached_property
+    def frames(self) -> "Frames":
+        """The trace as pandas data frames: `trace.frames.releases` and so on."""
+        from mauve_rt.trace.frames import Frames  # noqa: PLC0415 - pandas takes its time to load
+
+        return Frames(self)
+
+    def typed(self, *components: str) -> Iterator["Record"]:
+        """Yield the records of these components (all when none is named) by time, as typed values.
+
+        Raises:
+            TraceError: there is no such component in the trace.
+
+        """
+        from mauve_rt.trace.typed_records import typed_records  # noqa: PLC0415 - which needs this module
+
+        return typed_records(self, *components)
 
     def messages(self, *topics: str) -> Iterator[Message]:
         """Messages of these topics or types (all but the trace's own when none is named), by log time."""

@@ -43,7 +43,7 @@ def make_bag(name: str, *, state: str = "sense", realtime_offset_ns: int = 10**1
     source.add("control", Kind.START, 20, a=1000)
     source.cycle("control", 1000, states={state: 300}, wait_ns=5000, wakeup_ns=40)
     bag = TraceBag(source, Path.cwd().parent / name, node_name="/robot/executor", on_error=pytest.fail)
-    bag.write([], whole=True)
+    bag.write(source.drain_trace(), [], whole=True)
     bag.close()
     return str(bag.directory)
 

@@ -3,15 +3,17 @@
 import shutil
 import time
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import mauve_rt.trace
+import mauve_rt.trace.typed_records as typed
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag import BagWriter
 from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.records import Kind, ReconfigurationPhase
 from mauve_rt.trace.synthetic import SyntheticSource
 from mauve_rt.trace.trace import Deployment, Loss, Trace, merge_traces
 
@@ -147,3 +149,69 @@ def test_a_bag_cut_off_anywhere_gives_what_is_whole(tmp_path: Path, monkeypatch:
         assert bool(told.damage) == (size < data_end)
         seen.add(len(rows))
     assert {1, 20} <= seen
+
+
+def test_records_come_typed_and_as_data_frames(tmp_path: Path):
+    source = SyntheticSource(["a", "b"])
+    source.add("a", Kind.DEPLOYMENT, 5, a=1000, b=7, c=100)
+    source.add("a", Kind.START, 6, a=1007)
+    source.cycle("a", 1007, states={"work": 30}, wait_ns=100, wakeup_ns=2)
+    source.add("b", Kind.MARK, 1010, name="word", a=1, b=2, c=3)
+    source.add("a", Kind.OVERRUN, 1300, name="wait", a=1107, b=1300, c=2)
+    source.add("b", Kind.ARMED, 1400, name="wait", a=1500, b=1)
+    source.add("b", Kind.RECONFIGURATION, 1401, name="core", a=2, b=12)
+    trace = record(source, tmp_path / "bag")
+    assert list(trace.typed()) == [
+        typed.Deployed(5, "a", Deployment(5, 1000, 7, 100)),
+        typed.Started(6, "a", 1007),
+        typed.Released(1009, "a", "wait", 1007, 1009),
+        typed.StateBegun(1009, "a", "work"),
+        typed.Marked(1010, "b", "word", 1, 2, 3),
+        typed.StateEnded(1039, "a", "work"),
+        typed.Waited(1039, "a", "wait", 1107),
+        typed.Overrun(1300, "a", "wait", 1107, 1300, 2),
+        typed.Armed(1400, "b", "wait", 1500, True),
+        typed.Reconfigured(1401, "b", "core", ReconfigurationPhase.TAKE, 12),
+    ]
+    assert {one.component for one in trace.typed("b")} == {"b"}
+    (released,) = trace.frames.releases.to_dict("records")
+    assert (released["component"], released["wakeup_ns"], released["response_ns"]) == ("a", 2, 32)
+    (state,) = trace.frames.states.to_dict("records")
+    assert (state["state"], state["execution_ns"]) == ("work", 30)
+
+
+def test_every_kind_has_its_type(tmp_path: Path):
+    source = SyntheticSource(["a"])
+    for kind in Kind:
+        source.add("a", kind, int(kind), a=1)
+    found = list(record(source, tmp_path / "bag").typed())
+    assert len({type(one) for one in found}) == len(Kind)
+    assert set(get_args(typed.Record)) == {type(one) for one in found}
+
+
+def test_records_of_another_version_are_refused_with_both_layouts(tmp_path: Path):
+    share = tmp_path / "prefix" / "share" / "mauve_msgs" / "msg" / "TraceRecord.msg"
+    share.write_text(share.read_text().replace("uint32 name", "uint64 name"))
+    with pytest.raises(
+        TraceError, match=r"topic /robot/executor/trace/batches was written by another version"
+    ):
+        record(SyntheticSource(["a"]), tmp_path / "bag")
+
+
+def test_files_of_several_versions_are_refused(tmp_path: Path):
+    record(SyntheticSource(["a"]), tmp_path / "bag")
+    share = tmp_path / "prefix" / "share" / "mauve_msgs" / "msg" / "TraceRecord.msg"
+    share.write_text(share.read_text() + "uint8 more\n")
+    with pytest.raises(TraceError):
+        record(SyntheticSource(["a"]), tmp_path / "other")
+    shutil.move(tmp_path / "other" / "other_0.mcap", tmp_path / "bag" / "bag_1.mcap")
+    with pytest.raises(
+        TraceError, match=r"bag_1\.mcap: .* written by another version .* found .* uint8 more"
+    ):
+        mauve_rt.trace.open(tmp_path / "bag")
+
+
+def test_a_sqlite_bag_says_how_to_convert_it(tmp_path: Path):
+    (tmp_path / "x.db3").write_bytes(b"")
+    with pytest.raises(TraceError, match=r"its storage is sqlite3: `ros2 bag convert`"):
+        mauve_rt.trace.open(tmp_path)
