@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mauve_rt.trace
-from mauve_rt.cli.verb import OK, Verb
+from mauve_rt.cli.verb import OK, REFUSED, Verb
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part
 
@@ -81,6 +81,81 @@ def _open(bags: list[Path], progress: Progress) -> "dict[str, Trace]":
     return traces
 
 
+def _add_bag(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("bag", type=Path, help="folder of a bag, or one of its files")
+
+
+def _add_bag_and_json(parser: argparse.ArgumentParser) -> None:
+    _add_bag(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _info(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.cli.trace_views import info_values, info_view  # noqa: PLC0415
+    from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
+
+    with shown() as progress:
+        trace = mauve_rt.trace.open(args.bag, progress=progress)
+    values = info_values(trace)
+    if args.json:
+        print_json(values)
+    else:
+        console().print(info_view(values))
+    return OK
+
+
+def _check(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.trace.check import check_bag  # noqa: PLC0415
+
+    with shown() as progress:
+        findings = check_bag(args.bag, progress=progress)
+    for finding in findings:
+        print(f"{'damage' if finding.is_damage else 'loss' if finding.is_loss else 'note'}: {finding.text}")
+    bad = [finding for finding in findings if finding.is_damage or finding.is_loss]
+    if not bad:
+        print(f"{args.bag}: whole, nothing is missing")
+    elif any(finding.is_damage for finding in bad):
+        print(f"`mauve trace repair {args.bag}` makes a bag of it that every reader opens")
+    return REFUSED if bad else OK
+
+
+def _repair(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.trace.bag_repair import examine_bag, repair_bag  # noqa: PLC0415
+
+    with shown() as progress:
+        state = examine_bag(args.bag, progress=progress)
+        repair_bag(state)
+    if state.is_finished:
+        print(f"{args.bag}: nothing to repair")
+    for damage in state.damages():
+        print(f"repaired: {damage}")
+    return OK
+
+
+def _stats(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.cli.trace_views import statistics_values, statistics_view  # noqa: PLC0415
+    from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
+    from mauve_rt.trace.reconfigurations import reconfigurations  # noqa: PLC0415
+    from mauve_rt.trace.statistics import all_statistics  # noqa: PLC0415
+
+    with shown() as progress:
+        trace = mauve_rt.trace.open(args.bag, progress=part(progress, 0.0, 0.5))
+        statistics = all_statistics(trace, progress=part(progress, 0.5, 1.0))
+    if args.json:
+        print_json({name: statistics_values(one) for name, one in statistics.items()})
+    else:
+        console().print(statistics_view(statistics, reconfigurations(trace)))
+    return OK
+
+
 SUB_VERBS = (
+    Verb("info", "show what a bag holds", _add_bag_and_json, _info),
+    Verb("check", "see whether a bag is whole and nothing is missing", _add_bag, _check),
+    Verb("repair", "finish a bag that a kill or a full disk left unfinished", _add_bag, _repair),
+    Verb("stats", "show statistics of components, states, services", _add_bag_and_json, _stats),
     Verb("export", "write a trace as a file for ui.perfetto.dev, or as CSV files", _add_export, _export),
 )

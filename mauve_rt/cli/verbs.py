@@ -221,6 +221,54 @@ def _plugins(args: argparse.Namespace) -> int:
     return OK
 
 
+def _add_recording(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(title="actions", metavar="start|stop", required=True)
+    start = actions.add_parser("start", help="record into a new bag")
+    stop = actions.add_parser("stop", help="end the recording: the bag is complete then")
+    start.set_defaults(starts=True)
+    stop.set_defaults(starts=False)
+    for action in (start, stop):
+        _add_executor(action)
+    start.add_argument(
+        "bag", nargs="?", default="", help="folder below the executor's parameter bags (default: by the time)"
+    )
+    start.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="NAME[:TYPE[:QOS]]",
+        help="record this topic too; may be given again",
+    )
+    start.add_argument(
+        "--split-s", type=float, default=0.0, metavar="S", help="a new file after so long (default 60)"
+    )
+    start.add_argument(
+        "--split-mb",
+        type=float,
+        default=0.0,
+        metavar="MB",
+        help="or when one is so large (default: any size)",
+    )
+    for action in (start, stop):
+        _add_record(action)
+
+
+def _recording(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import StartRecording, StopRecording  # noqa: PLC0415
+
+    if not args.starts:
+        return _request(args, StopRecording, "stop_recording")
+    return _request(
+        args,
+        StartRecording,
+        "start_recording",
+        bag=args.bag,
+        topics=args.topic,
+        split_s=args.split_s,
+        split_bytes=max(round(args.split_mb * 1e6), 0),
+    )
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="architecture file")
 
@@ -244,6 +292,7 @@ VERBS = (
     Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
     Verb("nodes", "show the executors", _add_json, _nodes),
     Verb("check", "check an architecture file without starting anything", _add_file, _check),
+    Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
     Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

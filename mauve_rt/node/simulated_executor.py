@@ -5,13 +5,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.model import load_architecture
 from mauve_rt.model.schema import ResourceModel, TopicModel
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_faults import FaultWatch
-from mauve_rt.node.executor_messages import architecture_state, reconfiguration_event
+from mauve_rt.node.executor_messages import (
+    architecture_state,
+    reconfiguration_event,
+    trace_architecture,
+)
 from mauve_rt.node.executor_requests import Outcome, Request
 from mauve_rt.node.qos import qos_profile, recorded_qos
 from mauve_rt.node.simulated_runtime import SimulatedRuntime
@@ -62,6 +67,7 @@ class SimulatedExecutor:
         self._faults = FaultWatch()
         self._waiting: list[SentMessage] = []
         self._refused = 0
+        self._architecture = b""
         self._bag = TraceBag(self._runtime.simulated, bag, node_name=self.name, on_error=complain)
         for topic in (f"{self.name}/state", f"{self.name}/events"):
             self.record_topic(topic)
@@ -110,6 +116,7 @@ class SimulatedExecutor:
         if observed.epoch != self._published_epoch:
             state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
             self._published_epoch = state.epoch
+            self._architecture = bytes(serialize_message(trace_architecture(self._runtime, observed)))
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
         for fault in self._faults.look(observed.components):
             if fault.part.fell_back:
@@ -126,7 +133,10 @@ class SimulatedExecutor:
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
         waiting, self._waiting = self._waiting, []
-        self._refused += self._bag.write(self._runtime.simulated.drain_trace(), waiting, whole=True)
+        drain = self._runtime.simulated.drain_trace()
+        if self._architecture:
+            self._bag.tell_architecture(self._architecture, drain)
+        self._refused += self._bag.write(drain, waiting, whole=True)
         self._bag.tell_dropped(self._refused)
 
     def flush(self) -> None:

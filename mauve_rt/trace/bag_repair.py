@@ -25,6 +25,8 @@ class BagState:
     files: tuple[FileState, ...]
     metadata_damage: str
     """What is wrong with metadata.yaml; empty when nothing is, or when a single file was asked about."""
+    custom_data: Mapping[str, str]
+    """What metadata.yaml tells beside."""
 
     @property
     def is_finished(self) -> bool:
@@ -33,12 +35,7 @@ class BagState:
 
     def damages(self) -> list[str]:
         """What is wrong, a line for each file."""
-        lines = [
-            f"{file.path.name}: no finished MCAP file ({file.damage}); its first {file.whole_bytes:,} bytes "
-            f"are whole, with {file.counts.messages:,} messages, not the {file.left_out_bytes:,} bytes after"
-            for file in self.files
-            if not file.is_finished
-        ]
+        lines = [_damage(file) for file in self.files if not file.is_finished]
         return [*lines, *([f"{METADATA}: {self.metadata_damage}"] if self.metadata_damage else [])]
 
 
@@ -54,7 +51,13 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
     for index, file in enumerate(files):
         progress_here = part(progress, index / len(files), (index + 1) / len(files))
         states.append(examine(file, progress=progress_here))
-    return BagState(path, tuple(states), _metadata_damage(path, states) if path.is_dir() else "")
+    if not path.is_dir():
+        return BagState(path, tuple(states), "", {})
+    try:
+        custom_data = _custom_data(_read_metadata(path))
+    except TraceError:
+        custom_data = {}
+    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data)
 
 
 def repair_bag(state: BagState) -> None:
@@ -69,6 +72,14 @@ def repair_bag(state: BagState) -> None:
             file.repair()
     if state.metadata_damage:
         _write_metadata(state)
+
+
+def _damage(file: FileState) -> str:
+    found = f"{file.path.name}: no finished MCAP file ({file.damage})"
+    if file.is_data_whole:
+        return f"{found}; all of its {file.counts.messages:,} messages are whole"
+    whole = f"its first {file.whole_bytes:,} bytes are whole, with {file.counts.messages:,} messages"
+    return f"{found}; {whole}, not the {file.left_out_bytes:,} bytes after them"
 
 
 def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
@@ -114,19 +125,23 @@ def _write_metadata(state: BagState) -> None:
         before = _read_metadata(state.path)
     except TraceError:
         before = {}
-    custom = before.get("custom_data") or {}
     files = [BagFileCounts(file.path.name, file.counts) for file in state.files]
     try:
         write_metadata(
             state.path,
             files,
             _topics(state.files),
-            custom_data={str(key): str(value) for key, value in dict(custom).items()},
+            custom_data=state.custom_data,
             ros_distro=str(before.get("ros_distro") or "jazzy"),
         )
     except OSError as error:
         msg = f"bag {state.path}: {METADATA} cannot be written ({error.strerror})"
         raise TraceError(msg) from error
+
+
+def _custom_data(metadata: Mapping[str, Any]) -> dict[str, str]:
+    told = metadata.get("custom_data")
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
 
 def _topics(files: Sequence[FileState]) -> list[BagTopic]:

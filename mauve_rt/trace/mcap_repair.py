@@ -91,6 +91,8 @@ class FileState:
     size: int
     whole_bytes: int
     """Bytes of the data section that are whole."""
+    is_data_whole: bool
+    """Whether that is all of the data section: only what closes the file is missing or damaged."""
     schemas: list[Schema]
     channels: list[Channel]
     counts: Counts
@@ -182,6 +184,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             damage=damage,
             size=scan.size,
             whole_bytes=whole_bytes,
+            is_data_whole=scan.data_end is not None,
             schemas=list(scan.schemas.values()),
             channels=list(scan.channels.values()),
             counts=counts,

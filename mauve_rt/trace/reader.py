@@ -99,7 +99,7 @@ class _Content:
         self.files: list[BagFile] = []
         self._path = path
         self._topics: set[str] = set()
-        self._others: set[str] = set()
+        self._all_topics: dict[str, tuple[str, int]] = {}
         self._batches: list[Batch] = []
         self._components: tuple[str, ...] = ()
         self._names: tuple[str, ...] = ()
@@ -110,8 +110,8 @@ class _Content:
 
     def add(self, scan: McapScan, channel: Channel, data: bytes) -> None:
         type_name = scan.type_of(channel)
+        self._all_topics[channel.topic] = (type_name, self._all_topics.get(channel.topic, ("", 0))[1] + 1)
         if type_name not in _OWN_TYPES:
-            self._others.add(f"{channel.topic} ({type_name or 'without a type'})")
             return
         if (scan.path, channel.id) not in self._known:
             self._known.add((scan.path, channel.id))
@@ -141,10 +141,11 @@ class _Content:
     def trace(self, files: list[Path]) -> Trace:
         if len(self._topics) != 1:
             found = " and ".join(sorted(self._topics)) or f"no topic of type {_BATCH_TYPE}"
-            if not self._topics and self._others:
+            if not self._topics and self._all_topics:
                 libraries = {file.library for file in self.files if file.library}
                 by = f" (written by {', '.join(sorted(libraries))})" if libraries else ""
-                found += f" but {', '.join(sorted(self._others)[:3])}{by}"
+                others = [f"{topic} ({kind})" for topic, (kind, _) in sorted(self._all_topics.items())]
+                found += f" but {', '.join(others[:3])}{by}"
             msg = f"bag {self._path}: expected the trace of one executor, found {found}"
             raise TraceError(msg)
         pairs = np.array([(one.monotonic_ns, one.realtime_ns) for one in self._batches], np.int64)
@@ -160,6 +161,7 @@ class _Content:
             architecture=self._architecture,
             first_grids=self._first_grids or {},
             files=tuple(self.files),
+            topics=self._all_topics,
         )
 
 

@@ -1,7 +1,7 @@
 """A trace in memory: records per component, what they mean, what is missing."""
 
 import heapq
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -103,6 +103,8 @@ class Trace:
     """Grids of components that were deployed before the recording began."""
     files: tuple[BagFile, ...] = ()
     """What it was read from."""
+    topics: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    """Of every topic in the bag, the trace's own too: type and number of messages."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -113,6 +115,12 @@ class Trace:
     def lost(self) -> int:
         """Records known to be lost, of all components."""
         return sum(loss.lost for loss in self.losses.values())
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """Time of the first and of the last record; zeros when there is none."""
+        rows = [records["time_ns"] for records in self.records.values() if len(records)]
+        return (min(int(row.min()) for row in rows), max(int(row.max()) for row in rows)) if rows else (0, 0)
 
     def of(self, component: str, *kinds: Kind) -> Records:
         """Records of one component, of these kinds (all when none is named).
@@ -213,7 +221,16 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
             for component, grid in trace.first_grids.items()
         },
         files=tuple(file for trace in traces.values() for file in trace.files),
+        topics=_all_topics(traces.values()),
     )
+
+
+def _all_topics(traces: Iterable[Trace]) -> dict[str, tuple[str, int]]:
+    found: dict[str, tuple[str, int]] = {}
+    for trace in traces:
+        for topic, (type_name, count) in trace.topics.items():
+            found[topic] = (type_name, count + found.get(topic, ("", 0))[1])
+    return found
 
 
 def _clock_offset_ns(trace: Trace) -> int:

@@ -1,0 +1,104 @@
+"""`mauve trace info|check|repair|stats`: what a person reads, what a program reads, exit statuses."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+import mauve_rt.trace
+from mauve_rt.cli.main import main
+from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.synthetic import SyntheticSource
+
+
+@pytest.fixture
+def source() -> SyntheticSource:
+    source = SyntheticSource(["control", "slow"])
+    source.add("control", Kind.DEPLOYMENT, 0, a=1000, c=1000)
+    source.add("control", Kind.START, 1, a=1000)
+    instant = 1000
+    for _ in range(10):
+        instant = source.cycle("control", instant, states={"work": 250}, wait_ns=1000, wakeup_ns=20)
+    source.add("control", Kind.PARKED, instant - 500, name="wait", a=instant)
+    source.add("control", Kind.RECONFIGURATION, instant - 490, name="replace_core p/B", a=1, b=4)
+    source.add("control", Kind.ARMED, instant - 480, name="wait", a=instant, b=1)
+    source.cycle("control", instant, states={"work": 250}, wait_ns=1000, wakeup_ns=30)
+    source.add("slow", Kind.MARK, 5, name="[bold]hostile[/bold]")
+    return source
+
+
+def record(source: SyntheticSource, directory: Path) -> str:
+    recorder = Recorder(source, directory, node_name="/robot/executor")
+    recorder.start()
+    recorder.stop()
+    return str(directory)
+
+
+def test_info(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    bag = record(source, tmp_path / "bag")
+    assert main(["trace", "info", bag]) == 0
+    shown = capsys.readouterr().out
+    assert "50 records of 2 components" in shown
+    assert "0 lost" in shown
+    assert main(["trace", "info", bag, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["components"]["control"] == {"records": 49, "lost": 0}
+    assert told["topics"]["/robot/executor/trace/names"] == {
+        "type": "mauve_msgs/msg/TraceNames",
+        "messages": 1,
+    }
+
+
+def test_stats(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    bag = record(source, tmp_path / "bag")
+    assert main(["trace", "stats", bag]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "control 1 us" in shown
+    assert "wake-up latency 11 20 ns 20 ns 30 ns 30 ns 30 ns" in shown
+    assert "state work 11 250 ns" in shown
+    assert "control replace_core p/B yes 20 ns 0 0 ns 30 ns" in shown
+    assert main(["trace", "stats", bag, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["control"]
+    assert (told["releases"], told["wakeup"]["max_ns"], told["execution"]["work"]["p50_ns"]) == (11, 30, 250)
+
+
+def test_check_tells_losses(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    source.drop("control", 7)
+    bag = record(source, tmp_path / "bag")
+    assert main(["trace", "check", bag]) == 1
+    shown = capsys.readouterr().out
+    assert (
+        "loss: component 'control': 7 of 56 records (12.50%) are missing: 7 found no room in its ring"
+        in shown
+    )
+
+
+def test_check_and_repair(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    bag = record(source, tmp_path / "bag")
+    assert main(["trace", "check", bag]) == 0
+    assert "whole, nothing is missing" in capsys.readouterr().out
+    (file,) = Path(bag).glob("*.mcap")
+    os.truncate(file, file.stat().st_size - 100)
+    (Path(bag) / "metadata.yaml").unlink()
+    assert main(["trace", "check", bag]) == 1
+    shown = capsys.readouterr().out
+    assert "damage: bag_0.mcap: no finished MCAP file" in shown
+    assert "damage: metadata.yaml: not there" in shown
+    assert f"`mauve trace repair {bag}`" in shown
+    assert main(["trace", "repair", bag]) == 0
+    assert "repaired: bag_0.mcap" in capsys.readouterr().out
+    assert main(["trace", "check", bag]) == 0
+    assert main(["trace", "repair", bag]) == 0
+    assert "nothing to repair" in capsys.readouterr().out
+    assert len(mauve_rt.trace.open(bag).of("control")) == 49
+
+
+@pytest.mark.parametrize("verb", ["info", "check", "repair", "stats"])
+def test_what_is_no_bag(verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["trace", verb, str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    (tmp_path / "x.mcap").write_bytes(b"something else")
+    assert main(["trace", verb, str(tmp_path / "x.mcap")]) == 2
+    assert "x.mcap: not an MCAP file" in capsys.readouterr().err
