@@ -16,7 +16,10 @@ from pathlib import Path
 import machine
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from native import BenchmarkError
+from reading import reading_rows
 from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
+from recording import recording_rows
+from recording_killed import kill_rows
 from rows import Row, markdown, not_available
 from scale import scale_rows
 from service_calls import service_rows
@@ -45,6 +48,9 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "service": service_rows,
     "topics": topic_rows,
     "start": start_rows,
+    "recording": recording_rows,
+    "recording-killed": kill_rows,
+    "reading": reading_rows,
 }
 
 

@@ -21,6 +21,9 @@ class Settings:
     soak: int
     service_calls: int
     topics_s: float
+    recording_s: float
+    kills: int
+    read_records: tuple[int, ...]
     priority: int = 80
     cpu: int = 0
 
@@ -40,6 +43,9 @@ QUICK = Settings(
     soak=500,
     service_calls=50,
     topics_s=1.0,
+    recording_s=2.0,
+    kills=50,
+    read_records=(1_000_000,),
 )
 FULL = Settings(
     mode="full",
@@ -56,4 +62,7 @@ FULL = Settings(
     soak=10_000,
     service_calls=100,
     topics_s=3.0,
+    recording_s=6.0,
+    kills=50,
+    read_records=(1_000_000, 10_000_000),
 )

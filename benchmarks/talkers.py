@@ -38,6 +38,7 @@ class Talkers:
         *,
         count: int = 1,
         topics: int = 0,
+        marks: int = 0,
         bound: str = "",
         priority: int,
         cpu: int,
@@ -45,6 +46,8 @@ class Talkers:
         sent_anywhere: bool = False,
     ) -> None:
         """Write the architecture file; each talker remembers so many releases.
+
+        It writes 4 + `marks` trace records each time.
 
         Messages are sent on the CPU of the talkers, unless `sent_anywhere`.
         """
@@ -63,7 +66,7 @@ class Talkers:
         components = {
             name: _COMPONENT
             | {"priority": priority, "cpus": [cpu]}
-            | {"properties": {"topics": topics, "releases": releases, "file": str(file)}}
+            | {"properties": {"topics": topics, "marks": marks, "releases": releases, "file": str(file)}}
             for name, file in zip(self.names, self._files, strict=True)
         }
         model = {

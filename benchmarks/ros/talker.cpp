@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// A plug-in for benchmarks: a 1 kHz component that writes stamped points and remembers when it was released.
+// A plug-in for benchmarks: a 1 kHz component that writes stamped points and trace records of its own, and remembers
+// when it was released.
 #include <fstream>
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@ struct TalkerShell : mauve::Shell {
     for (int i = 0; i < kMostTopics; ++i) points.push_back(&write_port<Point>("point_" + std::to_string(i)));
   }
   mauve::Property<std::int64_t>& topics = property("topics", 1, {.minimum = 0, .maximum = kMostTopics});
+  mauve::Property<std::int64_t>& marks = property(
+      "marks", 0, {.description = "trace records of its own, each release", .minimum = 0, .maximum = 1000});
   mauve::Property<std::int64_t>& releases =
       property("releases", 0, {.description = "so many are remembered", .minimum = 0, .maximum = 1e7});
   mauve::Property<std::string>& file =
@@ -39,6 +42,7 @@ class Talker : public mauve::Core<TalkerShell> {
       stamp(point, mauve::monotonic_now_ns(), number_);
       shell().points[i]->write(point);
     }
+    for (std::int64_t i = 0; i < shell().marks; ++i) mauve::trace_mark(mark_, number_, i);
   }
 
  protected:
@@ -63,6 +67,7 @@ class Talker : public mauve::Core<TalkerShell> {
   };
   std::vector<Record> records_;
   std::size_t remembered_{0};
+  std::uint32_t mark_{mauve::TraceNames::intern("mark")};
   std::int64_t number_{0};
 };
 

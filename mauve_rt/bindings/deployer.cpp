@@ -2,6 +2,7 @@
 #include "mauve_rt/deployer.hpp"
 
 #include "mauve_rt/futex.hpp"
+#include "mauve_rt/trace_collector.hpp"
 
 #include "transaction.hpp"
 
@@ -95,14 +96,27 @@ class PyDeployer {
 
   std::vector<std::string> trace_components() const { return architecture_.trace_components(); }
 
+  void collect_trace(time_ns_t period_ns) {
+    const std::lock_guard lock(collector_mutex_);
+    collector_.reset();
+    if (period_ns > 0) collector_ = std::make_unique<TraceCollector>(architecture_, period_ns);
+  }
+
+  TraceDrain drain_trace() {
+    const std::lock_guard lock(collector_mutex_);
+    return collector_ != nullptr ? collector_->take() : architecture_.drain_trace();
+  }
+
  private:
   bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
 
   const PluginRegistry& registry_;
   Architecture& architecture_;
   Deployer deployer_;
-  std::atomic<bool> woken_{false};  // release/acquire: set once, for good
-  std::uint32_t seen_change_{0};    // of the one thread that waits for changes
+  std::mutex collector_mutex_;
+  std::unique_ptr<TraceCollector> collector_;  // under collector_mutex_
+  std::atomic<bool> woken_{false};             // release/acquire: set once, for good
+  std::uint32_t seen_change_{0};               // of the one thread that waits for changes
 };
 
 CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
@@ -218,8 +232,8 @@ void bind_deployer(py::module_& module) {
           py::arg("commit_timeout_ns") = s_to_ns(1), Unlocked())
       .def("realtime_status", [](PyDeployer& self) { return self.deployer().realtime_status(); })
       .def_property_readonly("epoch_ns", [](PyDeployer& self) { return self.deployer().epoch_ns(); })
-      .def(
-          "drain_trace", [](PyDeployer& self) { return self.deployer().drain_trace(); }, Unlocked())
+      .def("collect_trace", &PyDeployer::collect_trace, py::arg("period_ns"), Unlocked())
+      .def("drain_trace", &PyDeployer::drain_trace, Unlocked())
       .def("trace_components", &PyDeployer::trace_components)
       .def("trace_names", [](PyDeployer&) { return TraceNames::all(); })
       .def(

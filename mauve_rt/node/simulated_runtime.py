@@ -80,6 +80,9 @@ class SimulatedDeployer:
         """As Deployer.epoch_ns."""
         return self._simulation.epoch_ns()
 
+    def collect_trace(self, period_ns: int) -> None:
+        """Do nothing: who drives the simulation drains in time."""
+
     def drain_trace(self) -> TraceDrain:
         """As Deployer.drain_trace."""
         return self._simulation.drain_trace(self._architecture)

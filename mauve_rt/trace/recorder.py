@@ -6,13 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mauve_rt.trace.bag import TopicQos
-from mauve_rt.trace.cdr import RECORD_BYTES
 from mauve_rt.trace.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
     NAMES,
     Drain,
-    Drained,
     MessageSource,
     SentMessage,
     Split,
@@ -36,22 +34,21 @@ _JOIN_TIMEOUT_S = 2.0
 
 
 class Recorder:
-    """Writes a bag by two threads: one empties the rings often, one writes what came less often.
+    """Writes a bag from a thread of its own.
 
-    So a disk that makes the writer wait costs no records, as long as the queue between them has room. When it
-    has none the rings are not emptied, which counts what they lose. A failure to write (a full disk) ends the
-    recording, is told once through `on_error`, and leaves the bag as the flush before left it.
+    The rings are emptied often by a native thread of the source, so neither a disk that makes this one wait
+    nor a busy interpreter costs records, as long as there is room to collect them. A failure to write (a full
+    disk) ends the recording, is told once through `on_error`, and leaves the bag as the flush before left it.
 
     Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
 
-    | member          | written by                     | guarded by    |
-    | --------------- | ------------------------------ | ------------- |
-    | `_waiting` ...  | record(), the writer           | `_lock`       |
-    | `_dropped`      | record(), the writer           | `_lock`       |
-    | `_recording`    | start(), the writer            | `_lock`       |
-    | `_architecture` | tell_architecture()            | `_lock`       |
-    | `_drains` ...   | both threads                   | `_drain_lock` |
-    | `_bag`          | start(), then the writer       |               |
+    | member          | written by                     | guarded by |
+    | --------------- | ------------------------------ | ---------- |
+    | `_waiting` ...  | record(), the recorder thread  | `_lock`    |
+    | `_dropped`      | record(), the recorder thread  | `_lock`    |
+    | `_recording`    | start(), the recorder thread   | `_lock`    |
+    | `_architecture` | tell_architecture()            | `_lock`    |
+    | `_bag`          | start(), the recorder thread   |            |
     """
 
     def __init__(
@@ -75,10 +72,9 @@ class Recorder:
             node_name: absolute name of the executor's node, e.g. /robot_1/executor; the trace is below it.
             flush_period_s: so much, and what a flush takes, is lost by a kill at most.
             drain_period_s: the rings must not fill up within it.
-            queue_bytes: messages that may wait for a flush, and as many bytes of records; what exceeds it is
-                dropped and counted.
+            queue_bytes: messages that may wait for a flush; what exceeds it is dropped and counted.
             split: when the bag goes on in a new file; after a minute unless said otherwise.
-            on_error: called at most once for each cause, with one line, on the writer's thread.
+            on_error: called at most once for each cause, with one line, on the recorder thread.
             messages: asked, on the writer's thread, for messages beside those given to record().
 
         Raises:
@@ -99,11 +95,7 @@ class Recorder:
         self._dropped = 0
         self._recording = False
         self._architecture = b""
-        self._drain_lock = threading.Lock()
-        self._drains: list[Drain] = []
-        self._drained_bytes = 0
         self._stop = threading.Event()
-        self._drainer = threading.Thread(target=self._drain_often, name="trace_drain", daemon=True)
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     @property
@@ -130,17 +122,17 @@ class Recorder:
             return self._dropped + elsewhere - self._dropped_before
 
     def start(self, *, discard: bool = False) -> None:
-        """Start the threads. Once only.
+        """Start the thread. Once only.
 
         Args:
             discard: leave out what the rings hold already, from before.
 
         """
+        self._source.collect_trace(round(self._drain_period_s * 1e9))
         if discard:
             self._bag.discard(self._source.drain_trace())
         with self._lock:
             self._recording = True
-        self._drainer.start()
         self._thread.start()
 
     def tell_architecture(self, data: bytes) -> None:
@@ -173,30 +165,12 @@ class Recorder:
             return True
 
     def stop(self) -> None:
-        """Drain and flush a last time, close the bag. Returns within 4 s; may be called again."""
+        """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
         self._stop.set()
         if self._thread.ident is None:
             self._bag.abort()
-            return
-        for thread in (self._drainer, self._thread):
-            if thread is not threading.current_thread():
-                thread.join(_JOIN_TIMEOUT_S)
-
-    def _drain_often(self) -> None:
-        next_s = time.monotonic()
-        while not self._stop.wait(max(0.0, next_s - time.monotonic())) and self.recording:
-            try:
-                self._drain()
-            except Exception:  # noqa: BLE001 - the writer meets it too, and tells
-                return
-            next_s = max(next_s + self._drain_period_s, time.monotonic())
-
-    def _drain(self) -> None:
-        with self._drain_lock:
-            if self._drained_bytes <= self._queue_bytes:
-                drain = self._source.drain_trace()
-                self._drains.append(drain)
-                self._drained_bytes += len(drain.records) + RECORD_BYTES
+        elif self._thread is not threading.current_thread():
+            self._thread.join(_JOIN_TIMEOUT_S)
 
     def _run(self) -> None:
         try:
@@ -214,6 +188,8 @@ class Recorder:
                 self._recording = False
             self._bag.abort()
             self._report(f"recording stopped: {error}")
+        finally:
+            self._source.collect_trace(0)
 
     def _write(self) -> None:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
@@ -221,15 +197,10 @@ class Recorder:
             architecture = self._architecture
         if self._messages is not None:
             waiting += self._messages.take_messages()
-        self._drain()
-        with self._drain_lock:
-            drains, self._drains, self._drained_bytes = self._drains, [], 0
-        last = drains[-1]
-        records = b"".join(drain.records for drain in drains)
-        drained = Drained(records, last.written, last.dropped, last.monotonic_ns, last.realtime_ns)
+        drain = self._source.drain_trace()
         if architecture:
-            self._bag.tell_architecture(architecture, drained)
-        refused = self._bag.write(drained, waiting, whole=True)
+            self._bag.tell_architecture(architecture, drain)
+        refused = self._bag.write(drain, waiting, whole=True)
         with self._lock:
             self._dropped += refused
         self._bag.tell_dropped(self.dropped_messages)

@@ -77,6 +77,9 @@ class SyntheticSource:
         self.add(component, Kind.WAIT, now_ns, name=wait, a=nominal_ns + wait_ns)
         return nominal_ns + wait_ns
 
+    def collect_trace(self, period_ns: int) -> None:
+        """Do nothing: records wait here for as long as they like."""
+
     def drain_trace(self) -> SyntheticDrain:
         """Take all records."""
         records = b"".join(self._waiting)

@@ -45,7 +45,7 @@ class Drain(Protocol):
 
 
 class Drained(NamedTuple):
-    """Several drains as one."""
+    """A drain as a value."""
 
     records: bytes
     written: list[int]
@@ -57,8 +57,11 @@ class Drained(NamedTuple):
 class TraceSource(Protocol):
     """The part of `mauve_rt._kernel.Deployer` that the recorder uses."""
 
+    def collect_trace(self, period_ns: int) -> None:
+        """Empty the rings so often, by a thread without the interpreter, for drain_trace(); 0: no longer."""
+
     def drain_trace(self) -> Drain:
-        """Take everything out of the rings."""
+        """Take everything out of the rings, and what was collected."""
 
     def trace_components(self) -> list[str]:
         """Words that `component` of a record refers to."""
