@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.cli import trace_verb
+from mauve_rt.cli import report_verb, trace_verb
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -293,6 +293,7 @@ VERBS = (
     Verb("nodes", "show the executors", _add_json, _nodes),
     Verb("check", "check an architecture file without starting anything", _add_file, _check),
     Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
+    Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),
     Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

@@ -1,0 +1,40 @@
+"""`mauve report BAG...`: one page about a run."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from mauve_rt.cli.verb import BAD_USAGE, OK
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("bag", nargs="+", type=Path, help="bags of one run: rosbag2 folders or MCAP files")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.html",
+        help="the page (default: report.html inside the first bag's folder, or beside its file)",
+    )
+    parser.add_argument("--title", default="", help="of the page (default: the bags' names)")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Write the page; prints where it is."""
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415 - numpy and rich take their time to load
+    from mauve_rt.trace.progress import part  # noqa: PLC0415
+    from mauve_rt.trace.report import write_report  # noqa: PLC0415
+    from mauve_rt.trace.report.bags import bag_names, open_bags  # noqa: PLC0415
+
+    bags: list[Path] = args.bag
+    out = args.out or (bags[0] if bags[0].is_dir() else bags[0].parent) / "report.html"
+    title = args.title or f"Trace of {', '.join(bag_names(bags))}"
+    try:
+        with shown() as progress:
+            trace = open_bags(bags, progress=part(progress, 0, 0.5))
+            write_report(out, trace, title=title, progress=part(progress, 0.5, 1))
+    except OSError as error:
+        print(f"mauve: report {out}: cannot be written ({error.strerror or error})", file=sys.stderr)
+        return BAD_USAGE
+    print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
+    return OK

@@ -1,0 +1,120 @@
+"""Everything the parts of a report tell about one trace, computed once."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mauve_rt.trace.progress import Progress, silent
+from mauve_rt.trace.reconfigurations import Reconfiguration, reconfigurations
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.report.cycles import Array, releases_of, slices_by_state
+from mauve_rt.trace.report.requests import Request, join_requests
+from mauve_rt.trace.statistics import ComponentStatistics, component_statistics
+from mauve_rt.trace.trace import Trace
+
+
+class Swap(NamedTuple):
+    """A reconfiguration as measured, and as asked for."""
+
+    measured: Reconfiguration
+    request: Request | None
+
+
+class Fault(NamedTuple):
+    """A component parked FAULTED."""
+
+    component: str
+    state: str
+    time_ns: int
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A trace and what is known about it."""
+
+    trace: Trace
+    statistics: dict[str, ComponentStatistics]
+    releases: dict[str, Array]
+    slices: dict[str, dict[str, Array]]
+    """Per component and state."""
+    swaps: list[Swap]
+    faults: list[Fault]
+    begin_ns: int
+    """The first record of all."""
+    end_ns: int
+    zero_ns: int
+    """What the page's clock counts from."""
+
+    @property
+    def duration_ns(self) -> int:
+        """From the first to the last record."""
+        return self.end_ns - self.begin_ns
+
+    @property
+    def records(self) -> int:
+        """How many records are in the trace."""
+        return sum(map(len, self.trace.records.values()))
+
+    def period_ns(self, component: str) -> int:
+        """Period g as last deployed; 0 of a sporadic component, and where the trace does not tell."""
+        return self.statistics[component].period_ns
+
+    def sporadic(self, component: str) -> bool:
+        """Tell whether it was deployed without a grid."""
+        grids = self.trace.deployments(component)
+        return bool(grids) and grids[-1].period_ns == 0
+
+
+def analyse(
+    trace: Trace,
+    *,
+    events: Iterable[Any] = (),
+    zero_ns: int | None = None,
+    progress: Progress = silent,
+) -> Analysis:
+    """Compute it all.
+
+    Args:
+        trace: the trace.
+        events: messages of type ReconfigurationEvent, by time.
+        zero_ns: what the page's clock counts from; the first record when not given.
+        progress: told what is being done.
+    """
+    statistics, releases, slices = {}, {}, {}
+    for index, component in enumerate(trace.components):
+        progress(index / len(trace.components), "measuring")
+        statistics[component] = component_statistics(trace, component)
+        releases[component] = releases_of(trace.of(component))
+        slices[component] = slices_by_state(trace, component)
+    measured = reconfigurations(trace)
+    requests = join_requests(measured, events)
+    begin_ns, end_ns = _extent(trace)
+    return Analysis(
+        trace=trace,
+        statistics=statistics,
+        releases=releases,
+        slices=slices,
+        swaps=[Swap(*pair) for pair in zip(measured, requests, strict=True)],
+        faults=_faults(trace),
+        begin_ns=begin_ns,
+        end_ns=end_ns,
+        zero_ns=begin_ns if zero_ns is None else zero_ns,
+    )
+
+
+def _extent(trace: Trace) -> tuple[int, int]:
+    times = [records["time_ns"] for records in trace.records.values() if len(records)]
+    if not times:
+        return 0, 0
+    return min(int(one.min()) for one in times), max(int(one.max()) for one in times)
+
+
+def _faults(trace: Trace) -> list[Fault]:
+    found = [
+        Fault(component, trace.name(int(row["name"])), int(row["time_ns"]))
+        for component in trace.components
+        for row in np.atleast_1d(trace.of(component, Kind.FAULT))
+    ]
+    return sorted(found, key=lambda fault: fault.time_ns)

@@ -1,0 +1,61 @@
+"""Single events on a component's row: overruns, faults, stops, starts, the user's marks."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mauve_rt.trace.records import Kind, Records
+from mauve_rt.trace.report.cycles import Array
+
+MARKER = np.dtype(
+    [("time_ns", "<i8"), ("number", "<i8"), ("name", "<i8"), ("value", "<i8"), ("skipped", "<i8")]
+)
+"""value: of an overrun how late in ns, of a mark the user's a. Merged: worst value, sum of skipped."""
+
+KINDS = {
+    Kind.OVERRUN: "overrun",
+    Kind.FAULT: "fault",
+    Kind.STOP: "stop",
+    Kind.START: "start",
+    Kind.MARK: "mark",
+}
+MOST = 20_000
+"""Markers of one kind in a row; more are merged, far below what a screen could tell apart."""
+_LARGEST = 2**53
+
+
+class Markers(NamedTuple):
+    """Of one kind in one row."""
+
+    kind: str
+    entries: Array
+
+
+def markers_of(records: Records) -> list[Markers]:
+    """Markers of a component by kind; kinds without one are left out."""
+    found = [Markers(word, _entries(records[records["kind"] == kind], kind)) for kind, word in KINDS.items()]
+    return [one for one in found if len(one.entries)]
+
+
+def _entries(rows: Records, kind: Kind) -> Array:
+    entries = np.zeros(len(rows), MARKER)
+    entries["time_ns"] = rows["time_ns"]
+    entries["number"] = 1
+    entries["name"] = rows["name"]
+    if kind == Kind.OVERRUN:
+        entries["value"] = rows["b"] - rows["a"]
+        entries["skipped"] = rows["c"]
+    elif kind == Kind.MARK:
+        entries["value"] = np.clip(rows["a"], -_LARGEST, _LARGEST)
+    return entries if len(entries) <= MOST else _merged(entries)
+
+
+def _merged(entries: Array) -> Array:
+    time_ns = entries["time_ns"]
+    bucket_ns = max(1, int(time_ns[-1] - time_ns[0]) // MOST + 1)
+    (starts,) = np.nonzero(np.diff((time_ns - time_ns[0]) // bucket_ns, prepend=-1))
+    merged = entries[starts].copy()
+    merged["number"] = np.add.reduceat(entries["number"], starts)
+    merged["value"] = np.maximum.reduceat(entries["value"], starts)
+    merged["skipped"] = np.add.reduceat(entries["skipped"], starts)
+    return merged

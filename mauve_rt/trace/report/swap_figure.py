@@ -1,0 +1,219 @@
+"""A reconfiguration, magnified: its place on the grid, the blackout itself, the phase kept."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.report import svg
+from mauve_rt.trace.report.analysis import Analysis
+from mauve_rt.trace.report.scales import linear_ticks
+from mauve_rt.trace.report.units import counted, share_text, time_text
+
+WIDTH = 1080.0
+_LEFT, _RIGHT = 170.0, 20.0
+_ROW, _TALL_ROW = 26.0, 58.0
+_TOP = 30.0
+_MOST_TICKS = 240
+_MOST_SLICES = 300
+_PERIODS_AROUND = 2.6
+_OTHERS = 24
+"""Rows of other components."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """An interval of time and its place in a drawing."""
+
+    begin_ns: float
+    end_ns: float
+
+    def x(self, time_ns: float) -> float:
+        """Return where an instant is."""
+        share = (time_ns - self.begin_ns) / (self.end_ns - self.begin_ns)
+        return _LEFT + min(max(share, 0), 1) * (WIDTH - _LEFT - _RIGHT)
+
+    def ticks(self, zero_ns: float, *, count: int = 8) -> Iterator[tuple[float, float]]:
+        """Yield places and values of ticks, counted from zero_ns."""
+        for value in linear_ticks(self.begin_ns - zero_ns, self.end_ns - zero_ns, count=count):
+            yield self.x(value + zero_ns), value
+
+
+def grid_figure(analysis: Analysis, one: Reconfiguration) -> str:
+    """Draw the releases of all components around a swap, on the grid of the one that was swapped."""
+    window = _window(analysis, one)
+    others = [name for name in analysis.trace.components if name != one.component][:_OTHERS]
+    height = _TOP + _TALL_ROW + len(others) * _ROW + 26
+    parts = [_axis(window, one.parked_ns, height - 22), _grid_lines(analysis, one, window)]
+    band = max(window.x(one.armed_ns) - window.x(one.parked_ns), 2)
+    parts.append(svg.rect(window.x(one.parked_ns) - 1, _TOP - 8, band, height - _TOP - 14, css="blackout"))
+    parts.append(_row(analysis, one.component, window, _TOP, _TALL_ROW, css="own"))
+    for index, name in enumerate(others):
+        parts.append(_row(analysis, name, window, _TOP + _TALL_ROW + index * _ROW, _ROW, css="other"))
+    parts.append(_flags(one, window))
+    described = f"releases around the reconfiguration of {one.component}"
+    return svg.svg(WIDTH, height, "".join(parts), css="swap-grid", described=described)
+
+
+def blackout_figure(one: Reconfiguration) -> str:
+    """Draw the time from parked to armed, magnified."""
+    margin_ns = max(one.blackout_ns * 0.25, 200)
+    window = Window(one.parked_ns - margin_ns, one.armed_ns + margin_ns)
+    top, height = 30.0, 96.0
+    parts = [_axis(window, one.parked_ns, height - 22)]
+    left, right = window.x(one.parked_ns), window.x(one.armed_ns)
+    parts.append(svg.rect(left, top, right - left, 30, css="blackout solid", round_=3))
+    at_ns = float(one.armed_ns - one.adopt_ns - one.take_ns)
+    for phase, took_ns in (("adopt", one.adopt_ns), ("take", one.take_ns)):
+        begin, end = window.x(at_ns), window.x(at_ns + took_ns)
+        tip = f"{phase}: {time_text(took_ns)}"
+        parts.append(
+            svg.rect(begin, top + 5, max(end - begin, 1.5), 20, css=f"phase {phase}", tip=tip, round_=2)
+        )
+        at_ns += took_ns
+    parts.append(svg.label(left - 6, top + 20, "parked", css="strong", anchor="end"))
+    parts.append(svg.label(right + 6, top + 20, "armed", css="strong"))
+    parts_told = f"adopt {time_text(one.adopt_ns)}, take {time_text(one.take_ns)}"
+    told = f"blackout {time_text(one.blackout_ns)}: {parts_told}"
+    parts.append(svg.label((left + right) / 2, top - 8, told, css="strong", anchor="middle"))
+    return svg.svg(WIDTH, height, "".join(parts), css="swap-blackout", described=told)
+
+
+def phase_figure(analysis: Analysis, one: Reconfiguration, *, releases: int = 40) -> str:
+    """Draw how far the releases before and after were off the grid; empty without a grid."""
+    grid = analysis.trace.deployment_at(one.component, one.armed_ns)
+    found = analysis.releases[one.component]
+    if grid is None or grid.period_ns <= 0 or not len(found):
+        return ""
+    actual_ns = found["begin_ns"] + found["wakeup_ns"]
+    middle = int(np.searchsorted(actual_ns, one.armed_ns))
+    chosen = range(max(middle - releases, 0), min(middle + releases, len(found)))
+    errors = [grid.phase_ns(int(actual_ns[index])) for index in chosen]
+    if not errors:
+        return ""
+    low, high = min(0, *errors), max(0, *errors)
+    top, height = 18.0, 150.0
+    bottom = height - 28
+    span = max(high - low, 1_000) * 1.1
+
+    def y(error_ns: float) -> float:
+        return bottom - (error_ns - low) / span * (bottom - top)
+
+    step = (WIDTH - _LEFT - _RIGHT) / (2 * releases)
+    parts = []
+    for value in linear_ticks(low, low + span, count=4):
+        parts.append(
+            svg.line(_LEFT, y(value), WIDTH - _RIGHT, y(value), css="grid-line" if value else "axis")
+        )
+        parts.append(svg.label(_LEFT - 8, y(value) + 4, time_text(value), css="tick", anchor="end"))
+    centre = _LEFT + releases * step
+    parts.append(svg.line(centre, top - 8, centre, bottom, css="blackout-line"))
+    for index, error_ns in zip(chosen, errors, strict=True):
+        x = centre + (index - middle + 0.5) * step
+        which = index - middle + (index >= middle)
+        tip = f"release {which:+d}: {time_text(error_ns)} after its instant of the grid"
+        parts.append(svg.line(x, y(0), x, y(error_ns), css="stem"))
+        parts.append(svg.circle(x, y(error_ns), 3.2, css="after" if index >= middle else "before", tip=tip))
+    parts.append(svg.label(centre - 10, height - 8, "releases before", css="tick", anchor="end"))
+    parts.append(svg.label(centre + 10, height - 8, "releases after", css="tick"))
+    parts.append(svg.label(10, top + 4, "off the grid", css="strong"))
+    return svg.svg(
+        WIDTH, height, "".join(parts), css="swap-phase", described="phase of releases around the swap"
+    )
+
+
+def neighbours_in_words(analysis: Analysis, one: Reconfiguration) -> list[str]:
+    """Say of each other component what happened to its releases in the window of the figure."""
+    window = _window(analysis, one)
+    lines = []
+    for name in analysis.trace.components:
+        if name == one.component:
+            continue
+        releases = analysis.releases[name]
+        first, last = np.searchsorted(releases["begin_ns"], (window.begin_ns, window.end_ns))
+        inside = releases[first:last]
+        late = _overruns_within(analysis, name, window)
+        text = f"{name}: {counted(len(inside), 'release')}, {counted(late, 'overrun')}"
+        if len(inside):
+            worst = int(inside["wakeup_ns"].max())
+            rank = float(np.count_nonzero(releases["wakeup_ns"] > worst)) / len(releases)
+            text += f"; latest wake-up {time_text(worst)}, exceeded by {share_text(rank)} of all its wake-ups"
+        lines.append(text)
+    return lines
+
+
+def _overruns_within(analysis: Analysis, component: str, window: Window) -> int:
+    times = analysis.trace.of(component, Kind.OVERRUN)["time_ns"]
+    return int(np.count_nonzero((times >= window.begin_ns) & (times < window.end_ns)))
+
+
+def _window(analysis: Analysis, one: Reconfiguration) -> Window:
+    period_ns = analysis.period_ns(one.component)
+    next_ns = one.nominal_ns if one.nominal_ns is not None else one.pending_ns
+    first_ns, last_ns = one.parked_ns, max(one.armed_ns, next_ns)
+    if period_ns <= 0:
+        begins = analysis.releases[one.component]["begin_ns"]
+        typical = float(np.median(np.diff(begins))) if len(begins) > 2 else 0.0  # noqa: PLR2004
+        period_ns = int(typical) or max(last_ns - first_ns, 1_000_000)
+    around = _PERIODS_AROUND * period_ns
+    return Window(first_ns - around, last_ns + around)
+
+
+def _axis(window: Window, zero_ns: float, y: float) -> str:
+    parts = [svg.line(_LEFT, y, WIDTH - _RIGHT, y, css="axis")]
+    for x, value in window.ticks(zero_ns):
+        text = "parked" if value == 0 else ("+" if value > 0 else "") + time_text(value)
+        parts += [
+            svg.line(x, y, x, y + 4, css="axis"),
+            svg.label(x, y + 17, text, css="tick", anchor="middle"),
+        ]
+    return "".join(parts)
+
+
+def _grid_lines(analysis: Analysis, one: Reconfiguration, window: Window) -> str:
+    grid = analysis.trace.deployment_at(one.component, one.armed_ns)
+    if grid is None or grid.period_ns <= 0:
+        return ""
+    origin_ns = grid.epoch_ns + grid.offset_ns
+    first = int(np.ceil((window.begin_ns - origin_ns) / grid.period_ns))
+    last = int(np.floor((window.end_ns - origin_ns) / grid.period_ns))
+    if last - first > _MOST_TICKS:
+        return ""
+    places = (window.x(origin_ns + k * grid.period_ns) for k in range(first, last + 1))
+    return "".join(svg.line(x, _TOP - 8, x, _TOP + _TALL_ROW, css="grid-line") for x in places)
+
+
+def _row(analysis: Analysis, component: str, window: Window, top: float, height: float, *, css: str) -> str:
+    base = top + height - 6
+    room = height - (20 if css == "own" else 10)
+    parts = [svg.line(_LEFT, base, WIDTH - _RIGHT, base, css="row-line")]
+    name = svg.shortened(component, _LEFT - 24)
+    parts.append(svg.label(_LEFT - 10, base - room / 2 + 5, name, css="name", anchor="end", tip=component))
+    for index, (state, slices) in enumerate(analysis.slices[component].items()):
+        begins, ends = slices["begin_ns"], slices["begin_ns"] + slices["extent_ns"]
+        first, last = np.searchsorted(ends, window.begin_ns), np.searchsorted(begins, window.end_ns)
+        for begin, end in zip(begins[first:last][:_MOST_SLICES], ends[first:last], strict=False):
+            x, width = window.x(begin), window.x(end) - window.x(begin)
+            tip = f"{state}: {time_text(int(end - begin))}" if css == "own" else ""
+            parts.append(svg.rect(x, base - room, max(width, 1), room, css=f"slice s{index % 8}", tip=tip))
+    releases = analysis.releases[component]["begin_ns"]
+    inside = releases[np.searchsorted(releases, window.begin_ns) : np.searchsorted(releases, window.end_ns)]
+    for begin in inside[:_MOST_TICKS]:
+        x = window.x(begin)
+        parts.append(svg.line(x, base - room - (8 if css == "own" else 3), x, base, css=f"release {css}"))
+    return "".join(parts)
+
+
+def _flags(one: Reconfiguration, window: Window) -> str:
+    x = window.x(one.parked_ns)
+    parts = [svg.label(x + 6, 14, f"parked, blackout {time_text(one.blackout_ns)}", css="strong")]
+    if one.nominal_ns is not None:
+        end = window.x(one.nominal_ns)
+        missed = "" if one.missed_releases is None else f", {one.missed_releases or 'none'} missed"
+        room = end - x > 330  # noqa: PLR2004
+        if room:
+            parts.append(svg.label(end, 14, f"next release{missed}", css="strong", anchor="middle"))
+        parts.append(svg.path(f"M{svg.number(end - 4)} 18h8l-4 6z", css="arrow"))
+    return "".join(parts)

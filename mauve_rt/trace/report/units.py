@@ -1,0 +1,59 @@
+"""Times and counts as a person reads them: three digits, a unit, no ambiguity."""
+
+_NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
+_UNITS = ((1, "ns"), (1_000, "\N{MICRO SIGN}s"), (1_000_000, "ms"), (1_000_000_000, "s"))
+_MINUTE_NS = 60_000_000_000
+_LONGEST_IN_SECONDS_NS = 2 * _MINUTE_NS
+_TENS, _HUNDREDS, _THOUSANDS = 10, 100, 1000
+
+
+def time_text(time_ns: float | None) -> str:
+    """Return a time with its unit, e.g. 12.3 µs; a dash for None."""
+    if time_ns is None:
+        return "\N{EN DASH}"
+    if time_ns == 0:
+        return f"0{_NARROW_SPACE}\N{MICRO SIGN}s"
+    size_ns = abs(time_ns)
+    sign = "\N{MINUS SIGN}" if time_ns < 0 else ""
+    if size_ns >= _LONGEST_IN_SECONDS_NS:
+        minutes, rest_ns = divmod(size_ns, _MINUTE_NS)
+        return f"{sign}{int(minutes)}{_NARROW_SPACE}min {rest_ns / 1e9:.0f}{_NARROW_SPACE}s"
+    factor, unit = next(pair for pair in reversed(_UNITS) if size_ns >= pair[0] or pair[0] == 1)
+    return f"{sign}{digits(size_ns / factor)}{_NARROW_SPACE}{unit}"
+
+
+def digits(value: float) -> str:
+    """Return a number of at least three digits; whole numbers below a thousand stay whole."""
+    if value == int(value) and value < _THOUSANDS:
+        return f"{int(value)}"
+    decimals = 2 if value < _TENS else 1 if value < _HUNDREDS else 0
+    return f"{value:,.{decimals}f}"
+
+
+def share_text(share: float) -> str:
+    """Return a share as per cent: 12.3 %; what is not nothing never reads 0."""
+    percent = 100 * share
+    if 0 < percent < 0.01:  # noqa: PLR2004
+        return f"<{_NARROW_SPACE}0.01{_NARROW_SPACE}%"
+    return f"{digits(percent)}{_NARROW_SPACE}%"
+
+
+def counted(count: int, what: str, plural: str = "") -> str:
+    """Return e.g. 1 overrun, 2 overruns, no overrun."""
+    if count == 0:
+        return f"no {what}"
+    return f"1 {what}" if count == 1 else f"{count:,} {plural or what + 's'}"
+
+
+def times(count: int) -> str:
+    """Return once, 2 times, ..."""
+    return "once" if count == 1 else f"{count:,} times"
+
+
+def listed(words: list[str], *, limit: int = 6) -> str:
+    """Return a, b and c; of a long list its first and how many more there are."""
+    if len(words) > limit:
+        words = [*words[: limit - 1], f"{len(words) - limit + 1} more"]
+    if len(words) <= 1:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} and {words[-1]}"

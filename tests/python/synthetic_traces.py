@@ -1,0 +1,107 @@
+"""Traces of components that never ran, as their reader gives them."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mauve_rt.trace.records import RECORD, Kind, Records
+from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.trace import Loss, Trace
+
+MS = 1_000_000
+EPOCH_NS = 20 * MS
+PERIOD_NS = 10 * MS
+
+
+def trace_of(source: SyntheticSource) -> Trace:
+    """The trace of what was written into a source, without a bag in between."""
+    drain = source.drain_trace()
+    everything = np.frombuffer(drain.records, RECORD)
+    records = {
+        name: everything[everything["component"] == index] for index, name in enumerate(source.components)
+    }
+    losses = {
+        name: Loss(drain.written[index], len(records[name]), drain.dropped[index], drain.dropped[index])
+        for index, name in enumerate(source.components)
+    }
+    return Trace(records, tuple(source.trace_names()), losses, np.empty((0, 2), np.int64))
+
+
+def deploy(source: SyntheticSource, component: str, *, period_ns: int = PERIOD_NS) -> None:
+    """Write what a component's trace begins with."""
+    source.add(component, Kind.DEPLOYMENT, 0, a=EPOCH_NS, c=period_ns)
+    source.add(component, Kind.START, EPOCH_NS - MS, a=EPOCH_NS)
+
+
+def run(source: SyntheticSource, component: str, cycles: int, *, begin_ns: int = EPOCH_NS) -> int:
+    """Let a deployed component run for some periods; returns the pending instant."""
+    instant = begin_ns
+    for cycle in range(cycles):
+        instant = source.cycle(
+            component,
+            instant,
+            states={"sense": 200_000 + cycle % 7, "act": 300_000 + cycle % 11},
+            wait_ns=PERIOD_NS,
+            wakeup_ns=10_000 + cycle % 13,
+        )
+    return instant
+
+
+def overrun(source: SyntheticSource, component: str, instant_ns: int, *, late_ns: int = MS) -> int:
+    """Write a cycle whose state `act` took too long; returns the pending instant, after one skipped."""
+    late = instant_ns + PERIOD_NS + late_ns
+    source.add(component, Kind.RELEASE, instant_ns, name="wait", a=instant_ns, b=instant_ns)
+    source.add(component, Kind.STATE_BEGIN, instant_ns, name="act")
+    source.add(component, Kind.STATE_END, late, name="act")
+    source.add(component, Kind.OVERRUN, late, name="wait", a=instant_ns + PERIOD_NS, b=late, c=1)
+    source.add(component, Kind.WAIT, late, name="wait", a=instant_ns + 2 * PERIOD_NS)
+    return instant_ns + 2 * PERIOD_NS
+
+
+def swap(source: SyntheticSource, component: str, pending_ns: int, *, blackout_ns: int = 20_000) -> None:
+    """Replace a core half a period before the pending instant."""
+    parked = pending_ns - PERIOD_NS // 2
+    source.add(component, Kind.PARKED, parked, name="wait", a=pending_ns)
+    for phase, took_ns in ((1, 4_000), (2, 1_000)):
+        armed = parked + blackout_ns
+        source.add(component, Kind.RECONFIGURATION, armed, name="replace_core pkg/New", a=phase, b=took_ns)
+    source.add(component, Kind.ARMED, parked + blackout_ns, name="wait", a=pending_ns, b=1)
+
+
+def periodic_trace(components: Sequence[str] = ("c",), cycles: int = 50) -> Trace:
+    """Components that were never late."""
+    source = SyntheticSource(list(components))
+    for component in components:
+        deploy(source, component)
+        run(source, component, cycles)
+    return trace_of(source)
+
+
+def long_trace(components: Sequence[str], cycles: int, *, late: Iterable[int] = ()) -> Trace:
+    """Many cycles of six records, made by numpy: noisy times; the cycles in `late` overran."""
+    names = ("", "wait", "sense", "act")
+    kinds = (Kind.RELEASE, Kind.STATE_BEGIN, Kind.STATE_END, Kind.STATE_BEGIN, Kind.STATE_END, Kind.WAIT)
+    words = (1, 2, 2, 3, 3, 1)
+    records: dict[str, Records] = {}
+    for index, component in enumerate(components):
+        noise = np.random.default_rng(index)
+        nominal = EPOCH_NS + np.arange(cycles, dtype=np.int64) * PERIOD_NS
+        wakeup = noise.gamma(2, 8_000, cycles).astype(np.int64)
+        sense, act = (noise.gamma(6, mean, cycles).astype(np.int64) for mean in (40_000, 90_000))
+        rows = np.zeros((cycles, len(kinds)), RECORD)
+        rows["kind"], rows["name"], rows["component"] = kinds, words, index
+        ends = np.cumsum([nominal + wakeup, sense * 0, sense, act * 0, act, act * 0], axis=0).T
+        rows["time_ns"] = ends
+        rows["a"][:, 0], rows["b"][:, 0] = nominal, nominal + wakeup
+        rows["a"][:, -1] = nominal + PERIOD_NS
+        for cycle in late:
+            rows[cycle, -1]["kind"] = Kind.OVERRUN
+            rows[cycle, -1]["time_ns"] = nominal[cycle] + PERIOD_NS + MS // 10
+            rows[cycle, -1]["b"] = nominal[cycle] + PERIOD_NS + MS // 10
+        first = np.zeros(2, RECORD)
+        first["kind"], first["component"] = (Kind.DEPLOYMENT, Kind.START), index
+        first["a"], first["c"] = EPOCH_NS, (PERIOD_NS, 0)
+        records[component] = np.concatenate([first, rows.ravel()])
+        records[component]["sequence"] = np.arange(len(records[component]))
+    losses = {name: Loss(len(rows), len(rows), 0, 0) for name, rows in records.items()}
+    return Trace(records, names, losses, np.empty((0, 2), np.int64))

@@ -1,0 +1,152 @@
+"""The page as a whole: whatever the trace, it is one file, safe, and not too large."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic_traces import (
+    EPOCH_NS,
+    PERIOD_NS,
+    deploy,
+    long_trace,
+    overrun,
+    periodic_trace,
+    run,
+    swap,
+    trace_of,
+)
+
+from mauve_rt.trace.architecture import ComponentInfo, PortInfo
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.report import Card, Section, write_report
+from mauve_rt.trace.report.bags import bag_names
+from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.trace import Message, Trace
+
+HOSTILE = "</script><script>alert(1)</script><!--\"'&amp;"
+
+
+def page_of(trace: Trace, folder: Path, **more: object) -> str:
+    path = folder / "report.html"
+    write_report(path, trace, **more)  # type: ignore[arg-type]
+    return path.read_text(encoding="utf-8")
+
+
+def eventful_trace(name: str = "c") -> Trace:
+    source = SyntheticSource([name, "other"])
+    for component in source.components:
+        deploy(source, component)
+    run(source, "other", 80)
+    pending = overrun(source, name, run(source, name, 20))
+    swap(source, name, pending)
+    pending = run(source, name, 20, begin_ns=pending)
+    source.add(name, Kind.MARK, pending, name="the user's mark", a=2**62)
+    source.add(name, Kind.FAULT, pending, name="act")
+    return trace_of(source)
+
+
+def architecture(components: int) -> tuple[ComponentInfo, ...]:
+    """A ring of components, each writing what the next one reads, with a resource of all."""
+    return tuple(
+        ComponentInfo(
+            *(f"c{index}", "p/Shell", "p/Core", "p/Fsm", PERIOD_NS, 0, "SCHED_FIFO", index, (0, 1)),
+            (
+                PortInfo("out", "write", "p/T", f"data{index}", "write"),
+                PortInfo("in", "read", "p/T", f"data{(index - 1) % components}", "read"),
+                PortInfo("map", "call", "p/Map", "map", "get"),
+                PortInfo("free", "read", "p/T", "", ""),
+            ),
+        )
+        for index in range(components)
+    )
+
+
+def test_a_page_needs_nothing_but_itself(tmp_path: Path):
+    page = page_of(eventful_trace(), tmp_path)
+    assert page.startswith("<!DOCTYPE html>")
+    assert not re.search(r"(?:src|href)\s*=\s*[\"'](?!#|data:)", page)
+    assert not re.search(r"https?://|@import|url\(", page)
+    assert "default-src &#x27;none&#x27;" in page
+    for heading in (
+        "Timeline",
+        "Reconfigurations",
+        "Latencies and execution times",
+        "Architecture",
+        "Components",
+    ):
+        assert f"<h2>{heading}</h2>" in page
+
+
+def test_names_cannot_write_html(tmp_path: Path):
+    trace = eventful_trace(HOSTILE)
+    names = tuple(f"{name}{HOSTILE}" for name in trace.names)
+    info = replace(architecture(1)[0], name=HOSTILE, core=HOSTILE)
+    info = replace(info, ports=(PortInfo(HOSTILE, "read", HOSTILE, HOSTILE, HOSTILE),))
+    event = SimpleNamespace(
+        success=True, requested_by=HOSTILE, cause=HOSTILE, request=HOSTILE, from_core=HOSTILE,
+        to_core=HOSTILE, report=[SimpleNamespace(component=HOSTILE.rpartition("/")[2], prepare_ns=1)],
+    )  # fmt: skip
+    message = Message("/a/executor/events", 0, EPOCH_NS + 30 * PERIOD_NS, event)
+    page = page_of(
+        replace(trace, names=names, architecture=(info,)),
+        tmp_path,
+        title=HOSTILE,
+        extra=[Section(HOSTILE, "", note=HOSTILE, anchor=HOSTILE)],
+        figures=[Card(HOSTILE, HOSTILE)],
+        events=[message],
+    )
+    assert "<script>alert" not in page
+    assert page.count("</script>") == 3  # of our own: description, columns, program
+    assert "<!--" not in page
+
+
+@pytest.mark.parametrize(
+    "trace",
+    [
+        Trace({}, (), {}, np.empty((0, 2), np.int64)),
+        trace_of(SyntheticSource(["silent"])),
+        periodic_trace(cycles=1),
+        periodic_trace([f"component_{index}" for index in range(60)], 5),
+        replace(periodic_trace([f"c{index}" for index in range(30)], 5), architecture=architecture(30)),
+        replace(periodic_trace(["c0"], 5), architecture=architecture(5)),
+    ],
+    ids=["empty", "no record", "one release", "60 components", "30 connected", "more told than recorded"],
+)
+def test_any_trace_gives_a_page(trace: Trace, tmp_path: Path):
+    page = page_of(trace, tmp_path)
+    assert all(name in page for name in trace.components)
+    shown = re.sub(r"<script>.*</script>", "", page, flags=re.DOTALL)
+    assert not re.search(r"\b(?:NaN|nan|inf|Infinity)\b", shown)
+
+
+def test_a_sporadic_component_is_named_so(tmp_path: Path):
+    source = SyntheticSource(["events"])
+    deploy(source, "events", period_ns=0)
+    pending = run(source, "events", 5)
+    swap(source, "events", pending)
+    run(source, "events", 5, begin_ns=pending)
+    page = page_of(trace_of(source), tmp_path)
+    assert "sporadic" in page
+    assert "It is triggered by events: it has no grid to miss" in page
+
+
+def test_sections_of_others_stand_in_front(tmp_path: Path):
+    page = page_of(periodic_trace(), tmp_path, extra=[Section("The map", "<p>here</p>", anchor="map")])
+    assert page.index("<h2>The map</h2>") < page.index("<h2>Timeline</h2>")
+    assert '<a href="#map">The map</a>' in page
+
+
+def test_a_long_trace_stays_small(tmp_path: Path):
+    trace = long_trace(["a", "b", "c", "d"], 8_000, late=[4_000])  # a fifth of a million records
+    fixed = len(page_of(periodic_trace(["a", "b", "c", "d"], 5), tmp_path))
+    assert len(page_of(trace, tmp_path)) - fixed < 20e6 / 5
+    assert len(page_of(trace, tmp_path, budget=10_000)) - fixed < 0.3e6
+
+
+def test_bags_are_named_by_what_tells_them_apart():
+    assert bag_names([Path("/out/bag/robot_1"), Path("/out/bag/robot_2")]) == ["robot_1", "robot_2"]
+    assert bag_names([Path("/a/bag"), Path("/b/bag")]) == ["a_bag", "b_bag"]
+    assert bag_names([Path("/a/x_0.mcap")]) == ["x_0"]

@@ -1,0 +1,154 @@
+"""The verdict on traces whose course is known: nothing is said that they do not prove."""
+
+from dataclasses import replace
+
+import numpy as np
+from synthetic_traces import (
+    EPOCH_NS,
+    MS,
+    PERIOD_NS,
+    deploy,
+    overrun,
+    periodic_trace,
+    run,
+    swap,
+    trace_of,
+)
+
+from mauve_rt.trace.architecture import ComponentInfo
+from mauve_rt.trace.records import Kind
+from mauve_rt.trace.report import Verdict, judge
+from mauve_rt.trace.report.analysis import analyse
+from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.trace import Trace
+
+
+def verdict_on(trace: Trace) -> Verdict:
+    return judge(analyse(trace))
+
+
+def said(verdict: Verdict) -> str:
+    text = " ".join(sentence.text for sentence in verdict.sentences)
+    return text.replace("\N{NARROW NO-BREAK SPACE}", " ")
+
+
+def test_a_punctual_trace_is_good():
+    found = verdict_on(periodic_trace(("a", "b"), 50))
+    assert (found.level, found.headline) == ("good", "The timing held: no overrun, no fault.")
+    assert "2 components" in said(found)
+    assert "none was lost" in said(found)
+    assert "No overrun in 100 releases" in said(found)
+    assert "Nothing was reconfigured" in said(found)
+
+
+def test_overruns_name_the_component_and_what_took_the_time():
+    source = SyntheticSource(["good", "late"])
+    for component in source.components:
+        deploy(source, component)
+    run(source, "good", 1000)
+    overrun(source, "late", run(source, "late", 1000))
+    found = verdict_on(trace_of(source))
+    assert (found.level, found.headline) == ("attention", "The timing held, but for 1 overrun.")
+    assert "late overran once" in said(found)
+    assert "skipped 1 instant; in that cycle its state act took longest, 11 ms" in said(found)
+    assert "good had no overrun" in said(found)
+
+
+def test_a_late_wake_up_is_not_blamed_on_a_state():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    source.add("c", Kind.RELEASE, EPOCH_NS + 12 * MS, name="wait", a=EPOCH_NS, b=EPOCH_NS + 12 * MS)
+    late = EPOCH_NS + 12 * MS + 5
+    source.add("c", Kind.OVERRUN, late, name="wait", a=EPOCH_NS + PERIOD_NS, b=late, c=1)
+    assert "the wake-up itself took longest, 12 ms" in said(verdict_on(trace_of(source)))
+
+
+def test_overruns_as_a_habit_are_bad():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    instant = EPOCH_NS
+    for _ in range(10):
+        instant = overrun(source, "c", run(source, "c", 5, begin_ns=instant))
+    found = verdict_on(trace_of(source))
+    assert (found.level, found.headline) == ("bad", "The timing did not hold: 10 overruns.")
+
+
+def test_a_swap_that_cost_nothing_is_told_with_its_figures():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 20)
+    swap(source, "c", pending)
+    run(source, "c", 20, begin_ns=pending)
+    found = verdict_on(trace_of(source))
+    assert found.level == "good"
+    assert "1 reconfiguration without a missed release" in found.headline
+    assert "1 reconfiguration of c; the blackout lasted 20 \N{MICRO SIGN}s." in said(found)
+    assert "on the grid of the deployment, and came at most 10 \N{MICRO SIGN}s after it" in said(found)
+
+
+def test_missed_releases_and_a_lost_phase_are_told():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 20)
+    swap(source, "c", pending)
+    run(source, "c", 20, begin_ns=pending + 2 * PERIOD_NS + 3)
+    found = verdict_on(trace_of(source))
+    assert found.level == "bad"
+    assert found.headline == (
+        "The timing did not hold: 2 releases missed in reconfigurations and a phase that was not kept."
+    )
+    assert "1 left the component off its grid, by up to 3 ns" in said(found)
+
+
+def test_a_fault_is_bad():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    run(source, "c", 3)
+    source.add("c", Kind.FAULT, EPOCH_NS + 50 * MS, name="act")
+    found = verdict_on(trace_of(source))
+    assert (found.level, found.headline) == ("bad", "The timing did not hold: 1 fault.")
+    assert "c was parked faulted in its state act, 70 ms after the begin." in said(found)
+
+
+def test_lost_records_make_every_count_a_lower_bound():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 20)
+    source.drop("c", 7)
+    run(source, "c", 20, begin_ns=pending + 5 * PERIOD_NS)
+    found = verdict_on(trace_of(source))
+    assert found.level == "attention"
+    assert found.headline == "Nothing was late in what was recorded, but records are missing."
+    assert "at least 7 more were lost" in said(found)
+    assert "No overrun in 40 releases that were recorded" in said(found)
+    assert "Records of c are missing: their counts here are lower bounds" in said(found)
+
+
+def test_without_releases_nothing_is_proved():
+    for trace in (
+        Trace({}, (), {}, np.empty((0, 2), np.int64)),
+        trace_of(SyntheticSource(["c"])),
+    ):
+        found = verdict_on(trace)
+        assert found.level == "attention"
+        assert found.headline == "This trace proves nothing about timing: it holds no release."
+
+
+def test_of_a_sporadic_component_no_phase_is_claimed():
+    source = SyntheticSource(["events"])
+    deploy(source, "events", period_ns=0)
+    pending = run(source, "events", 5)
+    swap(source, "events", pending)
+    run(source, "events", 5, begin_ns=pending)
+    found = said(verdict_on(trace_of(source)))
+    assert "events is event-triggered: phase and missed releases do not apply" in found
+    assert "grid" not in found
+    assert "missed a release" not in found
+    assert "Of 1 no missed releases can be told" in found
+
+
+def test_ordinary_scheduling_is_not_hidden():
+    info = ComponentInfo("c", "p/S", "p/C", "p/F", PERIOD_NS, 0, "SCHED_OTHER", 0, (), ())
+    found = verdict_on(replace(periodic_trace(), architecture=(info,)))
+    assert found.level == "attention"
+    assert "Without real-time scheduling (SCHED_OTHER): c." in said(found)
