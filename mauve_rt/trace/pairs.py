@@ -11,7 +11,8 @@ Indices = npt.NDArray[np.intp]
 def gaps(records: Records) -> npt.NDArray[np.bool_]:
     """Tell of each record whether others are missing before it. The first has nothing before it."""
     found = np.zeros(len(records), np.bool_)
-    found[1:] = np.diff(records["sequence"].astype(np.int64)) != 1
+    sequence = np.ascontiguousarray(records["sequence"])
+    found[1:] = sequence[1:] != sequence[:-1] + np.uint64(1)
     return found
 
 
@@ -19,9 +20,10 @@ def following(
     records: Records, first: Kind, then: tuple[Kind, ...], unless: tuple[Kind, ...]
 ) -> tuple[Indices, Indices]:
     """Each record of kind `first` with the next of kind `then`, unless `unless` or a gap is in between."""
-    (starts,) = np.nonzero(records["kind"] == first)
-    (ends,) = np.nonzero(np.isin(records["kind"], then))
-    passed = np.cumsum(np.isin(records["kind"], unless) | gaps(records))
+    kinds = np.ascontiguousarray(records["kind"])
+    (starts,) = np.nonzero(kinds == first)
+    (ends,) = np.nonzero(np.isin(kinds, then))
+    passed = np.cumsum(np.isin(kinds, unless) | gaps(records))
     found = np.searchsorted(ends, starts)
     starts, found = starts[found < len(ends)], found[found < len(ends)]
     matches = ends[found]

@@ -219,14 +219,15 @@ def _check_layout(scan: McapScan, channel: Channel) -> None:
 def _per_component(
     batches: Sequence[Batch], components: tuple[str, ...]
 ) -> tuple[dict[str, Records], dict[str, Loss]]:
-    parts: dict[int, list[Records]] = {}
+    parts: dict[int, list[memoryview]] = {}
     for batch in batches:
         rows = np.frombuffer(batch.records, RECORD)
         numbers = rows["component"]
         cuts = [0, *(np.flatnonzero(numbers[1:] != numbers[:-1]) + 1).tolist(), len(rows)]
         for begin, end in pairwise(cuts):
             if end > begin:
-                parts.setdefault(int(numbers[begin]), []).append(rows[begin:end])
+                data = memoryview(batch.records)[begin * RECORD.itemsize : end * RECORD.itemsize]
+                parts.setdefault(int(numbers[begin]), []).append(data)
     first = min(batches, key=lambda batch: batch.monotonic_ns)
     last = max(batches, key=lambda batch: batch.monotonic_ns)
     known = max(len(last.written), *(number + 1 for number in parts), len(components))
@@ -234,8 +235,7 @@ def _per_component(
     records: dict[str, Records] = {}
     losses: dict[str, Loss] = {}
     for number, name in enumerate(names):
-        rows = np.concatenate(parts.get(number, [np.empty(0, RECORD)]))
-        rows = _in_order(rows)
+        rows = _in_order(np.frombuffer(bytearray().join(parts.pop(number, [])), RECORD))
         loss = _loss(rows, number, first, last)
         if name in records:  # removed and added again: the same component's next life
             rows = np.concatenate([records[name], rows])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mauve_rt.trace.pairs import following, nested
+from mauve_rt.trace.pairs import Indices, following, nested
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.records import Kind, Records
 from mauve_rt.trace.trace import Trace
@@ -73,9 +73,10 @@ def component_statistics(trace: Trace, component: str) -> ComponentStatistics:
 
     """
     records = trace.of(component)
-    releases = records[records["kind"] == Kind.RELEASE]
-    overruns = records[records["kind"] == Kind.OVERRUN]
-    contended = records[records["kind"] == Kind.CONTENDED]
+    kinds = np.ascontiguousarray(records["kind"])
+    (releases,) = np.nonzero(kinds == Kind.RELEASE)
+    overruns = records[kinds == Kind.OVERRUN]
+    contended = records[kinds == Kind.CONTENDED]
     grids = trace.deployments(component)
     states = state_spans(records)
     duration_ns = int(np.ptp(records["time_ns"])) if len(records) else 0
@@ -87,8 +88,8 @@ def component_statistics(trace: Trace, component: str) -> ComponentStatistics:
         releases=len(releases),
         overruns=len(overruns),
         skipped=int(overruns["c"].sum()),
-        faults=int(np.count_nonzero(records["kind"] == Kind.FAULT)),
-        wakeup=distribution(releases["b"] - releases["a"]),
+        faults=int(np.count_nonzero(kinds == Kind.FAULT)),
+        wakeup=distribution(records["b"][releases] - records["a"][releases]),
         response=distribution(response_times(records)),
         phase_error=distribution(_phase_errors(trace, component, records)),
         execution=_by_name(trace, states["name"], _lengths(states)),
@@ -117,26 +118,27 @@ def distribution(values: Values) -> Distribution:
 
 def response_times(records: Records) -> Values:
     """Of each release of one component: entry of its next wait - its nominal instant; ns, in order."""
-    release, following = pairs(records, Kind.RELEASE, (Kind.WAIT, Kind.OVERRUN), (Kind.RELEASE, Kind.STOP))
-    return np.asarray(following["time_ns"] - release["a"], np.int64)
+    then, unless = (Kind.WAIT, Kind.OVERRUN), (Kind.RELEASE, Kind.STOP)
+    releases, waits = following(records, Kind.RELEASE, then, unless)
+    return np.asarray(records["time_ns"][waits] - records["a"][releases], np.int64)
 
 
 def state_spans(records: Records) -> Spans:
     """Executions of states of one component, in order."""
-    return _spans(*pairs(records, Kind.STATE_BEGIN, (Kind.STATE_END,), (Kind.STATE_BEGIN,)))
+    return _spans(records, *following(records, Kind.STATE_BEGIN, (Kind.STATE_END,), (Kind.STATE_BEGIN,)))
 
 
 def service_spans(records: Records) -> Spans:
     """Calls of services by one component, in order; those within others too."""
-    begins, ends = nested(records, Kind.SERVICE_BEGIN, Kind.SERVICE_END)
-    return _spans(records[begins], records[ends])
+    return _spans(records, *nested(records, Kind.SERVICE_BEGIN, Kind.SERVICE_END))
 
 
-def _spans(begin: Records, end: Records) -> Spans:
-    same = begin["name"] == end["name"]
-    spans: Spans = np.empty(np.count_nonzero(same), SPAN)
-    spans["name"], spans["begin_ns"] = begin["name"][same], begin["time_ns"][same]
-    spans["end_ns"] = end["time_ns"][same]
+def _spans(records: Records, begins: Indices, ends: Indices) -> Spans:
+    names, times = records["name"], records["time_ns"]  # views: no record is copied whole
+    same = names[begins] == names[ends]
+    begins, ends = begins[same], ends[same]
+    spans: Spans = np.empty(len(begins), SPAN)
+    spans["name"], spans["begin_ns"], spans["end_ns"] = names[begins], times[begins], times[ends]
     return spans
 
 
@@ -145,19 +147,14 @@ def _lengths(spans: Spans) -> Values:
     return lengths
 
 
-def pairs(
-    records: Records, first: Kind, then: tuple[Kind, ...], unless: tuple[Kind, ...]
-) -> tuple[Records, Records]:
-    """Each record of kind `first` with the next of kind `then`, unless `unless` or a gap is in between."""
-    starts, matches = following(records, first, then, unless)
-    return records[starts], records[matches]
-
-
-def _releases_of_initial_state(records: Records) -> Records:
-    """Releases into the initial state (the one begun first after a start): only these are on the grid."""
-    _, first = pairs(records, Kind.START, (Kind.STATE_BEGIN,), (Kind.STOP,))
-    release, begun = pairs(records, Kind.RELEASE, (Kind.STATE_BEGIN,), (Kind.RELEASE, Kind.STOP))
-    return release[np.isin(begun["name"], first["name"])] if len(first) else release
+def _releases_of_initial_state(records: Records) -> Values:
+    """Actual releases into the initial state, begun first after a start: only these are on the grid."""
+    names, actual = records["name"], records["b"]
+    _, first = following(records, Kind.START, (Kind.STATE_BEGIN,), (Kind.STOP,))
+    if not len(first):
+        return np.asarray(actual[records["kind"] == Kind.RELEASE], np.int64)
+    releases, begun = following(records, Kind.RELEASE, (Kind.STATE_BEGIN,), (Kind.RELEASE, Kind.STOP))
+    return np.asarray(actual[releases[np.isin(names[begun], np.unique(names[first]))]], np.int64)
 
 
 def _by_name(trace: Trace, names: npt.NDArray[np.uint32], values: Values) -> dict[str, Distribution]:
@@ -173,7 +170,7 @@ def _phase_errors(trace: Trace, component: str, records: Records) -> Values:
     for index, grid in enumerate(grids):
         begin = grid.time_ns if index else np.iinfo(np.int64).min
         end = grids[index + 1].time_ns if index + 1 < len(grids) else np.iinfo(np.int64).max
-        actual = releases["b"][(releases["b"] >= begin) & (releases["b"] < end)]
+        actual = releases[(releases >= begin) & (releases < end)]
         half = grid.period_ns // 2
         errors.append((actual - grid.epoch_ns - grid.offset_ns + half) % grid.period_ns - half)
     return np.concatenate(errors or [np.empty(0, np.int64)])
