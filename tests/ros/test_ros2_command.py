@@ -60,12 +60,12 @@ def test_bad_usage_and_help(environment: dict[str, str]) -> None:
 
 
 def test_verbs_are_completed(environment: dict[str, str], tmp_path: Path) -> None:
-    line = "ros2 mauve re"
+    line = "ros2 mauve rep"
     asked = {"_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE_IFS": " "}
     program = tmp_path / "completions"
     asked |= {"_ARGCOMPLETE_STDOUT_FILENAME": str(program)}
     _run(ROS2, environment={**environment, **asked})
-    assert program.read_text().split() == ["reconfigure", "replace-core"]
+    assert program.read_text().split() == ["replace-core", "report"]
 
 
 def test_ros2_run_starts_an_executor(architecture: Path, graph: Any, environment: dict[str, str]) -> None:
