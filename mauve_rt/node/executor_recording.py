@@ -59,7 +59,7 @@ class Recording:
     | ---------------- | ---------------- | --------------- |
     | `_recorder`      | start(), stop()  | exchanged whole |
     | `_subscriptions` | start(), stop()  | `_lock`         |
-    | `_error`         | the recorder     | exchanged whole |
+    | `_last`          | stop()           | exchanged whole |
     """
 
     def __init__(
@@ -73,7 +73,6 @@ class Recording:
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
         self._last: RecordingStatus | None = None
-        self._error = ""
         self._subscriptions: list[Any] = []
 
     def start(self, bag: Path, topics: Sequence[str], *, split: Split) -> Path:
@@ -93,19 +92,17 @@ class Recording:
         chosen = [self._chosen(topic) for topic in topics]
         with self._lock:
             self.stop()
-            self._error = ""
             recorder = Recorder(
                 self._runtime.deployer,
                 bag.absolute(),
                 node_name=self._node.get_fully_qualified_name(),
                 split=split,
-                on_error=self._failed,
+                on_error=self._node.get_logger().error,
                 messages=self._bound,
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
             recorder.start(discard=self._runtime.active)
             self._recorder = recorder
-            self._bound.keep_messages(on=True)
             for topic in chosen:
                 self._subscribe(topic)
             return recorder.directory
@@ -119,7 +116,6 @@ class Recording:
             self._subscriptions.clear()
             if recorder is not None:
                 recorder.stop()
-                self._bound.keep_messages(on=False)
                 self._last = self.status()
                 self._recorder = None
             return self._last if recorder is not None else None
@@ -140,7 +136,7 @@ class Recording:
             recording=recorder.recording,
             messages=recorder.message_count,
             dropped=recorder.dropped_messages,
-            error=self._error,
+            error=recorder.error,
         )
 
     def record(self, topic: str, type_name: str, data: bytes, *, qos: QoSProfile | None = None) -> None:
@@ -158,10 +154,6 @@ class Recording:
 
     def _architecture(self, observed: Observed) -> bytes:
         return bytes(serialize_message(trace_architecture(self._runtime, observed)))
-
-    def _failed(self, text: str) -> None:
-        self._error = text
-        self._node.get_logger().error(text)
 
     def _chosen(self, topic: str) -> ChosenTopic:
         name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]

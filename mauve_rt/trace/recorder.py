@@ -47,6 +47,7 @@ class Recorder:
     | `_waiting` ...  | record(), the recorder thread  | `_lock`    |
     | `_dropped`      | record(), the recorder thread  | `_lock`    |
     | `_recording`    | start(), the recorder thread   | `_lock`    |
+    | `_error`        | the recorder thread            | `_lock`    |
     | `_architecture` | tell_architecture()            | `_lock`    |
     | `_bag`          | start(), the recorder thread   |            |
     """
@@ -94,6 +95,7 @@ class Recorder:
         self._waiting_bytes = 0
         self._dropped = 0
         self._recording = False
+        self._error = ""
         self._architecture = b""
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
@@ -108,6 +110,12 @@ class Recorder:
         """False before start(), after stop(), and after a failure."""
         with self._lock:
             return self._recording
+
+    @property
+    def error(self) -> str:
+        """Why it ended by itself; empty when it did not."""
+        with self._lock:
+            return self._error
 
     @property
     def message_count(self) -> int:
@@ -131,6 +139,8 @@ class Recorder:
         self._source.collect_trace(round(self._drain_period_s * 1e9))
         if discard:
             self._bag.discard(self._source.drain_trace())
+        if self._messages is not None:
+            self._messages.keep_messages(on=True)
         with self._lock:
             self._recording = True
         self._thread.start()
@@ -186,10 +196,13 @@ class Recorder:
         except Exception as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
             with self._lock:
                 self._recording = False
+                self._error = f"recording stopped: {error}"
             self._bag.abort()
-            self._report(f"recording stopped: {error}")
+            self._report(self._error)
         finally:
             self._source.collect_trace(0)
+            if self._messages is not None:
+                self._messages.keep_messages(on=False)
 
     def _write(self) -> None:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it

@@ -83,6 +83,9 @@ class SentMessage(NamedTuple):
 class MessageSource(Protocol):
     """Messages kept elsewhere until the recorder takes them."""
 
+    def keep_messages(self, *, on: bool) -> None:
+        """Keep them from now on, or no longer."""
+
     def take_messages(self) -> Sequence[SentMessage]:
         """What was sent or received since the last call."""
 
