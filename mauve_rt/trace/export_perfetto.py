@@ -84,7 +84,7 @@ def _write_executor(
 
 def _description(one: ComponentInfo) -> str:
     cpus = ", ".join(map(str, one.cpus)) or "any"
-    return f"{one.shell}, {one.core}, {one.fsm}; {one.policy} {one.priority}, CPU {cpus}"
+    return f"{one.shell}, {one.core}, {one.fsm}; priority {one.priority} {one.policy}, CPU {cpus}"
 
 
 def _write_request(file: PacketFile, process: int, request: Request) -> None:

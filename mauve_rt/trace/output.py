@@ -17,7 +17,7 @@ def new_file(path: Path, *, force: bool = False) -> Iterator[Path]:
         TraceError: something is there already (a file, with `force`, is replaced), or the system refuses.
 
     """
-    with _unfinished(path, force=force, taken=path.is_dir()) as place:
+    with _unfinished(path, force=force, folder=False) as place:
         yield place
         place.replace(path)
 
@@ -32,7 +32,7 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
         TraceError: as new_file.
 
     """
-    with _unfinished(path, force=force, taken=path.exists() and not path.is_dir()) as place:
+    with _unfinished(path, force=force, folder=True) as place:
         place.mkdir()
         yield place
         if path.exists():
@@ -43,20 +43,29 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def _unfinished(path: Path, *, force: bool, taken: bool) -> Iterator[Path]:
-    if path.exists() and (taken or not force):
-        remedy = "choose another name" if taken else "remove it, replace it by --force or choose another name"
-        what = "a folder" if path.is_dir() else "a file"
-        raise TraceError(f"{path}: {what} of this name exists already; {remedy} (--out)")
-    place = path.with_name(f".{path.name}.{os.getpid()}")
+def _unfinished(path: Path, *, force: bool, folder: bool) -> Iterator[Path]:
     try:
-        yield place
+        whole = path.resolve()  # "." has no name
+        if path.exists():
+            _check_replaceable(path, force=force, folder=folder)
+        place = whole.with_name(f".{whole.name}.{os.getpid()}")
+        try:
+            yield place
+        finally:
+            if place.is_dir():
+                shutil.rmtree(place, ignore_errors=True)
+            else:
+                place.unlink(missing_ok=True)
     except OSError as error:
         raise TraceError(
             f"{path}: cannot be written ({error.strerror}); choose another place (--out)"
         ) from error
-    finally:
-        if place.is_dir():
-            shutil.rmtree(place, ignore_errors=True)
-        else:
-            place.unlink(missing_ok=True)
+
+
+def _check_replaceable(path: Path, *, force: bool, folder: bool) -> None:
+    fits = path.is_dir() == folder and bool(path.resolve().name)
+    if fits and force:
+        return
+    what = "a folder" if path.is_dir() else "a file"
+    remedy = "remove it, replace it by --force or choose another name" if fits else "choose another name"
+    raise TraceError(f"{path}: {what} of this name exists already; {remedy} (--out)")

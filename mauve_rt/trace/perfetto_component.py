@@ -10,7 +10,7 @@ from mauve_rt.trace.perfetto_swaps import Swap
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.trace import Trace
 
-_TOLD_EVERY = 1 << 14  # records
+_AT_ONCE = 1 << 15  # records that are Python's objects at a time
 _FIGURES = {  # what a, b, c of a record are called
     Kind.DEPLOYMENT: ("epoch_ns", "offset_ns", "period_ns"),
     Kind.START: ("first_instant_ns",),
@@ -54,17 +54,20 @@ class ComponentTrack:
         }
         missing = gaps(self._rows)
         (drawn,) = np.nonzero((self._rows["kind"] != Kind.WAIT) | missing)
-        rows = self._rows[drawn]
-        columns = [rows[name].tolist() for name in ("kind", "time_ns", "name", "a", "b", "c")]
-        for index, lost, kind, *fields in zip(drawn.tolist(), missing[drawn].tolist(), *columns, strict=True):
-            if lost:
-                self._tell_loss(index)
-            if kind in draw:
-                draw[kind](index, *fields)
-            elif kind in _FIGURES:
-                self._happen(Kind(kind), index, *fields)
-            if index % _TOLD_EVERY == 0:
-                progress(index)
+        for begin in range(0, len(drawn), _AT_ONCE):
+            some = drawn[begin : begin + _AT_ONCE]
+            rows = self._rows[some]
+            columns = [rows[name].tolist() for name in ("kind", "time_ns", "name", "a", "b", "c")]
+            for index, lost, kind, *fields in zip(
+                some.tolist(), missing[some].tolist(), *columns, strict=True
+            ):
+                if lost:
+                    self._tell_loss(index)
+                if kind in draw:
+                    draw[kind](index, *fields)
+                elif kind in _FIGURES:
+                    self._happen(Kind(kind), index, *fields)
+            progress(int(some[-1]))
         self._end_all(int(self._rows["time_ns"][-1]) if len(self._rows) else 0)
 
     def _release(

@@ -94,7 +94,9 @@ def test_several_bags_are_one_trace() -> None:
     }
 
 
-def test_what_is_there_stays_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_there_stays_unless_forced(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     bag = make_bag("bag")
     for out, words in ((Path("a"), []), (Path("b"), ["--format", "csv"])):
         command = ["trace", "export", bag, "--out", str(out), *words]
@@ -105,6 +107,9 @@ def test_what_is_there_stays_unless_forced(capsys: pytest.CaptureFixture[str]) -
             (out / "mine.txt").write_text("stays", encoding="utf-8")
             (out / "states.csv").write_text("goes", encoding="utf-8")
         assert main([*command, "--force"]) == 0
+    monkeypatch.chdir("b")
+    assert main(["trace", "export", bag, "--format", "csv", "--out", ".", "--force"]) == 0
+    monkeypatch.chdir("..")
     assert Path("b/mine.txt").read_text(encoding="utf-8") == "stays"
     assert len(table(Path("b/states.csv"))) == 1
 
@@ -118,6 +123,8 @@ def test_what_cannot_be_exported_is_said_in_one_line(capsys: pytest.CaptureFixtu
         (["missing"], "not there"),
         ([bag, "--out", "nowhere/x"], "nowhere/x: cannot be written (No such file or directory)"),
         ([bag, "--format", "csv", "--out", "nowhere/x"], "nowhere/x: cannot be written"),
+        ([bag, "--out", "x" * 300], "cannot be written (File name too long)"),
+        ([bag, "--format", "csv", "--out", "/", "--force"], "/: a folder of this name exists already"),
         ([bag, bag], "another one is named bag, too"),
         ([bag, elsewhere], "different monotonic clocks"),
     ):
