@@ -20,6 +20,8 @@ class Swap(NamedTuple):
 
     measured: Reconfiguration
     request: Request | None
+    changed_ns: int
+    """When adopt and take were over, by the first record after them; the park's time without one."""
 
 
 class Fault(NamedTuple):
@@ -96,12 +98,26 @@ def analyse(
         statistics=statistics,
         releases=releases,
         slices=slices,
-        swaps=[Swap(*pair) for pair in zip(measured, requests, strict=True)],
+        swaps=[Swap(*one) for one in zip(measured, requests, _changed_ns(trace, measured), strict=True)],
         faults=_faults(trace),
         begin_ns=begin_ns,
         end_ns=end_ns,
         zero_ns=begin_ns if zero_ns is None else zero_ns,
     )
+
+
+def _changed_ns(trace: Trace, measured: list[Reconfiguration]) -> list[int]:
+    times = {
+        component: trace.of(component, Kind.RECONFIGURATION)["time_ns"]
+        for component in {one.component for one in measured}
+    }
+    found = []
+    for one in measured:
+        of_component = times[one.component]
+        at = int(np.searchsorted(of_component, one.parked_ns))
+        told = at < len(of_component) and of_component[at] <= one.armed_ns
+        found.append(int(of_component[at]) if told else one.parked_ns)
+    return found
 
 
 def _extent(trace: Trace) -> tuple[int, int]:

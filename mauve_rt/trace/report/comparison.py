@@ -52,7 +52,7 @@ def _chosen(swaps: list[Swap]) -> list[Swap]:
 
 
 def _option(analysis: Analysis, swap: Swap) -> str:
-    one, request = swap
+    one, request, _ = swap
     what = swap_title(one.what, request.to_core if request else "")
     return f"{time_text(one.parked_ns - analysis.zero_ns)}  {one.component}: {what}"
 
@@ -61,7 +61,7 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
     one = swap.measured
     others = details("The other components meanwhile", bullets(neighbours_in_words(analysis, one)))
     phase = phase_figure(analysis, one)
-    wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout_figure(one)}{phase}</div>'
+    wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout_figure(swap)}{phase}</div>'
     has_others = len(analysis.trace.components) > 1
     return (
         f'<div class="swap" data-chosen="swap" data-value="{index}"{" hidden" if index else ""}>'
@@ -71,7 +71,7 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
 
 
 def _in_words(analysis: Analysis, swap: Swap) -> str:
-    one, request = swap
+    one, request, _ = swap
     due_ns = one.pending_ns - one.parked_ns
     text = f"{one.component} was parked for {time_text(one.blackout_ns)}"
     if due_ns > 0:

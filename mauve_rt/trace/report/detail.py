@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from mauve_rt.trace.report.cycles import Array, Times
 
-BUDGET = 400_000
-"""Entries (executions and releases) in a page: about 3 MB."""
+BUDGET = 600_000
+"""Entries (executions and releases) in a page: about 4 MB."""
 _KEPT_SHARE = 0.7
 _WIDEST_NS = 4_000_000_000
 _NARROWEST_NS = 1_000

@@ -15,6 +15,8 @@ import networkx as nx
 _SWEEPS = 16
 _GAP_X, _GAP_Y = 26.0, 46.0
 _DUMMY_WIDTH = 14.0
+_STRAIGHTNESS = (1.0, 2.0, 8.0)
+"""How much an edge wants to be vertical: between two boxes, a box and a dummy, two dummies."""
 
 Node = str
 Point = tuple[float, float]
@@ -153,32 +155,48 @@ def _spread(layout: _Layout) -> None:
         levels = range(len(layout.layers))
         for level in reversed(levels) if sweep % 2 else levels:
             layer = layout.layers[level]
-            wanted = [_mean_x(layout, node) for node in layer]
+            wanted = [_wanted_x(layout, node) for node in layer]
             gaps = [
                 (layout.width(one) + layout.width(following)) / 2 + _GAP_X
                 for one, following in pairwise(layer)
             ]
-            layout.x.update(zip(layer, _apart(wanted, gaps), strict=True))
+            layout.x.update(
+                zip(layer, _apart(wanted, [_pull(layout, node) for node in layer], gaps), strict=True)
+            )
 
 
-def _mean_x(layout: _Layout, node: Node) -> float:
-    around = [*layout.above.get(node, ()), *layout.below.get(node, ())]
-    return sum(layout.x[one] for one in around) / len(around) if around else layout.x[node]
+def _wanted_x(layout: _Layout, node: Node) -> float:
+    """Mean of the neighbours' places, those counting more with which it is part of one long edge."""
+    around = [(_weight(layout, node, one), layout.x[one]) for one in _neighbours(layout, node)]
+    total = sum(weight for weight, _ in around)
+    return sum(weight * x for weight, x in around) / total if around else layout.x[node]
 
 
-def _apart(wanted: list[float], gaps: list[float]) -> list[float]:
+def _pull(layout: _Layout, node: Node) -> float:
+    return sum(_weight(layout, node, one) for one in _neighbours(layout, node)) or 1.0
+
+
+def _neighbours(layout: _Layout, node: Node) -> list[Node]:
+    return [*layout.above.get(node, ()), *layout.below.get(node, ())]
+
+
+def _weight(layout: _Layout, one: Node, other: Node) -> float:
+    return _STRAIGHTNESS[(one not in layout.sizes) + (other not in layout.sizes)]
+
+
+def _apart(wanted: list[float], pulls: list[float], gaps: list[float]) -> list[float]:
     """Return the places nearest to the wanted ones that keep the gaps: pooling of adjacent violators."""
     offset = [0.0]
     for gap in gaps:
         offset.append(offset[-1] + gap)
-    blocks: list[tuple[float, int]] = []
-    for value, shift in zip(wanted, offset, strict=False):
-        total, count = value - shift, 1
-        while blocks and blocks[-1][0] / blocks[-1][1] > total / count:
+    blocks: list[tuple[float, float, int]] = []  # of each: sum of weighted places, of weights, how many
+    for value, weight, shift in zip(wanted, pulls, offset, strict=False):
+        total, weights, count = weight * (value - shift), weight, 1
+        while blocks and blocks[-1][0] / blocks[-1][1] > total / weights:
             before = blocks.pop()
-            total, count = total + before[0], count + before[1]
-        blocks.append((total, count))
-    pooled = [total / count for total, count in blocks for _ in range(count)]
+            total, weights, count = total + before[0], weights + before[1], count + before[2]
+        blocks.append((total, weights, count))
+    pooled = [total / weights for total, weights, count in blocks for _ in range(count)]
     return [value + shift for value, shift in zip(pooled, offset, strict=False)]
 
 

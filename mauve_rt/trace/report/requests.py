@@ -1,5 +1,6 @@
 """Who asked for a reconfiguration, and why: the executors' events, joined with what the trace measured."""
 
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,22 +25,31 @@ class Request:
 def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) -> list[Request | None]:
     """Return the request behind each reconfiguration; None where the bag does not tell.
 
-    `events` are messages of type ReconfigurationEvent as `Trace.messages` gives them, by time.
+    `events` are messages of type ReconfigurationEvent as `Trace.messages` gives them.
     """
-    told = [event for event in events if event.msg.success]
-    matches = (next((event for event in told if _tells_of(event, one)), None) for one in measured)
-    return [
-        None if match is None else _request(match.msg, one)
-        for one, match in zip(measured, matches, strict=True)
-    ]
+    told = sorted((event for event in events if event.msg.success), key=_time_ns)
+    return [_request_behind(one, told) for one in measured]
+
+
+def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> Request | None:
+    for index in range(bisect_left(told, one.armed_ns, key=_time_ns), len(told)):
+        event = told[index]
+        if event.monotonic_ns - one.armed_ns > _REPLY_WITHIN_NS:
+            break
+        if _tells_of(event, one):
+            return _request(event.msg, one)
+    return None
+
+
+def _time_ns(event: Any) -> int:
+    return int(event.monotonic_ns)
 
 
 def _tells_of(event: Any, one: Reconfiguration) -> bool:
     executor, _, component = one.component.rpartition("/")
     if executor and f"/{executor}/" not in event.topic:
         return False
-    late_ns = event.monotonic_ns - one.armed_ns
-    return 0 <= late_ns <= _REPLY_WITHIN_NS and any(s.component == component for s in event.msg.report)
+    return any(step.component == component for step in event.msg.report)
 
 
 def _request(event: Any, one: Reconfiguration) -> Request:

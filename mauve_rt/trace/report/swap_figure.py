@@ -8,7 +8,7 @@ import numpy as np
 from mauve_rt.trace.reconfigurations import Reconfiguration
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.report import svg
-from mauve_rt.trace.report.analysis import Analysis
+from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.scales import linear_ticks
 from mauve_rt.trace.report.units import counted, share_text, time_text
 
@@ -57,15 +57,16 @@ def grid_figure(analysis: Analysis, one: Reconfiguration) -> str:
     return svg.svg(WIDTH, height, "".join(parts), css="swap-grid", described=described)
 
 
-def blackout_figure(one: Reconfiguration) -> str:
+def blackout_figure(swap: Swap) -> str:
     """Draw the time from parked to armed, magnified."""
+    one = swap.measured
     margin_ns = max(one.blackout_ns * 0.25, 200)
     window = Window(one.parked_ns - margin_ns, one.armed_ns + margin_ns)
     top, height = 30.0, 96.0
     parts = [_axis(window, one.parked_ns, height - 22)]
     left, right = window.x(one.parked_ns), window.x(one.armed_ns)
     parts.append(svg.rect(left, top, right - left, 30, css="blackout solid", round_=3))
-    at_ns = float(one.armed_ns - one.adopt_ns - one.take_ns)
+    at_ns = float(max(one.parked_ns, swap.changed_ns - one.adopt_ns - one.take_ns))
     for phase, took_ns in (("adopt", one.adopt_ns), ("take", one.take_ns)):
         begin, end = window.x(at_ns), window.x(at_ns + took_ns)
         tip = f"{phase}: {time_text(took_ns)}"

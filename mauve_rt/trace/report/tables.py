@@ -179,7 +179,7 @@ def _time(value: int, found: Distribution) -> Cell:
 
 
 def _swap_row(analysis: Analysis, swap: Swap) -> tuple[object, ...]:
-    one, request = swap
+    one, request, _ = swap
     change = one.what if request is None else request.request or one.what
     if request is not None and request.to_core:
         change = " \N{RIGHTWARDS ARROW} ".join(

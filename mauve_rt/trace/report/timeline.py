@@ -133,9 +133,10 @@ def _swaps(analysis: Analysis) -> list[dict[str, Any]]:
             "armed": one.armed_ns - analysis.begin_ns,
             "adopt": one.adopt_ns,
             "take": one.take_ns,
+            "changed": changed_ns - analysis.begin_ns,
             "missed": one.missed_releases,
         }
-        for one, request in analysis.swaps
+        for one, request, changed_ns in analysis.swaps
     ]
 
 

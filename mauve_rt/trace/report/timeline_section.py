@@ -15,7 +15,8 @@ _JUMPS = (
     ("response", "Worst responses"),
 )
 _KEYS = (
-    ("release", "release"),
+    ("release", "release, nominal"),
+    ("latency", "wake-up latency"),
     ("overrun", "overrun"),
     ("fault", "fault"),
     ("stop", "stop"),

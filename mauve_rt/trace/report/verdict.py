@@ -147,12 +147,13 @@ def _latencies(analysis: Analysis) -> Iterator[Sentence]:
         f"The latest wake-up came {time_text(worst.wakeup.max_ns)} after its instant ({worst.component}); "
         f"the 99th percentile of its latencies is {time_text(worst.wakeup.p99_ns)}"
     )
-    phases = [one for one in released if one.phase_error.count and analysis.period_ns(one.component)]
-    if phases:
-        most = max(phases, key=lambda one: _off_ns(one) / analysis.period_ns(one.component))
-        share = share_text(_off_ns(most) / analysis.period_ns(most.component))
+    periodic = [one for one in released if one.phase_error.count]
+    # beyond half a period the nearest instant of the grid is another one: nothing would be said by it
+    if periodic and all(2 * one.wakeup.max_ns < one.period_ns for one in periodic):
+        most = max(periodic, key=lambda one: _off_ns(one) / one.period_ns)
         text += (
-            f". Against the grids of the deployment, no release was further off than {share} of its period "
+            ". Against the grids of the deployment, no release was further off than "
+            f"{share_text(_off_ns(most) / most.period_ns)} of its period "
             f"({most.component}, {time_text(_off_ns(most))})"
         )
     yield Sentence("", text + ".")

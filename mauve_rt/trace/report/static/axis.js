@@ -29,7 +29,7 @@
     const step = stepAtLeast(span / Math.max(most, 1));
     const times = [];
     for (let k = Math.ceil(begin / step); k * step <= end && times.length < 200; k++) times.push(k * step);
-    if (step >= 60e9) return { step, base: null, ticks: times.map((time) => ({ time, text: clockText(time) })) };
+    if (step >= 60e9) return { step, base: null, ticks: times.map((time) => ({ time, text: clockText(time) + NARROW + "min" })) };
     const [unit, factor] = step >= 1e8 ? ["s", 1e9] : step >= 1e5 ? ["ms", 1e6] : step >= 1e2 ? ["\u00b5s", 1e3] : ["ns", 1];
     const decimals = Math.max(0, Math.round(Math.log10(factor)) - Math.floor(Math.log10(step) + 1e-9));
     const format = (value) => (value / factor).toFixed(decimals).replace("-", "\u2212") + NARROW + unit;

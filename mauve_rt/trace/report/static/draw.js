@@ -5,6 +5,7 @@
   mauve.AXIS_HEIGHT = 46;
   const TICK = 7; // of a release, above the slices
   const LABEL_ROOM = 44;
+  const GRID_ROOM = 7; // px between instants of a component's grid from which they are drawn
   const PER_PIXEL = 0.34; // entries from which shares of time are drawn instead
 
   mauve.rowHeight = (count) => (count > 24 ? 34 : count > 12 ? 40 : 48);
@@ -129,11 +130,26 @@
     }
   }
 
+  // The instants at which the component was due, as the deployment recorded them: also those that it skipped.
+  function drawGrid(context, row, scale, top, bottom, colours) {
+    context.fillStyle = colours.line;
+    row.grids.forEach(function ([from, origin, period], index) {
+      if (period * scale.perNs < GRID_ROOM) return;
+      const until = index + 1 < row.grids.length ? row.grids[index + 1][0] : Infinity;
+      const begin = Math.max(scale.begin, index ? from : -Infinity, origin);
+      const end = Math.min(scale.time(scale.width), until);
+      for (let k = Math.ceil((begin - origin) / period); origin + k * period <= end; k++) {
+        const x = Math.round(scale.x(origin + k * period)) - 0.5;
+        for (let y = top - TICK; y < bottom; y += 4) context.fillRect(x, y, 1, 2);
+      }
+    });
+  }
+
   function drawReleases(context, row, scale, top, bottom, colours) {
     const track = row.releases;
     const [first, last] = entriesWithin(track, scale.begin, scale.time(scale.width));
-    context.fillStyle = colours.muted;
     if (last - first + 1 > scale.width * 0.25) {
+      context.fillStyle = colours.muted;
       context.globalAlpha = 0.55;
       let before = track.last(scale.begin);
       let until = -1; // x up to which a merged entry reaches
@@ -146,6 +162,8 @@
       context.globalAlpha = 1;
       return;
     }
+    drawGrid(context, row, scale, top, bottom, colours);
+    context.fillStyle = colours.muted;
     for (let i = first; i <= last; i++) {
       const x = scale.x(track.begin[i]);
       const merged = track.number[i] > 1;
@@ -243,6 +261,27 @@
     }
   }
 
+  // Adopt and take: how long they took is recorded, and an instant just after them.
+  function drawPhases(context, swap, scale, top, rowHeight, colours) {
+    let at = Math.max(swap.parked, swap.changed - swap.take - swap.adopt);
+    context.font = "600 11px system-ui, sans-serif";
+    context.textBaseline = "middle";
+    for (const phase of ["adopt", "take"]) {
+      const x = scale.x(at);
+      const width = Math.max(1.5, swap[phase] * scale.perNs);
+      context.fillStyle = colours.swap;
+      context.fillRect(x, top + 15, width, rowHeight - 22);
+      if (width > LABEL_ROOM) {
+        context.fillStyle = colours.panel;
+        context.fillText(phase, x + 6, top + rowHeight / 2 + 4);
+      }
+      at += swap[phase];
+    }
+    context.textBaseline = "alphabetic";
+    context.font = "600 11px system-ui, sans-serif";
+    context.fillStyle = colours.swap;
+  }
+
   function drawSwaps(context, model, scale, height, rowHeight, colours) {
     let free = -Infinity;
     context.font = "600 11px system-ui, sans-serif";
@@ -258,6 +297,7 @@
       context.globalAlpha = width > 3 ? 0.4 : 1;
       context.fillRect(x, top, width, rowHeight);
       context.globalAlpha = 1;
+      if (width > 24) drawPhases(context, swap, scale, top, rowHeight, colours);
       const from = Math.max(x, 0);
       polygon(context, [[from, 22], [from + 8, 26], [from, 30]]);
       if (from > free) {
@@ -295,8 +335,8 @@
   };
 
   // The whole trace, small: a strip per row, then what went wrong, then the reconfigurations.
-  mauve.drawOverview = function (context, model, width, height, colours) {
-    const scale = new Scale({ begin: 0, end: model.duration }, width);
+  mauve.drawOverview = function (context, model, whole, width, height, colours) {
+    const scale = new Scale(whole, width);
     context.clearRect(0, 0, width, height);
     const strip = (height - 6) / model.rows.length;
     model.rows.forEach(function (row, index) {

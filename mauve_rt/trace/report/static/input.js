@@ -52,8 +52,8 @@
   // Drag the brush, its edges, or a new one.
   function listenToOverview(timeline) {
     const box = timeline.overview.parentElement;
-    const duration = timeline.model.duration;
-    const time = (x) => (x / timeline.overview.clientWidth) * duration;
+    const { begin, end } = timeline.whole;
+    const time = (x) => begin + (x / timeline.overview.clientWidth) * (end - begin);
     let grip = null;
     const place = (event) => event.clientX - box.getBoundingClientRect().left;
     const part = function (x) {

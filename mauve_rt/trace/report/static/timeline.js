@@ -134,7 +134,7 @@
       const height = this.overview.clientHeight;
       if (!width) return;
       if (!this.overviewPicture) {
-        mauve.drawOverview(context, this.model, width, height, this.colours);
+        mauve.drawOverview(context, this.model, this.whole, width, height, this.colours);
         this.overviewPicture = document.createElement("canvas");
         this.overviewPicture.width = this.overview.width;
         this.overviewPicture.height = this.overview.height;
@@ -156,7 +156,8 @@
     // Where the view is in the overview.
     brush() {
       const width = this.overview.clientWidth;
-      const place = (time) => Math.min(Math.max((time / this.model.duration) * width, 0), width);
+      const span = this.whole.end - this.whole.begin;
+      const place = (time) => Math.min(Math.max(((time - this.whole.begin) / span) * width, 0), width);
       const left = place(this.view.begin);
       return { left: Math.min(left, width - 4), right: Math.max(place(this.view.end), left + 4) };
     }

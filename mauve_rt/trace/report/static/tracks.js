@@ -73,6 +73,7 @@
       return {
         name: row.name,
         period: row.period,
+        grids: row.grids,
         lost: row.lost,
         states: row.states.map(
           (s) => new mauve.StateTrack(s.name, columns[s.begin], columns[s.extent], columns[s.idle], columns[s.number])
