@@ -16,9 +16,7 @@ LINK_DOWN = "#f3d9d3"
 LINK_DOWN_INK = "#b3432b"
 UNION = "#37474f"
 ROBOTS = ("#1f6fb4", "#d9771f", "#2f8f5b", "#8a55b5", "#b8860b", "#c0417a")
-STATES = ("#4c8fc7", "#f0a23c", "#5bb08a", "#a983c9", "#d66a5e", "#8d99a3", "#c9b037", "#4fb3b8")
 DPI = 150
-MICROSECOND = "\N{MICRO SIGN}s"
 
 
 def robot_colour(index: int) -> str:
@@ -78,12 +76,6 @@ def save(figure: Figure, path: Path) -> None:
 def short(name: str | None) -> str:
     """Name of a core without its package."""
     return "another core" if name is None else name.rsplit("/", 1)[-1]
-
-
-def microseconds(time_ns: float) -> str:
-    """Return a time in microseconds with its unit, three digits at least."""
-    value = time_ns / 1e3
-    return f"{value:,.{2 if value < 10 else 1 if value < 100 else 0}f} {MICROSECOND}"  # noqa: PLR2004
 
 
 def core_changes(swaps: Iterable[Swap]) -> list[Swap]:

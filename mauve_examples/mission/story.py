@@ -1,12 +1,14 @@
 """A mission in words: the verdict, the figures to remember, what happened when."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mauve_examples.mission.evidence import CoverageHistory
 from mauve_examples.mission.facts import MissionFacts
-from mauve_examples.mission.figure_style import core_changes, microseconds, short
+from mauve_examples.mission.figure_style import core_changes, short
 from mauve_examples.mission.summary import union_growth
 from mauve_examples.mission.swaps import Swap
+from mauve_rt.trace.report import Card
+from mauve_rt.trace.report.units import time_text
 
 
 class Happening(NamedTuple):
@@ -14,13 +16,6 @@ class Happening(NamedTuple):
 
     time_s: float
     text: str
-
-
-class KeyFigure(NamedTuple):
-    """One number, large."""
-
-    value: str
-    meaning: str
 
 
 def verdict(facts: MissionFacts, swaps: dict[str, list[Swap]], *, success: bool) -> str:
@@ -37,39 +32,35 @@ def verdict(facts: MissionFacts, swaps: dict[str, list[Swap]], *, success: bool)
     return "The mission did not go as planned."
 
 
-def key_figures(
-    facts: MissionFacts, coverage: CoverageHistory, swaps: dict[str, list[Swap]]
-) -> list[KeyFigure]:
-    """Return the figures that tell most."""
-    every = [swap for found in swaps.values() for swap in found]
-    figures = [
-        KeyFigure(
-            f"{coverage.union[-1]:.1%}" if len(coverage.union) else "0 %", "of the reachable cells explored"
-        )
-    ]
+def key_figures(facts: MissionFacts, coverage: CoverageHistory) -> list[Card]:
+    """Return the mission's figures that tell most; those of its traces stand beside."""
+    union = coverage.union[-1] if len(coverage.union) else 0.0
+    figures = [Card(f"{union:.1%}", "of the reachable cells explored")]
     if facts.link_down_ns:
-        figures.append(KeyFigure(f"+{union_growth(facts, coverage):.1%}", "explored while the link was down"))
-    figures.append(KeyFigure(str(len(every)), "live reconfigurations"))
-    if every:
-        longest_ns = max(swap.measured.blackout_ns for swap in every)
-        figures.append(KeyFigure(microseconds(longest_ns), "longest blackout of a component"))
-    measured = [swap.measured.missed_releases for swap in every]
-    if measured and None not in measured:
-        figures.append(KeyFigure(str(sum(count or 0 for count in measured)), "releases missed by them"))
+        figures.append(Card(f"+{union_growth(facts, coverage):.1%}", "explored while the link was down"))
     if facts.simulation is not None:
         speed = f"{facts.simulation['speed_up']:.0f} \N{MULTIPLICATION SIGN}"
-        figures.append(KeyFigure(speed, "as fast as real time, simulated"))
-        return figures
-    figures.append(KeyFigure("yes" if facts.realtime["granted"] else "no", "real-time rights granted"))
+        figures.append(Card(speed, "as fast as real time, simulated"))
+    else:
+        granted = facts.realtime["granted"]
+        figures.append(
+            Card("yes" if granted else "no", "real-time rights granted", "" if granted else "attention")
+        )
     return figures
 
 
-def overrun_figure(summary: dict[str, Any]) -> list[KeyFigure]:
-    """Return how many releases of all components came too late to be on time."""
-    components = [one for robot in summary["robots"].values() for one in robot["components"].values()]
-    overruns = sum(one["overruns"] for one in components)
-    releases = sum(one["releases"] for one in components)
-    return [KeyFigure(f"{overruns:,}", f"overruns in {releases:,} releases")]
+def realtime_in_words(facts: MissionFacts) -> tuple[str, str]:
+    """Return whether times are of a machine, and of one with real-time rights: level and sentence."""
+    if facts.simulation is not None:
+        took = f"{facts.simulation['virtual_s']:.1f} s passed in {facts.simulation['wall_s']:.1f} s"
+        return "", (
+            f"Simulated time: {took}. Execution takes no longer than declared, so that times here are of the "
+            "model, not of a machine."
+        )
+    if facts.realtime["granted"]:
+        return "good", "Every real-time right that was asked for was granted."
+    missing = "; ".join(facts.realtime["missing"]) or "the executors did not say what is missing"
+    return "attention", f"Real time: not all rights were granted ({missing})."
 
 
 def cores_in_words(facts: MissionFacts, swaps: dict[str, list[Swap]]) -> list[str]:
@@ -129,14 +120,14 @@ def swap_in_words(swap: Swap) -> str:
 
 def _costs(swap: Swap) -> list[str]:
     one = swap.measured
-    costs = [f"parked for {microseconds(one.blackout_ns)}"]
-    if swap.prepare_us is not None:
-        costs.insert(0, f"prepared in {microseconds(swap.prepare_us * 1e3)} while the old core ran on")
+    costs = [f"parked for {time_text(one.blackout_ns)}"]
+    if swap.prepare_us:  # nothing in simulated time
+        costs.insert(0, f"prepared in {time_text(swap.prepare_us * 1e3)} while the old core ran on")
     if one.missed_releases is not None:
         costs.append(f"{one.missed_releases or 'no'} release{'s' * (one.missed_releases > 1)} missed")
     if one.phase_nominal_ns is not None and one.phase_actual_ns is not None:
-        off = microseconds(one.phase_nominal_ns)
+        off = time_text(one.phase_nominal_ns)
         grid = f"{off} off the grid" if one.phase_nominal_ns else "on the grid"
-        late = microseconds(one.phase_actual_ns - one.phase_nominal_ns)
+        late = time_text(one.phase_actual_ns - one.phase_nominal_ns)
         costs.append(f"next release {grid}, woken {late} after it")
     return costs

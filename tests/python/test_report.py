@@ -103,13 +103,16 @@ def test_coverage_is_that_of_the_robots_maps(mission: Mission, summary: dict[str
 
 def test_the_report_is_one_page_with_everything_in_it(mission: Mission, summary: dict[str, Any]):
     page = (mission.out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 2
+    assert 'id="timeline"' in page
+    for robot in mission.facts.robots:
+        assert f"{robot}/exploration" in page
     assert "http://" not in page
     assert "https://" not in page
     assert "Mission succeeded" in page
     assert f"{summary['coverage']['union']:.1%}" in page
     assert "no release missed" in page
-    for name in ("map.png", "coverage.png", "timeline.png"):
+    for name in ("map.png", "coverage.png"):
         image = (mission.out / name).read_bytes()
         assert image[:8] == b"\x89PNG\r\n\x1a\n"
         assert len(image) > 20_000
@@ -172,4 +175,6 @@ def test_no_bag_at_all_still_gives_a_report(mission: Mission, tmp_path: Path):
 def test_text_from_the_mission_is_escaped(mission: Mission, tmp_path: Path):
     facts = replace(mission.facts, faults=["<script>alert(1)</script>"])
     write_results(tmp_path, facts, area=mission.area)
-    assert "<script>" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page

@@ -61,7 +61,8 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
     one = swap.measured
     others = details("The other components meanwhile", bullets(neighbours_in_words(analysis, one)))
     phase = phase_figure(analysis, one)
-    wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout_figure(swap)}{phase}</div>'
+    blackout = blackout_figure(swap) if one.blackout_ns else ""
+    wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout}{phase}</div>'
     has_others = len(analysis.trace.components) > 1
     return (
         f'<div class="swap" data-chosen="swap" data-value="{index}"{" hidden" if index else ""}>'

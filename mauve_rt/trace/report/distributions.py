@@ -11,16 +11,18 @@ from mauve_rt.trace.report.histograms import Values, histogram
 from mauve_rt.trace.report.units import time_text
 from mauve_rt.trace.statistics import Distribution, distribution
 
-_OPEN_UP_TO = 12
-"""Components whose histograms are shown unfolded."""
+_OPEN_UP_TO = 6
+"""Components up to which the histograms of all are shown unfolded, else those of the first."""
 
 
 def distributions_section(analysis: Analysis) -> Section:
     """Return the section with all histograms."""
     shown = [name for name in analysis.trace.components if analysis.statistics[name].releases]
     shown += [name for name in analysis.trace.components if name not in shown and analysis.slices[name]]
-    opened = len(shown) <= _OPEN_UP_TO
-    blocks = "".join(_component(analysis, name, opened=opened) for name in shown)
+    blocks = "".join(
+        _component(analysis, name, opened=index == 0 or len(shown) <= _OPEN_UP_TO)
+        for index, name in enumerate(shown)
+    )
     note = (
         "Heights are logarithms of counts, so that a single outlier is seen among thousands. Lines mark the "
         "median, the 99th and 99.9th percentile and the maximum. Hover for counts."

@@ -35,7 +35,7 @@ def write_report(
     title: str = "Trace report",
     extra: Sequence[Section] = (),
     figures: Sequence[Card] = (),
-    verdict: Verdict | None = None,
+    verdict: Callable[[Verdict], Verdict] | None = None,
     events: Iterable[Any] | None = None,
     zero_ns: int | None = None,
     budget: int = BUDGET,
@@ -49,7 +49,7 @@ def write_report(
         title: the page's.
         extra: sections to stand before those about the trace.
         figures: cards to stand before those about the trace.
-        verdict: what stands at the top; what the trace tells when not given.
+        verdict: makes what stands at the top of what the trace tells; that itself when not given.
         events: the executors' ReconfigurationEvent messages by time, when they have been read already.
         zero_ns: what the page's clock counts from, CLOCK_MONOTONIC; the first record when not given.
         budget: executions and releases that the timeline keeps, about; see `detail`.
@@ -77,8 +77,9 @@ def write_report(
         made = make(analysis)
         if made is not None:
             sections.append(made)
+    told_by_trace = judge(analysis)
     parts = [
-        verdict_html(verdict or judge(analysis), title=title),
+        verdict_html(verdict(told_by_trace) if verdict else told_by_trace, title=title),
         cards([*figures, *key_figures(analysis)]),
         *(section.render() for section in sections),
         words_section(),

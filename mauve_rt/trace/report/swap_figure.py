@@ -9,6 +9,7 @@ from mauve_rt.trace.reconfigurations import Reconfiguration
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis, Swap
+from mauve_rt.trace.report.cycles import Times
 from mauve_rt.trace.report.scales import linear_ticks
 from mauve_rt.trace.report.units import counted, share_text, time_text
 
@@ -17,7 +18,6 @@ _LEFT, _RIGHT = 170.0, 20.0
 _ROW, _TALL_ROW = 26.0, 58.0
 _TOP = 30.0
 _MOST_TICKS = 240
-_MOST_SLICES = 300
 _PERIODS_AROUND = 2.6
 _OTHERS = 24
 """Rows of other components."""
@@ -192,19 +192,34 @@ def _row(analysis: Analysis, component: str, window: Window, top: float, height:
     parts = [svg.line(_LEFT, base, WIDTH - _RIGHT, base, css="row-line")]
     name = svg.shortened(component, _LEFT - 24)
     parts.append(svg.label(_LEFT - 10, base - room / 2 + 5, name, css="name", anchor="end", tip=component))
-    for index, (state, slices) in enumerate(analysis.slices[component].items()):
+    for index, slices in enumerate(analysis.slices[component].values()):
         begins, ends = slices["begin_ns"], slices["begin_ns"] + slices["extent_ns"]
         first, last = np.searchsorted(ends, window.begin_ns), np.searchsorted(begins, window.end_ns)
-        for begin, end in zip(begins[first:last][:_MOST_SLICES], ends[first:last], strict=False):
-            x, width = window.x(begin), window.x(end) - window.x(begin)
-            tip = f"{state}: {time_text(int(end - begin))}" if css == "own" else ""
-            parts.append(svg.rect(x, base - room, max(width, 1), room, css=f"slice s{index % 8}", tip=tip))
+        boxes = _apart_by_pixels(begins[first:last], ends[first:last], window)
+        commands = "".join(
+            f"M{svg.number(x)} {svg.number(base)}v{svg.number(-room)}h{svg.number(width)}v{svg.number(room)}z"
+            for x, width in boxes
+        )
+        parts.append(svg.path(commands, css=f"slice s{index % 8}"))
     releases = analysis.releases[component]["begin_ns"]
-    inside = releases[np.searchsorted(releases, window.begin_ns) : np.searchsorted(releases, window.end_ns)]
-    for begin in inside[:_MOST_TICKS]:
-        x = window.x(begin)
-        parts.append(svg.line(x, base - room - (8 if css == "own" else 3), x, base, css=f"release {css}"))
+    first, last = np.searchsorted(releases, (window.begin_ns, window.end_ns))
+    inside = releases[first:last]
+    rise = room + (8 if css == "own" else 3)
+    ticks = _apart_by_pixels(inside, inside, window)
+    commands = "".join(f"M{svg.number(x)} {svg.number(base)}v{svg.number(-rise)}" for x, _ in ticks)
+    parts.append(svg.path(commands, css=f"release {css}"))
     return "".join(parts)
+
+
+def _apart_by_pixels(begin_ns: Times, end_ns: Times, window: Window) -> list[tuple[float, float]]:
+    """Places and widths of intervals; of those that begin within half a pixel only one."""
+    if not len(begin_ns):
+        return []
+    per_ns = (WIDTH - _LEFT - _RIGHT) / (window.end_ns - window.begin_ns)
+    x = _LEFT + np.clip((begin_ns - window.begin_ns) * per_ns, 0, None)
+    end = np.minimum(_LEFT + (end_ns - window.begin_ns) * per_ns, WIDTH - _RIGHT)
+    _, first = np.unique(np.round(2 * x), return_index=True)
+    return list(zip(x[first].tolist(), np.maximum(end - x, 1)[first].tolist(), strict=True))
 
 
 def _flags(one: Reconfiguration, window: Window) -> str:

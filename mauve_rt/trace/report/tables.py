@@ -2,6 +2,7 @@
 
 from html import escape
 
+from mauve_rt.trace.architecture import ComponentInfo
 from mauve_rt.trace.reconfigurations import Reconfiguration
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, details, table
@@ -9,7 +10,7 @@ from mauve_rt.trace.report.units import share_text, time_text
 from mauve_rt.trace.statistics import Distribution
 
 _PERCENTILES = ("count", "min", "p50", "p99", "p99.9", "max")
-_COUNTS = ("component", "period", "load", "releases", "overruns", "skipped", "faults")
+_COUNTS = ("component", "scheduled", "period", "load", "releases", "overruns", "skipped", "faults")
 _MANY_ROWS = 400
 
 WORDS = {
@@ -132,8 +133,11 @@ def _component_row(analysis: Analysis, component: str) -> tuple[object, ...]:
         else None
     )
     off_ns = max(abs(found.phase_error.min_ns), abs(found.phase_error.max_ns))
+    info = next((one for one in analysis.trace.architecture if one.name == component), None)
+    scheduled = None if info is None else scheduling_in_words(info)
     return (
         component,
+        scheduled,
         Cell(period or "\N{EN DASH}"),
         Cell(share_text(found.load)),
         found.releases,
@@ -144,6 +148,14 @@ def _component_row(analysis: Analysis, component: str) -> tuple[object, ...]:
         *_short(found.response),
         Cell(time_text(off_ns) if found.phase_error.count else "\N{EN DASH}"),
     )
+
+
+def scheduling_in_words(info: ComponentInfo) -> str:
+    """Return how a component's thread was scheduled: FIFO 40, CPU 1."""
+    policy = info.policy.removeprefix("SCHED_") or "simulated"
+    priority = f" {info.priority}" if info.priority else ""
+    cpus = f", CPU {' '.join(map(str, info.cpus))}" if info.cpus else ""
+    return f"{policy}{priority}{cpus}"
 
 
 def _short(found: Distribution) -> tuple[Cell, ...]:
