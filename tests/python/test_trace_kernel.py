@@ -4,8 +4,10 @@ import time
 from pathlib import Path
 
 import pytest
+from perfetto_decoding import Decoded
 
 from mauve_rt import _kernel
+from mauve_rt.trace.export_perfetto import export_perfetto
 from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.reconfigurations import reconfigurations
 from mauve_rt.trace.recorder import Recorder
@@ -90,3 +92,22 @@ def test_swaps_are_as_the_kernel_reported_them(run: Run):
         assert (one.blackout_ns, one.missed_releases) == (told.blackout_ns, told.missed_releases)
         assert (one.phase_nominal_ns, one.phase_actual_ns) == (told.phase_nominal_ns, told.phase_actual_ns)
         assert one.parked_ns + one.adopt_ns + one.take_ns <= one.armed_ns
+
+
+def test_perfetto_shows_them(run: Run, tmp_path: Path):
+    export_perfetto({"robot": run.trace}, tmp_path / "trace.pftrace")
+    decoded = Decoded(tmp_path / "trace.pftrace")
+    for name, told in all_statistics(run.trace).items():
+        events = decoded.of(name)
+        assert sum(event.category == "state" for event in events) == sum(
+            found.count for found in told.execution.values()
+        )
+        assert sum(event.category == "release" for event in events) == told.releases
+        latencies = [count for event in events for count in event.counts]
+        assert (min(latencies), max(latencies)) == (told.wakeup.min_ns, told.wakeup.max_ns)
+    swaps = [event for event in decoded.of("slow") if event.category == "reconfiguration"]
+    found = reconfigurations(run.trace)
+    assert [(one.begin_ns, one.end_ns) for one in swaps] == [(one.parked_ns, one.armed_ns) for one in found]
+    for one, ((_, _, begin), (_, _, end)) in zip(found, decoded.flows.values(), strict=True):
+        assert (begin.begin_ns, end.name) == (one.parked_ns, "late")
+        assert end.begin_ns == max(one.nominal_ns or 0, one.armed_ns)
