@@ -7,7 +7,7 @@ import sys
 import threading
 from pathlib import Path
 
-from mauve_rt import _kernel
+from mauve_rt.api import Architecture, Deployer, PluginRegistry
 from mauve_rt.trace.recorder import Recorder
 
 COMPONENTS, MARKS = 5, 16
@@ -15,9 +15,9 @@ COMPONENTS, MARKS = 5, 16
 
 def main(library: str, bag: str) -> None:
     """Record 100,000 records a second."""
-    registry = _kernel.PluginRegistry()
+    registry = PluginRegistry()
     registry.load_library(library)
-    architecture = _kernel.Architecture(registry)
+    architecture = Architecture(registry)
     for number in range(COMPONENTS):
         name = f"talker_{number}"
         architecture.add_component(
@@ -26,7 +26,7 @@ def main(library: str, bag: str) -> None:
         architecture.set_property(name, "topics", 0)
         architecture.set_property(name, "marks", MARKS)
     architecture.configure()
-    deployer = _kernel.Deployer(architecture)
+    deployer = Deployer(architecture)
     recorder = Recorder(deployer, Path(bag), node_name="/executor")
     recorder.start()
     deployer.deploy()

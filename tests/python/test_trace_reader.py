@@ -148,7 +148,8 @@ def test_a_bag_cut_off_anywhere_gives_what_is_whole(tmp_path: Path, monkeypatch:
         assert told.whole_bytes <= size
         assert bool(told.damage) == (size < data_end)
         seen.add(len(rows))
-    assert {1, 20} <= seen
+    assert 20 in seen
+    assert len(seen) > 2
 
 
 def test_records_come_typed_and_as_data_frames(tmp_path: Path):
