@@ -51,6 +51,12 @@ def browser() -> Iterator[Browser]:
         yield started
 
 
+@pytest.fixture(autouse=True)
+def _no_complaints_of_others(browser: Browser) -> None:
+    browser.complaints.clear()
+    browser.requests.clear()
+
+
 def view(browser: Browser) -> tuple[float, float]:
     found = json.loads(browser.evaluate("JSON.stringify(mauve.timeline.view)"))
     return found["begin"], found["end"]
@@ -155,6 +161,13 @@ def test_the_theme_button_changes_the_colours(browser: Browser, page: Path):
     browser.settle()
     assert browser.evaluate(paper) != light
     assert min(browser.evaluate(INK)) > 200
+
+
+def test_a_trace_without_records_is_shown_without_complaint(browser: Browser, tmp_path: Path):
+    write_report(tmp_path / "report.html", trace_of(SyntheticSource(["silent"])))
+    browser.open(tmp_path / "report.html")
+    assert browser.evaluate("document.documentElement.dataset.ready") == "yes"
+    assert browser.complaints == []
 
 
 def test_a_view_goes_down_to_single_microseconds_and_no_further_than_the_trace(browser: Browser, page: Path):

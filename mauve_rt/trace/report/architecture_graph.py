@@ -88,7 +88,8 @@ def _arranged(graph: "nx.DiGraph[str]", sizes: dict[str, Size]) -> Iterable[tupl
     x, y, row_height = _MARGIN, _MARGIN, 0.0
     for nodes in found:
         edges = [edge for edge in graph.edges if edge[0] in nodes]
-        placed = place({node: sizes[node] for node in sizes if node in nodes}, edges)
+        hubs = {node for node in nodes if node.startswith("r:")}
+        placed = place({node: sizes[node] for node in sizes if node in nodes}, edges, hubs=hubs)
         if x > _MARGIN and x + placed.size.width > _WIDEST:
             x, y, row_height = _MARGIN, y + row_height + _BETWEEN, 0.0
         yield x, y, placed

@@ -10,7 +10,7 @@ from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.blocks import attribute
 from mauve_rt.trace.report.scales import asks_for_log, linear_ticks, log_ticks
 from mauve_rt.trace.report.timeline import json_for_script
-from mauve_rt.trace.report.units import time_text
+from mauve_rt.trace.report.units import tick_texts, time_text
 from mauve_rt.trace.statistics import Distribution, distribution
 
 Values = npt.NDArray[np.int64]
@@ -109,13 +109,15 @@ def _axis(bins: Bins) -> str:
     base = HEIGHT - _BOTTOM
     parts = [svg.line(_LEFT, base, WIDTH - _RIGHT, base, css="axis")]
     free = 0.0
-    for value in bins.ticks():
+    ticks = bins.ticks()
+    texts = [time_text(value) for value in ticks] if bins.logarithmic else tick_texts(ticks)
+    for value, text in zip(ticks, texts, strict=True):
         x = _LEFT + bins.place(value) * (WIDTH - _LEFT - _RIGHT)
         parts.append(svg.line(x, base, x, base + 3, css="axis"))
         anchor = "start" if x < _LABEL_ROOM / 2 else "end" if x > WIDTH - _LABEL_ROOM / 2 else "middle"
         begin = x - {"start": 0.0, "middle": _LABEL_ROOM / 2, "end": _LABEL_ROOM}[anchor]
         if begin >= free:
-            parts.append(svg.label(x, HEIGHT - 4, time_text(value), css="tick", anchor=anchor))
+            parts.append(svg.label(x, HEIGHT - 4, text, css="tick", anchor=anchor))
             free = begin + _LABEL_ROOM
     return "".join(parts)
 

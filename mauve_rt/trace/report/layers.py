@@ -5,7 +5,7 @@ turn edges of cycles round, assign layers by longest paths, put dummies where an
 each layer by the means of its neighbours, then move nodes towards these means without overlap.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -50,8 +50,13 @@ class _Layout:
         return self.sizes[node].width if node in self.sizes else _DUMMY_WIDTH
 
 
-def place(sizes: Mapping[Node, Size], edges: Sequence[tuple[Node, Node]]) -> Placed:
-    """Place the nodes of a graph. Edges from a node to itself are left out."""
+def place(
+    sizes: Mapping[Node, Size], edges: Sequence[tuple[Node, Node]], *, hubs: Collection[Node] = ()
+) -> Placed:
+    """Place the nodes of a graph. Edges from a node to itself are left out.
+
+    Long edges of one hub take the same way as far as they can.
+    """
     layout = _Layout(sizes)
     graph: nx.DiGraph[Node] = nx.DiGraph()
     graph.add_nodes_from(sizes)
@@ -60,7 +65,7 @@ def place(sizes: Mapping[Node, Size], edges: Sequence[tuple[Node, Node]]) -> Pla
     down: nx.DiGraph[Node] = nx.DiGraph()
     down.add_nodes_from(sizes)
     down.add_edges_from((b, a) if (a, b) in turned else (a, b) for a, b in graph.edges)
-    _fill(layout, down, _layer_of(down))
+    _fill(layout, down, _layer_of(down), hubs)
     _order(layout)
     _spread(layout)
     return _placed(layout, graph, turned)
@@ -99,21 +104,25 @@ def _layer_of(down: "nx.DiGraph[Node]") -> dict[Node, int]:
     return layer
 
 
-def _fill(layout: _Layout, down: "nx.DiGraph[Node]", layer: dict[Node, int]) -> None:
+def _fill(layout: _Layout, down: "nx.DiGraph[Node]", layer: dict[Node, int], hubs: Collection[Node]) -> None:
     layout.layers = [[] for _ in range(max(layer.values(), default=0) + 1)]
     for node in nx.dfs_preorder_nodes(down):
         layout.layers[layer[node]].append(node)
     for start, end in down.edges:
         chain = [start]
         for level in range(layer[start] + 1, layer[end]):
-            dummy = "\0".join(("", start, end, str(level)))
-            layout.layers[level].append(dummy)
+            way = (start, "") if start in hubs else ("", end) if end in hubs else (start, end)
+            dummy = "\0".join(("", *way, str(level)))
+            if dummy not in layout.above:
+                layout.layers[level].append(dummy)
+                layout.above[dummy] = []
             chain.append(dummy)
         chain.append(end)
         layout.chains[start, end] = chain
         for one, following in pairwise(chain):
-            layout.below.setdefault(one, []).append(following)
-            layout.above.setdefault(following, []).append(one)
+            if following not in layout.below.setdefault(one, []):
+                layout.below[one].append(following)
+                layout.above.setdefault(following, []).append(one)
 
 
 def _order(layout: _Layout) -> None:

@@ -11,7 +11,7 @@ from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.cycles import Times
 from mauve_rt.trace.report.scales import linear_ticks
-from mauve_rt.trace.report.units import counted, share_text, time_text
+from mauve_rt.trace.report.units import counted, share_text, tick_texts, time_text
 
 WIDTH = 1080.0
 _LEFT, _RIGHT = 170.0, 20.0
@@ -104,11 +104,12 @@ def phase_figure(analysis: Analysis, one: Reconfiguration, *, releases: int = 40
 
     step = (WIDTH - _LEFT - _RIGHT) / (2 * releases)
     parts = []
-    for value in linear_ticks(low, low + span, count=4):
+    ticks = linear_ticks(low, low + span, count=4)
+    for value, text in zip(ticks, tick_texts(ticks), strict=True):
         parts.append(
             svg.line(_LEFT, y(value), WIDTH - _RIGHT, y(value), css="grid-line" if value else "axis")
         )
-        parts.append(svg.label(_LEFT - 8, y(value) + 4, time_text(value), css="tick", anchor="end"))
+        parts.append(svg.label(_LEFT - 8, y(value) + 4, text, css="tick", anchor="end"))
     centre = _LEFT + releases * step
     parts.append(svg.line(centre, top - 8, centre, bottom, css="blackout-line"))
     for index, error_ns in zip(chosen, errors, strict=True):
@@ -164,8 +165,10 @@ def _window(analysis: Analysis, one: Reconfiguration) -> Window:
 
 def _axis(window: Window, zero_ns: float, y: float) -> str:
     parts = [svg.line(_LEFT, y, WIDTH - _RIGHT, y, css="axis")]
-    for x, value in window.ticks(zero_ns):
-        text = "parked" if value == 0 else ("+" if value > 0 else "") + time_text(value)
+    ticks = list(window.ticks(zero_ns))
+    texts = tick_texts([value for _, value in ticks])
+    for (x, value), told in zip(ticks, texts, strict=True):
+        text = "parked" if value == 0 else ("+" if value > 0 else "") + told
         parts += [
             svg.line(x, y, x, y + 4, css="axis"),
             svg.label(x, y + 17, text, css="tick", anchor="middle"),

@@ -25,6 +25,7 @@ _KEYS = (
     ("swap", "parked to armed"),
 )
 _STATES_NAMED = 4
+_CHARACTER_PX, _PERIOD_PX, _NAMES_PX = 9, 84, (200, 340)
 
 
 def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
@@ -39,7 +40,8 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         '<button type="button" data-zoom="in" title="zoom in (+)">+</button>'
         '<button type="button" data-zoom="out" title="zoom out (-)">\N{MINUS SIGN}</button>'
         '<button type="button" data-zoom="all" title="show everything (0)">All</button></span></div>'
-        '<div id="timeline" class="timeline" tabindex="0" role="application" '
+        f'<div id="timeline-view" class="timeline" style="--names: {_names_px(analysis)}px" tabindex="0" '
+        'role="application" '
         'aria-label="timeline: arrow keys move, plus and minus zoom, 0 shows everything">'
         '<div class="overview"><canvas></canvas></div>'
         f'<div class="lanes"><div class="names"><div class="axis-room"></div>{names}</div>'
@@ -47,6 +49,12 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         f'<p class="where" aria-live="polite"></p><p class="keys">{keys}</p>'
     )
     return Section("Timeline", html, note=_note(described), anchor="timeline", wide=True)
+
+
+def _names_px(analysis: Analysis) -> int:
+    """Width of the column of names: that of the longest one and its period, within limits."""
+    longest = max(map(len, analysis.trace.components), default=0)
+    return min(max(_CHARACTER_PX * longest + _PERIOD_PX, _NAMES_PX[0]), _NAMES_PX[1])
 
 
 def _jump(kind: str, name: str, count: int) -> str:

@@ -1,9 +1,10 @@
 """Times and counts as a person reads them: three digits, a unit, no ambiguity."""
 
 _NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
+_MINUS = "\N{MINUS SIGN}"
 _UNITS = ((1, "ns"), (1_000, "\N{MICRO SIGN}s"), (1_000_000, "ms"), (1_000_000_000, "s"))
-_MINUTE_NS = 60_000_000_000
-_LONGEST_IN_SECONDS_NS = 2 * _MINUTE_NS
+_LONGEST_IN_SECONDS_NS = 120_000_000_000
+_LONGEST_IN_MINUTES = 120
 _TENS, _HUNDREDS, _THOUSANDS = 10, 100, 1000
 
 
@@ -14,12 +15,29 @@ def time_text(time_ns: float | None) -> str:
     if time_ns == 0:
         return f"0{_NARROW_SPACE}\N{MICRO SIGN}s"
     size_ns = abs(time_ns)
-    sign = "\N{MINUS SIGN}" if time_ns < 0 else ""
+    sign = _MINUS if time_ns < 0 else ""
     if size_ns >= _LONGEST_IN_SECONDS_NS:
-        minutes, rest_ns = divmod(size_ns, _MINUTE_NS)
-        return f"{sign}{int(minutes)}{_NARROW_SPACE}min {rest_ns / 1e9:.0f}{_NARROW_SPACE}s"
+        minutes, seconds = divmod(round(size_ns / 1e9), 60)
+        if minutes >= _LONGEST_IN_MINUTES:
+            hours, minutes = divmod(minutes, 60)
+            return f"{sign}{hours}{_NARROW_SPACE}h {minutes}{_NARROW_SPACE}min"
+        return f"{sign}{minutes}{_NARROW_SPACE}min {seconds}{_NARROW_SPACE}s"
     factor, unit = next(pair for pair in reversed(_UNITS) if size_ns >= pair[0] or pair[0] == 1)
     return f"{sign}{digits(size_ns / factor)}{_NARROW_SPACE}{unit}"
+
+
+def tick_texts(values: list[float]) -> list[str]:
+    """Return times in one unit, as exact as it takes to tell them apart."""
+    largest = max((abs(value) for value in values), default=0.0)
+    factor, unit = next(pair for pair in reversed(_UNITS) if largest >= pair[0] or pair[0] == 1)
+    for decimals in range(10):
+        numbers = [f"{value / factor:,.{decimals}f}" for value in values]
+        if len(set(numbers)) == len(numbers) and all(
+            abs(float(text.replace(",", "")) * factor - value) <= abs(value) * 1e-3 + 1e-9
+            for text, value in zip(numbers, values, strict=True)
+        ):
+            break
+    return [f"{text.replace('-', _MINUS)}{_NARROW_SPACE}{unit}" for text in numbers]
 
 
 def digits(value: float) -> str:

@@ -19,7 +19,11 @@
     const size = Math.abs(ns);
     if (size >= 120e9) {
       const seconds = Math.round(size / 1e9);
-      const text = Math.floor(seconds / 60) + NARROW + "min " + (seconds % 60) + NARROW + "s";
+      const minutes = Math.floor(seconds / 60);
+      const text =
+        minutes < 120
+          ? minutes + NARROW + "min " + (seconds % 60) + NARROW + "s"
+          : Math.floor(minutes / 60) + NARROW + "h " + (minutes % 60) + NARROW + "min";
       return ns < 0 ? "\u2212" + text : text;
     }
     const [unit, factor] = UNITS.find((pair) => size >= pair[1]) || UNITS[3];

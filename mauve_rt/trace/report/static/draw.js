@@ -139,6 +139,7 @@
       const begin = Math.max(scale.begin, index ? from : -Infinity, origin);
       const end = Math.min(scale.time(scale.width), until);
       for (let k = Math.ceil((begin - origin) / period); origin + k * period <= end; k++) {
+        if (!mauve.runsAt(row, origin + k * period)) continue;
         const x = Math.round(scale.x(origin + k * period)) - 0.5;
         for (let y = top - TICK; y < bottom; y += 4) context.fillRect(x, y, 1, 2);
       }

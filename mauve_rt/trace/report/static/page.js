@@ -61,7 +61,7 @@
   }
 
   async function startTimeline() {
-    const place = document.getElementById("timeline");
+    const place = document.getElementById("timeline-view");
     if (!place) return;
     const described = JSON.parse(document.getElementById("timeline-described").textContent);
     const columns = await mauve.unpackColumns(described.columns, document.getElementById("timeline-columns").textContent);
@@ -80,7 +80,7 @@
       root.dataset.ready = "failed";
       console.error("the timeline cannot be shown:", error);
       const told = mauve.element("p", "nothing", "The timeline cannot be shown by this browser: " + error.message);
-      document.getElementById("timeline").replaceWith(told);
+      document.getElementById("timeline-view").replaceWith(told);
     }
   );
 })((window.mauve = window.mauve || {}));

@@ -20,6 +20,7 @@
       this.whole = { begin: -MARGIN * model.duration, end: (1 + MARGIN) * model.duration };
       this.view = { ...this.whole };
       this.listeners = [];
+      root.classList.toggle("dense", this.rowHeight < 40);
       root.style.setProperty("--row", this.rowHeight + "px");
       root.style.setProperty("--axis", mauve.AXIS_HEIGHT + "px");
       new ResizeObserver(() => this.resize()).observe(this.plot);

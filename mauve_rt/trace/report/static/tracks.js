@@ -66,10 +66,36 @@
     }
   };
 
+  // When a row began and ceased to run: [time, running] in order.
+  function turnsOf(markers) {
+    const turns = [];
+    for (const { kind, time } of markers) {
+      if (kind === "start" || kind === "stop" || kind === "fault") for (const at of time) turns.push([at, kind === "start"]);
+    }
+    return turns.sort((a, b) => a[0] - b[0]);
+  }
+
+  mauve.runsAt = function (row, time) {
+    let running = !row.turns.length || !row.turns[0][1];
+    for (const [at, now] of row.turns) {
+      if (at > time) break;
+      running = now;
+    }
+    return running;
+  };
+
   // Builds the model of the page's timeline: rows with tracks, on a clock that begins with the trace.
   mauve.buildModel = function (described, columns) {
     const rows = described.rows.map(function (row) {
       const r = row.releases;
+      const markers = row.markers.map((m) => ({
+        kind: m.kind,
+        time: columns[m.time],
+        number: columns[m.number],
+        name: columns[m.name],
+        value: columns[m.value],
+        skipped: columns[m.skipped],
+      }));
       return {
         name: row.name,
         period: row.period,
@@ -81,14 +107,8 @@
         releases: new mauve.ReleaseTrack(
           columns[r.begin], columns[r.extent], columns[r.number], columns[r.wakeup], columns[r.response]
         ),
-        markers: row.markers.map((m) => ({
-          kind: m.kind,
-          time: columns[m.time],
-          number: columns[m.number],
-          name: columns[m.name],
-          value: columns[m.value],
-          skipped: columns[m.skipped],
-        })),
+        markers,
+        turns: turnsOf(markers),
       };
     });
     return {
