@@ -6,25 +6,23 @@ import numpy as np
 
 from mauve_rt.trace.records import RECORD, Kind, Records
 from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Loss, Trace
+from mauve_rt.trace.trace import Loss, Message, Trace
 
 MS = 1_000_000
 EPOCH_NS = 20 * MS
 PERIOD_NS = 10 * MS
 
 
-def trace_of(source: SyntheticSource) -> Trace:
-    """The trace of what was written into a source, without a bag in between."""
+def trace_of(source: SyntheticSource, messages: tuple[Message, ...] = ()) -> Trace:
+    """What the source has been given since the last time, without a bag in between."""
     drain = source.drain_trace()
     everything = np.frombuffer(drain.records, RECORD)
-    records = {
-        name: everything[everything["component"] == index] for index, name in enumerate(source.components)
-    }
-    losses = {
-        name: Loss(drain.written[index], len(records[name]), drain.dropped[index], drain.dropped[index])
-        for index, name in enumerate(source.components)
-    }
-    return Trace(records, tuple(source.trace_names()), losses, np.empty((0, 2), np.int64))
+    records, losses = {}, {}
+    for index, name in enumerate(source.components):
+        rows = records[name] = everything[everything["component"] == index]
+        losses[name] = Loss(drain.written[index], len(rows), drain.dropped[index], drain.dropped[index])
+    pairs = np.array([(drain.monotonic_ns, drain.realtime_ns)], np.int64)
+    return Trace(records, tuple(source.trace_names()), losses, pairs, lambda _: iter(messages))
 
 
 def deploy(source: SyntheticSource, component: str, *, period_ns: int = PERIOD_NS) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trace_making import trace_of
+from synthetic_traces import trace_of
 
 from mauve_rt.trace import frames
 from mauve_rt.trace.records import Kind, ReconfigurationPhase

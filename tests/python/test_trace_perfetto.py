@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 from perfetto_decoding import Decoded, Event
-from trace_making import trace_of
+from synthetic_traces import trace_of
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.export_perfetto import export_perfetto

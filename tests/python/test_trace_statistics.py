@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic_traces import trace_of
 
 from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.records import RECORD, Kind, ReconfigurationPhase
+from mauve_rt.trace.records import Kind, ReconfigurationPhase
 from mauve_rt.trace.statistics import Distribution, component_statistics, distribution, state_spans
 from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Loss, Trace
 
 EPOCH_NS, OFFSET_NS, PERIOD_NS = 1_000_000, 300, 10_000
 FIRST_NS = EPOCH_NS + OFFSET_NS
@@ -20,19 +20,6 @@ def source_of_one() -> SyntheticSource:
     source.add("c", Kind.DEPLOYMENT, 0, a=EPOCH_NS, b=OFFSET_NS, c=PERIOD_NS)
     source.add("c", Kind.START, EPOCH_NS - 5, a=FIRST_NS)
     return source
-
-
-def trace_of(source: SyntheticSource) -> Trace:
-    drain = source.drain_trace()
-    everything = np.frombuffer(drain.records, RECORD)
-    records = {
-        name: everything[everything["component"] == index] for index, name in enumerate(source.components)
-    }
-    losses = {
-        name: Loss(drain.written[index], len(records[name]), drain.dropped[index], drain.dropped[index])
-        for index, name in enumerate(source.components)
-    }
-    return Trace(records, tuple(source.trace_names()), losses, np.empty((0, 2), np.int64))
 
 
 def test_a_periodic_component():
