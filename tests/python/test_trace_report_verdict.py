@@ -63,6 +63,40 @@ def test_a_late_wake_up_is_not_blamed_on_a_state():
     assert "the wake-up itself took longest, 12 ms" in said(verdict_on(trace_of(source)))
 
 
+def late_together(source: SyntheticSource, *, hog_ns: int) -> None:
+    """Three components released at one instant, all woken 5 ms later; the first had executed meanwhile."""
+    source.add("hog", Kind.RELEASE, EPOCH_NS, name="wait", a=EPOCH_NS, b=EPOCH_NS)
+    source.add("hog", Kind.STATE_BEGIN, EPOCH_NS, name="act")
+    source.add("hog", Kind.STATE_END, EPOCH_NS + hog_ns, name="act")
+    for component in ("a", "b", "c"):
+        source.add(component, Kind.RELEASE, EPOCH_NS + 5 * MS, name="wait", a=EPOCH_NS, b=EPOCH_NS + 5 * MS)
+
+
+def test_what_came_from_outside_is_not_laid_to_the_components():
+    source = SyntheticSource(["hog", "a", "b", "c"])
+    late_together(source, hog_ns=1000)
+    found = said(verdict_on(trace_of(source)))
+    assert "At one moment several components woke late together while none of them was executing" in found
+    assert "3 of them by up to 5 ms" in found
+
+
+def test_a_component_that_kept_the_others_waiting_is_not_excused():
+    source = SyntheticSource(["hog", "a", "b", "c"])
+    late_together(source, hog_ns=4_900_000)
+    assert "woke late together" not in said(verdict_on(trace_of(source)))
+
+
+def test_nor_is_one_whose_state_never_ended():
+    source = SyntheticSource(["hog", "a", "b", "c"])
+    source.add("hog", Kind.STATE_BEGIN, EPOCH_NS - MS, name="act")
+    late_together(source, hog_ns=0)
+    assert "woke late together" in said(verdict_on(trace_of(source)))
+    source = SyntheticSource(["hog", "stuck", "a", "b", "c"])
+    source.add("stuck", Kind.STATE_BEGIN, EPOCH_NS - MS, name="act")
+    late_together(source, hog_ns=0)
+    assert "woke late together" not in said(verdict_on(trace_of(source)))
+
+
 def test_overruns_as_a_habit_are_bad():
     source = SyntheticSource(["c"])
     deploy(source, "c")

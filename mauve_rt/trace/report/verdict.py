@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.overruns import culprits
+from mauve_rt.trace.report.stalls import stalls
 from mauve_rt.trace.report.units import counted, listed, share_text, time_text, times
 from mauve_rt.trace.statistics import ComponentStatistics
 
@@ -42,6 +43,7 @@ def judge(analysis: Analysis) -> Verdict:
         *_scope(analysis),
         *_overruns(analysis),
         *_latencies(analysis),
+        *_stalls(analysis),
         *_swaps(analysis),
         *_faults(analysis),
         *_doubts(analysis),
@@ -157,6 +159,22 @@ def _latencies(analysis: Analysis) -> Iterator[Sentence]:
             f"({most.component}, {time_text(_off_ns(most))})"
         )
     yield Sentence("", text + ".")
+
+
+def _stalls(analysis: Analysis) -> Iterator[Sentence]:
+    found = [] if analysis.trace.lost else stalls(analysis)  # who knows what the lost records told
+    if not found:
+        return
+    worst = max(found, key=lambda one: one.latency_ns)
+    moments = "At one moment" if len(found) == 1 else f"At {len(found):,} moments"
+    at_worst = "" if len(found) == 1 else "at worst "
+    yield Sentence(
+        "",
+        f"{moments} several components woke late together while none of them was executing, {at_worst}"
+        f"{worst.components} of them by up to {time_text(worst.latency_ns)} "
+        f"({time_text(worst.end_ns - analysis.zero_ns)} after the begin): something outside of them held "
+        "the processors.",
+    )
 
 
 def _off_ns(one: ComponentStatistics) -> int:

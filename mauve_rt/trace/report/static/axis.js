@@ -34,14 +34,14 @@
     const decimals = Math.max(0, Math.round(Math.log10(factor)) - Math.floor(Math.log10(step) + 1e-9));
     const format = (value) => (value / factor).toFixed(decimals).replace("-", "\u2212") + NARROW + unit;
     if (factor === 1e9) return { step, base: null, ticks: times.map((time) => ({ time, text: format(time) })) };
-    const coarse = 10 ** Math.ceil(Math.log10(span));
+    const coarse = 10 ** Math.floor(Math.log10(span));
     const base = Math.floor(begin / coarse) * coarse;
     return { step, base, ticks: times.map((time) => ({ time, text: "+" + format(time - base) })) };
   };
 
   // The base of an axis as exact as it is: a multiple of a power of ten.
   mauve.baseText = function (base, span) {
-    const decimals = Math.min(9, Math.max(0, 9 - Math.ceil(Math.log10(span))));
+    const decimals = Math.min(9, Math.max(0, 9 - Math.floor(Math.log10(span))));
     return (base / 1e9).toFixed(decimals).replace("-", "\u2212") + NARROW + "s";
   };
 })((window.mauve = window.mauve || {}));

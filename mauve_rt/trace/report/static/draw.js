@@ -4,6 +4,7 @@
 
   mauve.AXIS_HEIGHT = 46;
   const TICK = 7; // of a release, above the slices
+  const LEAST = 2.5; // px of height for whatever there is
   const LABEL_ROOM = 44;
   const GRID_ROOM = 7; // px between instants of a component's grid from which they are drawn
   const PER_PIXEL = 0.34; // entries from which shares of time are drawn instead
@@ -83,51 +84,48 @@
     context.restore();
   }
 
-  // Of each pixel column: which share of its time each state took, stacked; the height is the cube root of the share.
+  // Of each pixel column: which share of its time each state took, stacked; the height is the cube root of the
+  // share. What begins within a column is seen there, however short it is.
   function drawShares(context, row, scale, top, bottom, colours) {
     const room = bottom - top;
     const columns = Math.ceil(scale.width);
     const perColumn = 1 / scale.perNs;
-    const count = row.states.length;
-    const busy = new Float64Array(count);
-    const begun = new Float64Array(count);
-    for (let s = 0; s < count; s++) {
-      const index = row.states[s].last(scale.begin);
-      busy[s] = row.states[s].busyUntil(scale.begin, index);
-      begun[s] = row.states[s].begunUntil(scale.begin, index);
-    }
-    const shares = new Float64Array(count);
+    const states = row.states.map((track) => sharesOf(track, scale, columns));
+    const ground = new Float64Array(columns).fill(bottom);
+    states.forEach(function (shares, s) {
+      context.fillStyle = colours.states[s % 8];
+      for (let column = 0; column < columns; column++) {
+        if (!shares.busy[column] && !shares.begun[column]) continue;
+        let total = 0;
+        let present = 0;
+        for (const other of states) {
+          total += other.busy[column];
+          present += other.busy[column] > 0 || other.begun[column];
+        }
+        const height = Math.max(LEAST, Math.cbrt(Math.min(1, total / perColumn)) * room);
+        const part = total > 0 ? (shares.busy[column] / total) * height : height / present;
+        context.fillRect(column, ground[column] - part, 1, part);
+        ground[column] -= part;
+      }
+    });
+  }
+
+  // Of each pixel column: busy time of a state in ns, and whether one began.
+  function sharesOf(track, scale, columns) {
+    const busy = new Float64Array(columns);
+    const begun = new Uint8Array(columns);
+    let index = track.last(scale.begin);
+    let busyBefore = track.busyUntil(scale.begin, index);
     for (let column = 0; column < columns; column++) {
       const time = scale.time(column + 1);
-      let total = 0;
-      let some = -1;
-      for (let s = 0; s < count; s++) {
-        const track = row.states[s];
-        const index = track.last(time);
-        const busyNow = track.busyUntil(time, index);
-        const begunNow = track.begunUntil(time, index);
-        shares[s] = Math.max(0, busyNow - busy[s]);
-        if (begunNow > begun[s]) some = s;
-        busy[s] = busyNow;
-        begun[s] = begunNow;
-        total += shares[s];
-      }
-      if (total <= 0 && some < 0) continue;
-      const height = Math.max(2.5, Math.cbrt(Math.min(1, total / perColumn)) * room);
-      let from = bottom;
-      if (total <= 0) {
-        context.fillStyle = colours.states[some % 8];
-        context.fillRect(column, bottom - height, 1, height);
-        continue;
-      }
-      for (let s = 0; s < count; s++) {
-        if (shares[s] <= 0) continue;
-        const part = (shares[s] / total) * height;
-        context.fillStyle = colours.states[s % 8];
-        context.fillRect(column, from - part, 1, part);
-        from -= part;
-      }
+      const next = track.last(time);
+      const busyNow = track.busyUntil(time, next);
+      busy[column] = Math.max(0, busyNow - busyBefore);
+      begun[column] = next > index ? 1 : 0;
+      busyBefore = busyNow;
+      index = next;
     }
+    return { busy, begun };
   }
 
   // The instants at which the component was due, as the deployment recorded them: also those that it skipped.
@@ -253,7 +251,8 @@
       context.fillRect(x - 0.5, 20, 1, height - 20);
       context.fillStyle = colours.muted;
       const width = context.measureText(tick.text).width;
-      if (x - width / 2 > (axis.base === null ? 0 : 78)) context.fillText(tick.text, x - width / 2, 14);
+      const free = x - width / 2 > (axis.base === null ? -1 : 78) && x + width / 2 < scale.width + 1;
+      if (free) context.fillText(tick.text, x - width / 2, 14);
     }
     if (axis.base !== null) {
       context.fillStyle = colours.ink;
@@ -285,6 +284,7 @@
 
   function drawSwaps(context, model, scale, height, rowHeight, colours) {
     let free = -Infinity;
+    const labels = [];
     context.font = "600 11px system-ui, sans-serif";
     context.textBaseline = "alphabetic";
     for (const swap of model.swaps) {
@@ -305,21 +305,27 @@
         const text = swap.what + (swap.committed ? "" : " (refused)") + ", " + mauve.timeText(swap.armed - swap.parked);
         const room = context.measureText(text).width;
         const left = from + 12 + room > scale.width ? from - room - 6 : from + 12;
-        context.fillText(text, left, 33);
-        free = left + room + 14;
+        if (left > free) {
+          labels.push([text, left, room]);
+          free = left + room + 14;
+        }
       }
+    }
+    for (const [text, left, room] of labels) {
+      context.fillStyle = colours.panel;
+      context.globalAlpha = 0.85;
+      context.fillRect(left - 2, 23, room + 4, 13);
+      context.globalAlpha = 1;
+      context.fillStyle = colours.swap;
+      context.fillText(text, left, 33);
     }
   }
 
   // One whole picture of what is in view.
-  mauve.drawTimeline = function (context, model, view, width, rowHeight, colours, chosenRow) {
+  mauve.drawTimeline = function (context, model, view, width, rowHeight, colours) {
     const scale = new Scale(view, width);
     const height = mauve.AXIS_HEIGHT + model.rows.length * rowHeight;
     context.clearRect(0, 0, width, height);
-    if (chosenRow >= 0) {
-      context.fillStyle = colours.faint;
-      context.fillRect(0, mauve.AXIS_HEIGHT + chosenRow * rowHeight, width, rowHeight);
-    }
     drawAxis(context, model, scale, height, colours);
     model.rows.forEach(function (row, index) {
       const top = mauve.AXIS_HEIGHT + index * rowHeight;

@@ -15,7 +15,9 @@
       this.overview = root.querySelector(".overview canvas");
       this.where = root.parentElement.querySelector(".where");
       this.rowHeight = mauve.rowHeight(model.rows.length);
-      this.chosenRow = -1;
+      this.chosen = mauve.element("div", "chosen");
+      this.chosen.hidden = true;
+      this.plot.prepend(this.chosen);
       this.colours = mauve.readColours();
       this.whole = { begin: -MARGIN * model.duration, end: (1 + MARGIN) * model.duration };
       this.view = { ...this.whole };
@@ -102,10 +104,10 @@
       requestAnimationFrame(step);
     }
 
+    // Mark a row; none when it is negative.
     choose(row) {
-      if (row === this.chosenRow) return;
-      this.chosenRow = row;
-      this.redraw();
+      this.chosen.hidden = row < 0;
+      this.chosen.style.top = mauve.AXIS_HEIGHT + row * this.rowHeight + "px";
     }
 
     redraw() {
@@ -118,9 +120,9 @@
     }
 
     draw() {
-      const { context, model, view, width, rowHeight, colours, chosenRow } = this;
+      const { context, model, view, width, rowHeight, colours } = this;
       if (!width) return;
-      mauve.drawTimeline(context, model, view, width, rowHeight, colours, chosenRow);
+      mauve.drawTimeline(context, model, view, width, rowHeight, colours);
       this.drawBrush();
       const span = view.end - view.begin;
       this.where.textContent =
