@@ -103,8 +103,12 @@ class Recording:
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
             recorder.start(discard=self._runtime.active)
             self._recorder = recorder
-            for topic in chosen:
-                self._subscribe(topic)
+            try:
+                for topic in chosen:
+                    self._subscribe(topic)
+            except Exception:
+                self.stop()
+                raise
             return recorder.directory
 
     def stop(self) -> RecordingStatus | None:

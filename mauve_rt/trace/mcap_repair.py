@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, MessageIndex, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from mauve_rt.trace.errors import TraceError
@@ -33,6 +33,8 @@ class _ChunkSeen:
         """As the chunk itself tells."""
         self.indexed: Entries = {}
         """As the indexes tell."""
+        self.is_followed = False
+        """By anything but its indexes."""
         self.end = found.end
         data = chunk.data if not chunk.compression else _unpacked(chunk)
         self._index = ChunkIndex(
@@ -62,8 +64,7 @@ class _ChunkSeen:
 
     def is_indexed(self) -> bool:
         """Whether the indexes behind it are those of this chunk."""
-        found = {channel: sorted(entries) for channel, entries in self.indexed.items() if entries}
-        return found == self.messages
+        return _sorted(self.indexed) == _sorted(self.messages)
 
     def index_again(self) -> bytes:
         """Return message indexes to be written right behind it."""
@@ -166,6 +167,8 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
                 if last is not None:
                     chunks.append(last.entry())
                 last = _ChunkSeen(found, record)
+            elif last is not None and not isinstance(record, DataEnd):
+                last.is_followed = True
             if isinstance(record, OtherRecord) and record.opcode in others:
                 others[Opcode(record.opcode)] += 1
             for one in scan.inside(record):
@@ -175,7 +178,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
         damage = scan.damage or scan.summary_damage()
         whole_bytes, missing = scan.whole_bytes, b""
         if last is not None:
-            if damage and not last.is_indexed():
+            if damage and not last.is_followed and not last.is_indexed():
                 whole_bytes, missing = last.end, last.index_again()
             chunks.append(last.entry())
         return FileState(
@@ -194,6 +197,10 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             _attachments=others[Opcode.ATTACHMENT],
             _metadata=others[Opcode.METADATA],
         )
+
+
+def _sorted(entries: Entries) -> Entries:
+    return {channel: sorted(found) for channel, found in entries.items() if found}
 
 
 def _unpacked(chunk: Chunk) -> bytes:

@@ -76,7 +76,7 @@ class Recorder:
             queue_bytes: messages that may wait for a flush; what exceeds it is dropped and counted.
             split: when the bag goes on in a new file; after a minute unless said otherwise.
             on_error: called at most once for each cause, with one line, on the recorder thread.
-            messages: asked, on the writer's thread, for messages beside those given to record().
+            messages: asked, on the recorder thread, for messages beside those given to record().
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
