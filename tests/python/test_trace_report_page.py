@@ -19,12 +19,15 @@ from synthetic_traces import (
     trace_of,
 )
 
+from mauve_rt.cli.main import main
 from mauve_rt.trace.architecture import ComponentInfo, PortInfo
+from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.report import Card, Section, write_report
+from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.bags import bag_names
 from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Message, Trace
+from mauve_rt.trace.trace import Message, Trace, merge_traces
 
 HOSTILE = "</script><script>alert(1)</script><!--\"'&amp;"
 
@@ -144,6 +147,71 @@ def test_a_long_trace_stays_small(tmp_path: Path):
     fixed = len(page_of(periodic_trace(["a", "b", "c", "d"], 5), tmp_path))
     assert len(page_of(trace, tmp_path)) - fixed < 20e6 / 5
     assert len(page_of(trace, tmp_path, budget=10_000)) - fixed < 0.3e6
+
+
+def test_the_command_writes_into_the_bag_unless_told_otherwise(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    for name in ("one", "two"):
+        source = SyntheticSource(["c"])
+        deploy(source, "c")
+        run(source, "c", 5)
+        recorder = Recorder(source, tmp_path / name, node_name="/robot/executor")
+        recorder.start()
+        recorder.stop()
+    one, two = str(tmp_path / "one"), str(tmp_path / "two")
+    assert main(["report", one]) == 0
+    assert capsys.readouterr().out.startswith(f"{one}/report.html (0.")
+    assert "Trace of one" in (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+    both = tmp_path / "both.html"
+    assert main(["report", one, two, "--out", str(both), "--title", "Both"]) == 0
+    page = both.read_text(encoding="utf-8")
+    assert "<title>Both</title>" in page
+    assert "one/c" in page
+    assert "two/c" in page
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["nowhere"], "not there"),
+        (["", ""], "named twice"),
+        (["", "--out", "no/such/folder/page.html"], "cannot be written (No such file or directory)"),
+    ],
+)
+def test_the_command_says_what_is_wrong(
+    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    recorder = Recorder(SyntheticSource(["c"]), tmp_path / "bag", node_name="/robot/executor")
+    recorder.start()
+    recorder.stop()
+    assert main(["report", *(word or str(tmp_path / "bag") for word in words)]) == 2
+    assert told in capsys.readouterr().err
+
+
+def event(topic: str, time_ns: int, component: str, by: str) -> Message:
+    step = SimpleNamespace(component=component, prepare_ns=7)
+    told = SimpleNamespace(
+        success=True, requested_by=by, cause="", request="", from_core="", to_core="", report=[step]
+    )
+    return Message(topic, 0, time_ns, told)
+
+
+def test_a_request_is_that_of_the_same_executor():
+    trace = merge_traces({"r1": eventful_trace(), "r2": eventful_trace()})
+    swaps = analyse(trace).swaps
+    late_ns = swaps[0].measured.armed_ns + 1
+    events = [event(f"/{robot}/executor/events", late_ns, "c", robot) for robot in ("r2", "r1")]
+    found = analyse(trace, events=events).swaps
+    assert [(one.measured.component, one.request and one.request.requested_by) for one in found] == [
+        ("r1/c", "r1"),
+        ("r2/c", "r2"),
+    ]
+    strange = [event("/elsewhere/events", late_ns, "c", "somebody")]
+    assert {one.request and one.request.requested_by for one in analyse(trace, events=strange).swaps} == {
+        "somebody"
+    }
+    assert {one.request for one in analyse(trace, events=strange * 2).swaps} == {None}
 
 
 def test_bags_are_named_by_what_tells_them_apart():

@@ -32,28 +32,32 @@ def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) ->
 
 
 def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> Request | None:
-    for index in range(bisect_left(told, one.armed_ns, key=_time_ns), len(told)):
-        event = told[index]
-        if event.monotonic_ns - one.armed_ns > _REPLY_WITHIN_NS:
-            break
-        if _tells_of(event, one):
-            return _request(event.msg, one)
-    return None
+    """Return the first that tells of it soon after.
+
+    Components of merged traces are named <bag>/<component>. Where the executor's topics do not have the name
+    of the bag, an event is taken only when no other one could be meant.
+    """
+    begin, end = (
+        bisect_left(told, limit_ns, key=_time_ns)
+        for limit_ns in (one.armed_ns, one.armed_ns + _REPLY_WITHIN_NS + 1)
+    )
+    owner, _, component = one.component.rpartition("/")
+    found = [event for event in told[begin:end] if _tells_of(event, component)]
+    if owner:
+        own = [event for event in found if f"/{owner}/" in event.topic]
+        found = own or (found if len(found) == 1 else [])
+    return _request(found[0].msg, component) if found else None
 
 
 def _time_ns(event: Any) -> int:
     return int(event.monotonic_ns)
 
 
-def _tells_of(event: Any, one: Reconfiguration) -> bool:
-    executor, _, component = one.component.rpartition("/")
-    if executor and f"/{executor}/" not in event.topic:
-        return False
+def _tells_of(event: Any, component: str) -> bool:
     return any(step.component == component for step in event.msg.report)
 
 
-def _request(event: Any, one: Reconfiguration) -> Request:
-    component = one.component.rpartition("/")[2]
+def _request(event: Any, component: str) -> Request:
     step = next(step for step in event.report if step.component == component)
     return Request(
         requested_by=event.requested_by,

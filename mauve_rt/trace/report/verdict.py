@@ -236,6 +236,10 @@ def _faults(analysis: Analysis) -> Iterator[Sentence]:
 
 
 def _doubts(analysis: Analysis) -> Iterator[Sentence]:
+    damaged = [file for file in analysis.trace.files if file.damage]
+    if damaged:
+        files = counted(len(damaged), "file")
+        yield Sentence(ATTENTION, f"Of {files} not all could be read: {damaged[0].damage}.")
     lossy = [name for name, found in analysis.statistics.items() if found.lost_records]
     if lossy:
         yield Sentence(
