@@ -81,6 +81,32 @@ class _ChunkSeen:
         return serialized(self._index)
 
 
+class _Chunks:
+    """All chunks of a data section."""
+
+    def __init__(self) -> None:
+        self.last: _ChunkSeen | None = None
+        self._before: list[bytes] = []  # entries of those before the last one
+
+    def note(self, found: Found) -> None:
+        """Take note of the next record of the data section."""
+        record = found.record
+        if isinstance(record, Chunk):
+            self._before = self.entries()
+            self.last = _ChunkSeen(found, record)
+        elif self.last is not None and isinstance(record, MessageIndex):
+            self.last.add_index(found.offset, found.end, record)
+        elif self.last is not None and not isinstance(record, DataEnd):
+            self.last.is_followed = True
+
+    def entries(self) -> list[bytes]:
+        """Their records in the summary."""
+        if self.last is not None:
+            self._before.append(self.last.entry())
+            self.last = None
+        return self._before
+
+
 @dataclass
 class FileState:
     """What a pass over a file found."""
@@ -154,21 +180,12 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
 
     """
     counts = Counts()
-    chunks: list[bytes] = []  # entries of the summary, but for that of the last one
-    last: _ChunkSeen | None = None
+    chunks = _Chunks()
     others = {Opcode.ATTACHMENT: 0, Opcode.METADATA: 0}
     with McapScan(path) as scan:
         for found in scan.found():
             record = found.record
-            if isinstance(record, MessageIndex) and last is not None:
-                last.add_index(found.offset, found.end, record)
-                continue
-            if isinstance(record, Chunk):
-                if last is not None:
-                    chunks.append(last.entry())
-                last = _ChunkSeen(found, record)
-            elif last is not None and not isinstance(record, DataEnd):
-                last.is_followed = True
+            chunks.note(found)
             if isinstance(record, OtherRecord) and record.opcode in others:
                 others[Opcode(record.opcode)] += 1
             for one in scan.inside(record):
@@ -177,10 +194,10 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             progress(scan.whole_bytes / max(scan.size, 1), "examining")
         damage = scan.damage or scan.summary_damage()
         whole_bytes, missing = scan.whole_bytes, b""
-        if last is not None:
-            if damage and not last.is_followed and not last.is_indexed():
-                whole_bytes, missing = last.end, last.index_again()
-            chunks.append(last.entry())
+        last = chunks.last
+        if damage and last is not None and not last.is_followed and not last.is_indexed():
+            whole_bytes, missing = last.end, last.index_again()
+        entries = chunks.entries()
         return FileState(
             path=path,
             library=scan.header.library,
@@ -191,8 +208,8 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             schemas=list(scan.schemas.values()),
             channels=list(scan.channels.values()),
             counts=counts,
-            _chunk_indexes=b"".join(chunks),
-            _chunk_count=len(chunks),
+            _chunk_indexes=b"".join(entries),
+            _chunk_count=len(entries),
             _missing_indexes=missing,
             _attachments=others[Opcode.ATTACHMENT],
             _metadata=others[Opcode.METADATA],
