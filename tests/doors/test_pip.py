@@ -114,6 +114,11 @@ def test_executor(start: str, installation: Installation, tmp_path: Path) -> Non
         command, architecture, mauve=prefix / "bin" / "mauve", environment=installation.shell
     ) as executor:
         assert executor.component()["core"] == "mauve_rt/PointRelay"
+        executor.mauve("record", "start", "/executor", "bag")
         executor.wait_for_releases()
+        executor.mauve("record", "stop", "/executor")
         assert all(library.is_relative_to(prefix) for library in executor.libraries())
         assert executor.interrupt() == 0, executor.output
+    for words in (["trace", "check"], ["trace", "stats"], ["report"], ["trace", "export"]):
+        run(prefix / "bin" / "mauve", *words, tmp_path / "bag", environment=installation.shell, cwd=tmp_path)
+    assert "<canvas" in (tmp_path / "bag" / "report.html").read_text(encoding="utf-8")
