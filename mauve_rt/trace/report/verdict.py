@@ -122,7 +122,8 @@ def _overruns(analysis: Analysis) -> Iterator[Sentence]:
         blamed = culprits(analysis, one.component)
         if blamed:
             worst = blamed[0]
-            which = "in that cycle" if one.overruns == 1 else f"in {worst.overruns:,} of these cycles"
+            which = "all" if worst.overruns == one.overruns else f"{worst.overruns:,}"
+            which = "in that cycle" if one.overruns == 1 else f"in {which} of these cycles"
             what = f"its state {worst.state}" if worst.state else "the wake-up itself"
             limit = "" if one.overruns == 1 else "up to "
             text += f"; {which} {what} took longest, {limit}{time_text(worst.longest_ns)}"
