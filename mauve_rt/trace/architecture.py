@@ -1,5 +1,6 @@
 """The architecture that a bag tells of: components, their places in time, what their ports connect to."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -66,3 +67,14 @@ class ComponentInfo:
             for port in self.ports
         )
         return replace(self, name=f"{prefix}/{self.name}", ports=ports)
+
+
+def with_known_policies(
+    told: Iterable[ComponentInfo], before: Iterable[ComponentInfo]
+) -> tuple[ComponentInfo, ...]:
+    """Return what is told, with the policies told before where a thread has ended and has none to tell."""
+    known = {component.name: component.policy for component in before}
+    return tuple(
+        component if component.policy else replace(component, policy=known.get(component.name, ""))
+        for component in told
+    )

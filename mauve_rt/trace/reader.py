@@ -17,7 +17,7 @@ from mcap.records import Channel
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from mauve_rt.trace.architecture import ComponentInfo
+from mauve_rt.trace.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.cdr import Batch, decode_batch
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_scan import McapScan
@@ -130,7 +130,8 @@ class _Content:
             raise TraceError(msg) from error
 
     def _add_architecture(self, said: Any) -> None:
-        self._architecture = tuple(ComponentInfo.of_message(component) for component in said.components)
+        told = tuple(ComponentInfo.of_message(component) for component in said.components)
+        self._architecture = with_known_policies(told, self._architecture)
         if self._first_grids is None:  # later ones are told by the records themselves
             epoch_ns = int(said.epoch_ns)
             self._first_grids = {

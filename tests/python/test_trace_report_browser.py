@@ -1,6 +1,7 @@
 """The report in a headless Chromium: it draws, zooms, tells what is under the pointer, without complaint."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -161,6 +162,44 @@ def test_the_theme_button_changes_the_colours(browser: Browser, page: Path):
     browser.settle()
     assert browser.evaluate(paper) != light
     assert min(browser.evaluate(INK)) > 200
+
+
+def test_hovering_a_histogram_tells_counts(browser: Browser, page: Path):
+    browser.open(page)
+    browser.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+    browser.evaluate(
+        "document.querySelector('#distributions [data-histogram]').scrollIntoView({block: 'center'})"
+    )
+    browser.settle()
+    box = json.loads(
+        browser.evaluate(
+            "(() => { const b = document.querySelector('#distributions .bars').getBoundingClientRect();"
+            "return JSON.stringify([b.right - 1, b.top + b.height / 2]); })()"
+        )
+    )
+    browser.mouse("mouseMoved", *box)
+    browser.settle()
+    tip = browser.evaluate("document.getElementById('tip').innerText").replace("\u202f", " ")
+    assert re.search(r"\d \N{MICRO SIGN}s to .*\d \N{MICRO SIGN}s\s+count\s+\d+ \([\d.]+ %\)", tip)
+    assert browser.complaints == []
+
+
+def test_one_chooses_which_reconfiguration_is_shown(browser: Browser, tmp_path: Path):
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 10)
+    for _ in range(2):
+        swap(source, "c", pending)
+        pending = run(source, "c", 10, begin_ns=pending)
+    write_report(tmp_path / "report.html", trace_of(source))
+    browser.open(tmp_path / "report.html")
+    shown = "[...document.querySelectorAll('.swap')].map(one => one.checkVisibility())"
+    assert browser.evaluate(shown) == [True, False]
+    browser.evaluate(
+        "(() => { const s = document.querySelector('[data-chooser=swap]'); s.value = '1';"
+        "s.dispatchEvent(new Event('change')); })()"
+    )
+    assert browser.evaluate(shown) == [False, True]
 
 
 def test_a_trace_without_records_is_shown_without_complaint(browser: Browser, tmp_path: Path):

@@ -124,7 +124,7 @@ def test_before_and_after_do_not_reach_over_the_neighbouring_swaps():
     assert len(panels) == 3
     for panel in panels:
         assert '<td>wake-up latency</td><td class="number">5</td>' in panel
-        assert panel.count("<circle") == 20  # of the phase: all four fives, whichever swap
+        assert panel.count('class="dot ') == 20  # of the phase: all four fives, whichever swap
         assert "no release missed" in panel
 
 

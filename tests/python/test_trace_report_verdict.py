@@ -15,7 +15,7 @@ from synthetic_traces import (
     trace_of,
 )
 
-from mauve_rt.trace.architecture import ComponentInfo
+from mauve_rt.trace.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.report import Verdict, judge
 from mauve_rt.trace.report.analysis import analyse
@@ -186,3 +186,9 @@ def test_ordinary_scheduling_is_not_hidden():
     found = verdict_on(replace(periodic_trace(), architecture=(info,)))
     assert found.level == "attention"
     assert "Without real-time scheduling (SCHED_OTHER): c." in said(found)
+
+
+def test_a_policy_is_known_after_the_threads_have_ended():
+    running = ComponentInfo("c", "p/S", "p/C", "p/F", PERIOD_NS, 0, "SCHED_OTHER", 0, (), ())
+    other = replace(running, name="new", policy="")
+    assert with_known_policies([replace(running, policy=""), other], [running]) == (running, other)

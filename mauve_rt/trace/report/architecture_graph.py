@@ -114,7 +114,7 @@ def _arrows(placed: Placed, arrows: list[_Arrow], sizes: dict[str, Size]) -> Ite
         resource = several[0].port.resource.rpartition("/")[2]
         words = [one.port.name for one in several if one.port.name != resource]
         if words:
-            middle = _middle(points)
+            middle = _middle(points, last=ends[1].startswith("c:"))
             text = svg.shortened(", ".join(words), 110, character=5.4)
             parts += svg.label(*middle, text, css="port", anchor="middle")
         yield svg.group(parts, css="arrow", tip="\n".join(tips))
@@ -154,9 +154,9 @@ def _head(points: list[Point]) -> str:
     )
 
 
-def _middle(points: list[Point]) -> Point:
-    at = len(points) // 2
-    (x0, y0), (x1, y1) = points[at - 1], points[at]
+def _middle(points: list[Point], *, last: bool) -> Point:
+    """Middle of the part at the component, where no other edge takes the same way."""
+    (x0, y0), (x1, y1) = points[-2:] if last else points[:2]
     return ((x0 + x1) / 2, (y0 + y1) / 2 + 3)
 
 

@@ -40,7 +40,7 @@ def slices_by_state(trace: Trace, component: str) -> dict[str, Array]:
         slices["extent_ns"] = of_state["end_ns"] - of_state["begin_ns"]
         slices["busy_ns"] = slices["extent_ns"]
         slices["number"] = 1
-        found[trace.name(int(name))] = slices
+        found[trace.name(int(name))] = _by_begin(slices)
     return found
 
 
@@ -54,7 +54,13 @@ def releases_of(records: Records) -> Array:
     found["wakeup_ns"] = rows["b"] - rows["a"]
     ends = next_of(records, at, (Kind.WAIT, Kind.OVERRUN), unless=(Kind.RELEASE, Kind.STOP))
     found["response_ns"] = np.where(ends >= 0, records["time_ns"][ends] - rows["a"], UNKNOWN)
-    return found
+    return _by_begin(found)
+
+
+def _by_begin(entries: Array) -> Array:
+    """Return them sorted, as those who search them need it; records nearly always are already."""
+    begin_ns = entries["begin_ns"]
+    return entries if (begin_ns[1:] >= begin_ns[:-1]).all() else entries[np.argsort(begin_ns, kind="stable")]
 
 
 def next_of(records: Records, at: Times, kinds: tuple[Kind, ...], *, unless: tuple[Kind, ...]) -> Times:

@@ -19,6 +19,8 @@ _ROW, _TALL_ROW = 26.0, 58.0
 _TOP = 30.0
 _MOST_TICKS = 240
 _PERIODS_AROUND = 2.6
+_OUTLIER = 2.5
+"""Times the 90th percentile of phase errors from which one is drawn as beyond."""
 _OTHERS = 24
 """Rows of other components."""
 
@@ -94,13 +96,13 @@ def phase_figure(analysis: Analysis, one: Reconfiguration, *, releases: int = 40
     errors = [grid.phase_ns(int(actual_ns[index])) for index in chosen]
     if not errors:
         return ""
-    low, high = min(0, *errors), max(0, *errors)
-    top, height = 18.0, 150.0
+    low, high = (_typical_limit(errors, sign) for sign in (-1, 1))
+    top, height = 22.0, 154.0
     bottom = height - 28
     span = max(high - low, 1_000) * 1.1
 
     def y(error_ns: float) -> float:
-        return bottom - (error_ns - low) / span * (bottom - top)
+        return bottom - (min(max(error_ns, low), high) - low) / span * (bottom - top)
 
     step = (WIDTH - _LEFT - _RIGHT) / (2 * releases)
     parts = []
@@ -117,13 +119,24 @@ def phase_figure(analysis: Analysis, one: Reconfiguration, *, releases: int = 40
         which = index - middle + (index >= middle)
         tip = f"release {which:+d}: {time_text(error_ns)} after its instant of the grid"
         parts.append(svg.line(x, y(0), x, y(error_ns), css="stem"))
-        parts.append(svg.circle(x, y(error_ns), 3.2, css="after" if index >= middle else "before", tip=tip))
+        css = "after" if index >= middle else "before"
+        if low <= error_ns <= high:
+            parts.append(svg.circle(x, y(error_ns), 3.2, css=f"dot {css}", tip=tip))
+        else:  # further off than the figure reaches
+            points = f"M{svg.number(x - 4)} {svg.number(y(error_ns))}h8l-4 {-8 if error_ns > high else 8}z"
+            parts.append(svg.path(points, css=f"dot {css}", tip=tip))
     parts.append(svg.label(centre - 10, height - 8, "releases before", css="tick", anchor="end"))
     parts.append(svg.label(centre + 10, height - 8, "releases after", css="tick"))
     parts.append(svg.label(10, top + 4, "off the grid", css="strong"))
     return svg.svg(
         WIDTH, height, "".join(parts), css="swap-phase", described="phase of releases around the swap"
     )
+
+
+def _typical_limit(errors: list[int], sign: int) -> float:
+    """How far a figure reaches on one side of 0: single outliers do not flatten all the rest."""
+    sizes = [max(sign * error, 0) for error in errors]
+    return sign * min(max(sizes), max(_OUTLIER * float(np.quantile(sizes, 0.9)), 1_000))
 
 
 def neighbours_in_words(analysis: Analysis, one: Reconfiguration) -> list[str]:

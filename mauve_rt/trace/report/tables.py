@@ -10,7 +10,7 @@ from mauve_rt.trace.report.units import share_text, time_text
 from mauve_rt.trace.statistics import Distribution
 
 _PERCENTILES = ("count", "min", "p50", "p99", "p99.9", "max")
-_COUNTS = ("component", "scheduled", "period", "load", "releases", "overruns", "skipped", "faults")
+_COUNTS = ("component", "scheduled", "period", "load", "releases", "overruns", "skipped")
 _MANY_ROWS = 400
 
 WORDS = {
@@ -36,8 +36,9 @@ WORDS = {
 
 def components_section(analysis: Analysis) -> Section:
     """Return the tables per component and per state."""
+    faults = ("faults",) if analysis.faults else ()
     components = table(
-        (*_COUNTS, *_spread("wake-up"), *_spread("response"), "phase error, most"),
+        (*_COUNTS, *faults, *_spread("wake-up"), *_spread("response")),
         [_component_row(analysis, name) for name in analysis.trace.components],
     )
     states = [
@@ -132,7 +133,6 @@ def _component_row(analysis: Analysis, component: str) -> tuple[object, ...]:
         if analysis.sporadic(component)
         else None
     )
-    off_ns = max(abs(found.phase_error.min_ns), abs(found.phase_error.max_ns))
     info = next((one for one in analysis.trace.architecture if one.name == component), None)
     scheduled = None if info is None else scheduling_in_words(info)
     return (
@@ -143,19 +143,17 @@ def _component_row(analysis: Analysis, component: str) -> tuple[object, ...]:
         found.releases,
         Cell(f"{found.overruns:,}", "attention" if found.overruns else ""),
         Cell(f"{found.skipped:,}", "attention" if found.skipped else ""),
-        Cell(f"{found.faults:,}", "bad" if found.faults else ""),
+        *([Cell(f"{found.faults:,}", "bad" if found.faults else "")] if analysis.faults else []),
         *_short(found.wakeup),
         *_short(found.response),
-        Cell(time_text(off_ns) if found.phase_error.count else "\N{EN DASH}"),
     )
 
 
 def scheduling_in_words(info: ComponentInfo) -> str:
     """Return how a component's thread was scheduled: FIFO 40, CPU 1."""
-    policy = info.policy.removeprefix("SCHED_") or "simulated"
-    priority = f" {info.priority}" if info.priority else ""
+    policy = info.policy.removeprefix("SCHED_") or "priority"  # no thread to read it back from
     cpus = f", CPU {' '.join(map(str, info.cpus))}" if info.cpus else ""
-    return f"{policy}{priority}{cpus}"
+    return f"{policy} {info.priority}{cpus}"
 
 
 def _short(found: Distribution) -> tuple[Cell, ...]:
