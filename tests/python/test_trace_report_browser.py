@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from headless_browser import NAMES, Browser, find_browser
-from synthetic_traces import deploy, overrun, run, swap, trace_of
+from synthetic_traces import deploy, long_trace, overrun, run, swap, trace_of
 
 from mauve_rt.trace.report import write_report
 from mauve_rt.trace.synthetic import SyntheticSource
@@ -162,6 +162,26 @@ def test_the_theme_button_changes_the_colours(browser: Browser, page: Path):
     browser.settle()
     assert browser.evaluate(paper) != light
     assert min(browser.evaluate(INK)) > 200
+
+
+def test_what_is_merged_says_so(browser: Browser, tmp_path: Path):
+    write_report(tmp_path / "report.html", long_trace(["c"], 5_000, late=[4_000]), budget=1_000)
+    browser.open(tmp_path / "report.html")
+    merged = "mauve.timeline.model.rows[0].states[0]"
+    assert browser.evaluate(f"{merged}.number.some(number => number > 1)")
+    begin, extent = browser.evaluate(
+        f"(() => {{ const i = {merged}.number.findIndex(n => n > 1);"
+        f"return [{merged}.begin[i], {merged}.extent[i]]; }})()"
+    )
+    browser.evaluate(f"mauve.timeline.show({begin}, {begin + extent})")
+    left, top, width, _ = plot(browser)
+    browser.mouse("mouseMoved", left + width / 2, top + browser.evaluate("mauve.AXIS_HEIGHT + 30"))
+    browser.settle()
+    tip = browser.evaluate("document.getElementById('tip').innerText")
+    assert "merged" in tip
+    assert "kept in full" in tip
+    assert min(browser.evaluate(INK)) > 200
+    assert browser.complaints == []
 
 
 def test_hovering_a_histogram_tells_counts(browser: Browser, page: Path):

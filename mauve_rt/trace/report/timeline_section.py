@@ -34,7 +34,8 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         return Section("Timeline", '<p class="nothing">The trace holds no record.</p>', anchor="timeline")
     jumps = "".join(_jump(kind, name, len(described["jumps"][kind])) for kind, name in _JUMPS)
     names = "".join(_row_name(analysis, index) for index in range(len(analysis.trace.components)))
-    keys = "".join(f'<span><i class="key-{kind}"></i>{name}</span>' for kind, name in _KEYS)
+    shown = [*_KEYS, ("kept", "kept in full")] if described["bucket"] else _KEYS
+    keys = "".join(f'<span><i class="key-{kind}"></i>{name}</span>' for kind, name in shown)
     html = (
         f'<div class="toolbar">{jumps}<span class="zoom">'
         '<button type="button" data-zoom="in" title="zoom in (+)">+</button>'

@@ -39,7 +39,9 @@
       entries += Math.max(0, range[1] - range[0] + 1);
       return range;
     });
-    if (entries > scale.width * PER_PIXEL) drawShares(context, row, scale, top, bottom, colours);
+    const many = entries > scale.width * PER_PIXEL;
+    const merged = (track, [first, last]) => track.number.subarray(first, last + 1).some((number) => number > 1);
+    if (many || row.states.some((track, i) => merged(track, ranges[i]))) drawShares(context, row, scale, top, bottom, colours);
     else row.states.forEach((track, i) => drawEntries(context, track, ranges[i], scale, top, bottom, colours, i));
   }
 
@@ -53,13 +55,7 @@
       context.fillStyle = colour;
       const from = Math.max(x, -10);
       const shown = Math.min(x + width, scale.width + 10) - from;
-      if (track.number[i] > 1) {
-        const share = track.extent[i] > 0 ? 1 - track.idle[i] / track.extent[i] : 0;
-        const height = Math.max(2, Math.cbrt(share) * room);
-        context.globalAlpha = 0.6;
-        context.fillRect(from, bottom - height, Math.max(shown, 1), height);
-        context.globalAlpha = 1;
-      } else if (width >= 1) {
+      if (width >= 1) {
         context.fillRect(from, top, shown, room);
         if (shown > LABEL_ROOM) nameSlice(context, track.name, from, shown, top, bottom, colours);
       } else {
@@ -253,6 +249,14 @@
       const width = context.measureText(tick.text).width;
       const free = x - width / 2 > (axis.base === null ? -1 : 78) && x + width / 2 < scale.width + 1;
       if (free) context.fillText(tick.text, x - width / 2, 14);
+    }
+    if (model.bucket) {
+      context.fillStyle = colours.accent;
+      for (const [begin, end] of model.kept) {
+        const from = Math.max(scale.x(begin), 0);
+        const to = Math.min(scale.x(end), scale.width);
+        if (to >= 0 && from <= scale.width) context.fillRect(from, 19, Math.max(to - from, 1), 2);
+      }
     }
     if (axis.base !== null) {
       context.fillStyle = colours.ink;

@@ -3,6 +3,7 @@
   "use strict";
 
   const NEAR = 4; // px
+  const MERGED = "Only what is around reconfigurations, overruns, faults and the worst latencies is kept in full.";
   const tip = () => document.getElementById("tip");
 
   // Show lines near the pointer: {title, colour, facts: [[word, value]], notes: [text]} each.
@@ -64,13 +65,13 @@
     if (track.number[at] === 1) return { facts: [["execution time", mauve.timeText(track.extent[at])], ["begin", begin]] };
     const share = track.extent[at] ? 1 - track.idle[at] / track.extent[at] : 0;
     return {
+      merged: true,
       facts: [
         ["merged", mauve.countText(track.number[at], "execution")],
         ["within", mauve.timeText(track.extent[at])],
         ["share of the time", mauve.shareText(share)],
         ["begin", begin],
       ],
-      notes: ["Away from what is interesting, executions are merged."],
     };
   }
 
@@ -157,7 +158,9 @@
     const found = swaps(timeline, time, pixel);
     if (row) {
       found.push(...markers(row, timeline, time, pixel));
-      found.push(...executions(row, timeline, time, pixel), ...release(row, timeline, time, pixel));
+      const executed = executions(row, timeline, time, pixel);
+      found.push(...executed, ...release(row, timeline, time, pixel));
+      if (executed.some((block) => block.merged)) found.push({ notes: [MERGED] });
       if (found.length) found.unshift({ title: row.name });
     }
     return { index: row ? index : -1, blocks: found, time };
