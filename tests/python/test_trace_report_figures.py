@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic_traces import EPOCH_NS, PERIOD_NS, deploy, run, swap, trace_of
+from synthetic_traces import EPOCH_NS, PERIOD_NS, deploy, overrun, run, swap, trace_of
 
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.comparison import reconfigurations_section
@@ -140,3 +140,19 @@ def test_the_blackout_is_told_with_its_parts():
     assert "blackout 20 us: adopt 4 us, take 1 us" in text
     assert f"c was parked for 20 us, {PERIOD_NS // 2_000_000} ms before its next release was due" in text
     assert "The next release was due on the grid, and came 10 us after its instant" in text
+
+
+def test_the_others_are_told_of():
+    source = SyntheticSource(["c", "calm", "late"])
+    for component in source.components:
+        deploy(source, component)
+    pending = run(source, "c", 5)
+    swap(source, "c", pending)
+    run(source, "c", 5, begin_ns=pending)
+    run(source, "calm", 10)
+    run(source, "late", 3, begin_ns=overrun(source, "late", run(source, "late", 4)))
+    section = reconfigurations_section(analyse(trace_of(source)))
+    assert section is not None
+    text = plain(section.html)
+    assert "the other 2 components were released 11 times; late overran once." in text
+    assert "calm: 6 releases, no overrun; latest wake-up 10.0 us" in text

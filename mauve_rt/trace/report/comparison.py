@@ -6,10 +6,11 @@ from html import escape
 import numpy as np
 
 from mauve_rt.trace.report.analysis import Analysis, Swap
-from mauve_rt.trace.report.blocks import Cell, Section, bullets, details, table
+from mauve_rt.trace.report.blocks import Cell, Section, table
 from mauve_rt.trace.report.cycles import UNKNOWN
 from mauve_rt.trace.report.histograms import Values, histogram
-from mauve_rt.trace.report.swap_figure import blackout_figure, grid_figure, neighbours_in_words, phase_figure
+from mauve_rt.trace.report.neighbours import neighbours_in_words
+from mauve_rt.trace.report.swap_figure import blackout_figure, grid_figure, phase_figure
 from mauve_rt.trace.report.tables import reconfigurations_table
 from mauve_rt.trace.report.timeline import swap_title
 from mauve_rt.trace.report.units import counted, time_text
@@ -59,14 +60,12 @@ def _option(analysis: Analysis, swap: Swap) -> str:
 
 def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
     one = swap.measured
-    others = details("The other components meanwhile", bullets(neighbours_in_words(analysis, one)))
     phase = phase_figure(analysis, one)
     blackout = blackout_figure(swap) if one.blackout_ns else ""
     wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout}{phase}</div>'
-    has_others = len(analysis.trace.components) > 1
     return (
         f'<div class="swap" data-chosen="swap" data-value="{index}"{" hidden" if index else ""}>'
-        f"<p>{escape(_in_words(analysis, swap))}</p>{wide}{others if has_others else ''}"
+        f"<p>{escape(_in_words(analysis, swap))}</p>{wide}{neighbours_in_words(analysis, one)}"
         f"{_before_and_after(analysis, swap)}</div>"
     )
 

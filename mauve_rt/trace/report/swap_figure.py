@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mauve_rt.trace.reconfigurations import Reconfiguration
-from mauve_rt.trace.records import Kind
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.cycles import Times
 from mauve_rt.trace.report.scales import linear_ticks
-from mauve_rt.trace.report.units import counted, share_text, tick_texts, time_text
+from mauve_rt.trace.report.units import tick_texts, time_text
 
 WIDTH = 1080.0
 _LEFT, _RIGHT = 170.0, 20.0
@@ -45,7 +44,7 @@ class Window:
 
 def grid_figure(analysis: Analysis, one: Reconfiguration) -> str:
     """Draw the releases of all components around a swap, on the grid of the one that was swapped."""
-    window = _window(analysis, one)
+    window = window_around(analysis, one)
     others = [name for name in analysis.trace.components if name != one.component][:_OTHERS]
     height = _TOP + _TALL_ROW + len(others) * _ROW + 26
     parts = [_axis(window, one.parked_ns, height - 22), _grid_lines(analysis, one, window)]
@@ -139,32 +138,8 @@ def _typical_limit(errors: list[int], sign: int) -> float:
     return sign * min(max(sizes), max(_OUTLIER * float(np.quantile(sizes, 0.9)), 1_000))
 
 
-def neighbours_in_words(analysis: Analysis, one: Reconfiguration) -> list[str]:
-    """Say of each other component what happened to its releases in the window of the figure."""
-    window = _window(analysis, one)
-    lines = []
-    for name in analysis.trace.components:
-        if name == one.component:
-            continue
-        releases = analysis.releases[name]
-        first, last = np.searchsorted(releases["begin_ns"], (window.begin_ns, window.end_ns))
-        inside = releases[first:last]
-        late = _overruns_within(analysis, name, window)
-        text = f"{name}: {counted(len(inside), 'release')}, {counted(late, 'overrun')}"
-        if len(inside):
-            worst = int(inside["wakeup_ns"].max())
-            rank = float(np.count_nonzero(releases["wakeup_ns"] > worst)) / len(releases)
-            text += f"; latest wake-up {time_text(worst)}, exceeded by {share_text(rank)} of all its wake-ups"
-        lines.append(text)
-    return lines
-
-
-def _overruns_within(analysis: Analysis, component: str, window: Window) -> int:
-    times = analysis.trace.of(component, Kind.OVERRUN)["time_ns"]
-    return int(np.count_nonzero((times >= window.begin_ns) & (times < window.end_ns)))
-
-
-def _window(analysis: Analysis, one: Reconfiguration) -> Window:
+def window_around(analysis: Analysis, one: Reconfiguration) -> Window:
+    """Return what the figure of the grid shows: some periods around the swap and the next release."""
     period_ns = analysis.period_ns(one.component)
     next_ns = one.nominal_ns if one.nominal_ns is not None else one.pending_ns
     first_ns, last_ns = one.parked_ns, max(one.armed_ns, next_ns)
