@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.model import load_architecture
@@ -19,6 +18,7 @@ from mauve_rt.node.executor_messages import (
 )
 from mauve_rt.node.executor_requests import Outcome, Request
 from mauve_rt.node.qos import qos_profile, recorded_qos
+from mauve_rt.node.simulated_messages import serialize
 from mauve_rt.node.simulated_runtime import SimulatedRuntime
 from mauve_rt.node.simulated_topics import Sample, SimulatedTopics, resolved, stamp
 from mauve_rt.trace.trace_bag import SentMessage, TraceBag
@@ -116,7 +116,7 @@ class SimulatedExecutor:
         if observed.epoch != self._published_epoch:
             state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
             self._published_epoch = state.epoch
-            self._architecture = bytes(serialize_message(trace_architecture(self._runtime, observed)))
+            self._architecture = serialize(trace_architecture(self._runtime, observed))
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
         for fault in self._faults.look(observed.components):
             if fault.part.fell_back:

@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 
 from builtin_interfaces.msg import Time
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 
 from mauve_rt.model import message_class
+from mauve_rt.node.simulated_messages import serialize
 
 S = 1_000_000_000
 
@@ -43,7 +44,7 @@ class SimulatedTopics:
 
     def say(self, topic: str, type_name: str, message: Any, *, time_ns: int, qos: QoSProfile) -> None:
         """Publish a message of rclpy."""
-        self.publish(Sample(topic, type_name, serialize_message(message), time_ns, qos))
+        self.publish(Sample(topic, type_name, serialize(message), time_ns, qos))
 
 
 def resolved(name: str, namespace: str) -> str:
