@@ -118,11 +118,8 @@ TraceDrain Architecture::drain_trace() {
     drain.dropped[number] = finals_[number].dropped;
   }
   for (const auto& component : present) {
-    TraceRing* ring = component->task().ring();
-    if (ring == nullptr) continue;
-    ring->drain(drain.records);
-    drain.written[component->task().number()] = ring->offered();
-    drain.dropped[component->task().number()] = ring->dropped();
+    Task& task = component->task();
+    task.drain_ring(drain.records, drain.written[task.number()], drain.dropped[task.number()]);
   }
   drain.monotonic_ns = monotonic_now_ns();
   drain.realtime_ns = realtime_now_ns();

@@ -88,7 +88,21 @@ Fault Task::fault() const {
 
 std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
 
+void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped) {
+  const std::lock_guard lock(ring_mutex_);
+  if (ring_ == nullptr) return;
+  ring_->drain(into);
+  written = ring_->offered();
+  dropped = ring_->dropped();
+}
+
+std::unique_ptr<TraceRing> Task::release_ring() {
+  const std::lock_guard lock(ring_mutex_);
+  return std::move(ring_);
+}
+
 void Task::begin_trace(bool trace) {
+  const std::lock_guard lock(ring_mutex_);
   if (!trace) {
     ring_.reset();
   } else if (ring_ == nullptr) {

@@ -96,6 +96,7 @@ struct ChangeSignal {
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
 /// | boundary_ns_ ...       | machine                               | machine      | its own                            |
+/// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | command_mutex_         | ordinary threads, a command each      | -            | -                                  |
 class Task {
  public:
@@ -212,10 +213,12 @@ class Task {
   const TaskStatistics& statistics() const noexcept { return statistics_; }
   /// What the thread allocated, and its page faults, since its last start.
   const ThreadCounters& counters() const noexcept { return counters_; }
-  /// The trace's ring; nullptr when nothing is traced. [non-rt]
+  /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
   TraceRing* ring() noexcept { return ring_.get(); }
+  /// Appends the ring's records and tells its counts; leaves all alone when nothing is traced. [non-rt]
+  void drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped);
   /// Gives the ring away, when the component is removed before the ring is drained; parked, no thread. [non-rt]
-  std::unique_ptr<TraceRing> release_ring() noexcept { return std::move(ring_); }
+  std::unique_ptr<TraceRing> release_ring();
   const std::string& name() const noexcept { return name_; }
   std::uint16_t number() const noexcept { return number_; }
 
@@ -281,6 +284,7 @@ class Task {
   Context context_;
   TaskStatistics statistics_;
   ThreadCounters counters_;
+  std::mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
 
   Shell* shell_{nullptr};
