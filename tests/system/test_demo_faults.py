@@ -116,7 +116,7 @@ def test_without_privileges_it_runs_and_says_what_is_missing(start: Starter):
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     if summary["realtime"]["granted"]:
         pytest.skip("this user has real-time rights (rtprio and memlock limits)")
-    assert status == 0, demo.lines[-10:]
+    assert status == 0, "\n".join(demo.lines[-10:])
     missing = summary["realtime"]["missing"]
     assert any("rtprio" in line for line in missing)
     text = "\n".join(demo.lines)
