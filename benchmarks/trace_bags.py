@@ -18,13 +18,6 @@ _REALTIME_NS = 1_700_000_000_000_000_000
 class _Words:
     """The words of the records."""
 
-    def collect_trace(self, period_ns: int) -> None:
-        """Nothing to collect."""
-
-    def drain_trace(self) -> Drained:
-        """Not asked: the records are given."""
-        raise NotImplementedError
-
     def trace_components(self) -> list[str]:
         return list(COMPONENTS)
 

@@ -225,10 +225,7 @@ class RecordingOrders:
         if self._recording.recording:
             raise RefusalError(Code.ALREADY_RUNNING, "it records already; stop that first")
         bag = self._folder / (order.bag or f"mauve_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}")
-        if (
-            not bag.resolve().is_relative_to(self._folder.resolve())
-            or bag.resolve() == self._folder.resolve()
-        ):
+        if self._folder.resolve() not in bag.resolve().parents:
             text = (
                 f"bag '{order.bag}': expected a folder below {self._folder} (the executor's parameter bags)"
             )

@@ -54,7 +54,17 @@ class Drained(NamedTuple):
     realtime_ns: int
 
 
-class TraceSource(Protocol):
+class TraceWords(Protocol):
+    """What the numbers in records stand for; all that a bag asks for itself."""
+
+    def trace_components(self) -> list[str]:
+        """Words that `component` of a record refers to."""
+
+    def trace_names(self) -> list[str]:
+        """Words that `name` of a record refers to."""
+
+
+class TraceSource(TraceWords, Protocol):
     """The part of `mauve_rt._kernel.Deployer` that the recorder uses."""
 
     def collect_trace(self, period_ns: int) -> None:
@@ -62,12 +72,6 @@ class TraceSource(Protocol):
 
     def drain_trace(self) -> Drain:
         """Take everything out of the rings, and what was collected."""
-
-    def trace_components(self) -> list[str]:
-        """Words that `component` of a record refers to."""
-
-    def trace_names(self) -> list[str]:
-        """Words that `name` of a record refers to."""
 
 
 class SentMessage(NamedTuple):
@@ -111,7 +115,7 @@ class TraceBag:
 
     def __init__(
         self,
-        source: TraceSource,
+        words: TraceWords,
         directory: Path,
         *,
         node_name: str,
@@ -121,7 +125,7 @@ class TraceBag:
         """Create the bag; nothing is drained yet.
 
         Args:
-            source: the deployer, or a simulation's.
+            words: the deployer's, or a simulation's.
             directory: the bag's folder, which must not exist yet.
             node_name: absolute name of the executor's node; the trace is below it.
             on_error: called at most once for each type that cannot be recorded, with one line.
@@ -131,7 +135,7 @@ class TraceBag:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
-        self._source = source
+        self._words = words
         self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
@@ -212,7 +216,7 @@ class TraceBag:
 
     def _write_names(self, log_time_ns: int) -> None:
         """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
-        words = (self._source.trace_components(), self._source.trace_names())
+        words = (self._words.trace_components(), self._words.trace_names())
         if words != self._names:
             self._names = words
             self._write_latched(NAMES, encode_names(*words), log_time_ns)

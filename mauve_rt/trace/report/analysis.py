@@ -92,7 +92,7 @@ def analyse(
         slices[component] = slices_by_state(trace, component)
     measured = reconfigurations(trace)
     requests = join_requests(measured, events)
-    begin_ns, end_ns = _extent(trace)
+    begin_ns, end_ns = trace.span_ns
     return Analysis(
         trace=trace,
         statistics=statistics,
@@ -118,13 +118,6 @@ def _changed_ns(trace: Trace, measured: list[Reconfiguration]) -> list[int]:
         told = at < len(of_component) and of_component[at] <= one.armed_ns
         found.append(int(of_component[at]) if told else one.parked_ns)
     return found
-
-
-def _extent(trace: Trace) -> tuple[int, int]:
-    times = [records["time_ns"] for records in trace.records.values() if len(records)]
-    if not times:
-        return 0, 0
-    return min(int(one.min()) for one in times), max(int(one.max()) for one in times)
 
 
 def _faults(trace: Trace) -> list[Fault]:

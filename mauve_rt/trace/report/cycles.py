@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.pairs import gaps
 from mauve_rt.trace.records import Kind, Records
 from mauve_rt.trace.statistics import state_spans
 from mauve_rt.trace.trace import Trace
@@ -68,9 +69,7 @@ def next_of(records: Records, at: Times, kinds: tuple[Kind, ...], *, unless: tup
     (ends,) = np.nonzero(np.isin(records["kind"], kinds))
     if not len(ends):
         return np.full(len(at), -1, np.int64)
-    barrier = np.isin(records["kind"], unless)
-    barrier[1:] |= np.diff(records["sequence"].astype(np.int64)) != 1
-    passed = np.cumsum(barrier)
+    passed = np.cumsum(np.isin(records["kind"], unless) | gaps(records))
     found = np.searchsorted(ends, at, side="right")
     there = found < len(ends)
     index = ends[np.minimum(found, len(ends) - 1)]
