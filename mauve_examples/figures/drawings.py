@@ -24,10 +24,7 @@ def draw_without_barrier(run: Run) -> Canvas:
     """Fig. 3: synchronisation lost."""
     first, second = tasks_of(run)
     t_0 = run.deployer[0].begin_ns
-    window = (t_0 - _MARGIN_NS, second.executions[:_EXECUTIONS][-1][1] + 2 * _MARGIN_NS)
-    canvas = Canvas("Fig. 3   Without the barrier: synchronisation lost", _ROWS, window, t_0)
-    _draw_deployer(canvas, run)
-    _draw_tasks(canvas, run, (first, second), window)
+    canvas, window = _from_start("Fig. 3   Without the barrier: synchronisation lost", run)
     canvas.grid(_instants(first.grid, window), FIRST, (_FIRST_ROW, _SECOND_ROW))
     canvas.grid(_instants(second.grid, window), SECOND, (_SECOND_ROW, _SECOND_ROW))
     canvas.instant(t_0, "$t_0$")
@@ -45,14 +42,10 @@ def draw_without_barrier(run: Run) -> Canvas:
 
 def draw_deployment(run: Run) -> Canvas:
     """Fig. 5: tasks synchronised."""
-    first, second = tasks_of(run)
-    t_0 = run.deployer[0].begin_ns
-    window = (t_0 - _MARGIN_NS, second.executions[:_EXECUTIONS][-1][1] + 2 * _MARGIN_NS)
-    canvas = Canvas("Fig. 5   The barrier and one epoch: tasks synchronised", _ROWS, window, t_0)
-    _draw_deployer(canvas, run)
-    _draw_tasks(canvas, run, (first, second), window)
+    first, _ = tasks_of(run)
+    canvas, window = _from_start("Fig. 5   The barrier and one epoch: tasks synchronised", run)
     canvas.grid(_instants(first.grid, window), FAINT)
-    canvas.instant(t_0, "$t_0$")
+    canvas.instant(run.deployer[0].begin_ns, "$t_0$")
     canvas.instant(first.nominal_ns[0], "$t_1$", row=_FIRST_ROW)
     canvas.remark(_DEPLOYER_ROW, run.deployer[0].end_ns, "all threads have met: the epoch is $t_1$, for both")
     return canvas
@@ -76,6 +69,17 @@ def draw_reconfiguration(run: Run) -> Canvas:
     canvas.remark(_DEPLOYER_ROW, request.end_ns, "$C_B$ is built and configured, both tasks running", CHANGE)
     canvas.change(_SECOND_ROW, swap.parked_ns, f"$C_A \\to C_B$: {microseconds(swap.blackout_ns)}")
     return canvas
+
+
+def _from_start(title: str, run: Run) -> tuple[Canvas, tuple[int, int]]:
+    """Return a canvas with deployer and tasks from the deployer's first act on, and the time it shows."""
+    first, second = tasks_of(run)
+    t_0 = run.deployer[0].begin_ns
+    window = (t_0 - _MARGIN_NS, second.executions[:_EXECUTIONS][-1][1] + 2 * _MARGIN_NS)
+    canvas = Canvas(title, _ROWS, window, t_0)
+    _draw_deployer(canvas, run)
+    _draw_tasks(canvas, run, (first, second), window)
+    return canvas, window
 
 
 def _draw_deployer(canvas: Canvas, run: Run) -> None:
