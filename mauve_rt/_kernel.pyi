@@ -357,7 +357,7 @@ class Transaction:
 @final
 class TransactionReport:
     steps: Final[list[StepReport]]
-    epoch: Final[int]  # of the architecture, after
+    revision: Final[int]  # of the architecture, after
     prepare_ns: Final[int]
     blackout_ns: Final[int]  # the longest of any component's
 
@@ -427,7 +427,7 @@ class Architecture:
         """Its address, for other native modules."""
     def describe(self) -> ArchitectureDescription:
         """Components, implementations, wiring, properties, states, grids and resources, as of one moment."""
-    def epoch(self) -> int:
+    def revision(self) -> int:
         """Grows with every committed change and every start, stop and fault; never 0."""
     def components(self) -> list[ComponentDescription]: ...
     def take_recent_maxima(self) -> list[RecentMaxima]:
@@ -477,7 +477,7 @@ class Deployer:
         transaction: Transaction,
         *,
         dry_run: bool = False,
-        expected_epoch: int = 0,
+        expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
         phase_timeout_ns: int = 1_000_000_000,
     ) -> TransactionReport:
@@ -561,7 +561,7 @@ class Simulation:
         transaction: Transaction,
         *,
         dry_run: bool = False,
-        expected_epoch: int = 0,
+        expected_revision: int = 0,
     ) -> TransactionReport:
         """As Deployer.commit, in virtual time."""
     def replace_core(self, architecture: Architecture, component: str, core: str) -> StepReport:

@@ -217,7 +217,7 @@ class FakeRobot:
             "mauve_msgs/msg/ReconfigurationEvent",
             stamp=self.messages.make("builtin_interfaces/msg/Time", sec=0, nanosec=0),
             instance_id="1",
-            epoch=2,
+            revision=2,
             requested_by=f"/{self.name}/supervisor",
             request_id="1",
             request=f"replace_core exploration {core}",
@@ -241,7 +241,7 @@ class FakeRobot:
             decision=decision,
             reason=REASONS[decision],
             silence_s=SILENCE_S if decision == "do" else 0.04,
-            epoch=1,
+            revision=1,
             message="",
         )
         topic = f"/{self.name}/supervisor/decisions"

@@ -127,7 +127,7 @@ void bind_architecture(py::module_& module) {
           Unlocked())
       .def(
           "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked())
-      .def("epoch", [](PyArchitecture& self) { return self.architecture.epoch(); })
+      .def("revision", [](PyArchitecture& self) { return self.architecture.revision(); })
       .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
       .def("components", &describe_components)
       .def("take_recent_maxima", &take_all_recent_maxima)

@@ -139,14 +139,14 @@ StepReport replace_core(PyDeployer& self, const std::string& component, const py
 }
 
 TransactionReport commit(PyDeployer& self, const PyTransaction& steps, bool dry_run,
-                         std::uint64_t expected_epoch, time_ns_t commit_timeout_ns,
+                         std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
                          time_ns_t phase_timeout_ns) {
   Transaction transaction = steps.build(self.registry());
   const py::gil_scoped_release release;
   return self.deployer().commit(std::move(transaction),
                                 {.timeouts = timeouts(commit_timeout_ns, phase_timeout_ns),
                                  .dry_run = dry_run,
-                                 .expected_epoch = expected_epoch});
+                                 .expected_revision = expected_revision});
 }
 
 /// With Python's 5 ms a component in Python would wait that long for a thread that computes; DESIGN section 4.
@@ -218,7 +218,7 @@ void bind_deployer(py::module_& module) {
           [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
-           py::arg("expected_epoch") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
+           py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
            py::arg("phase_timeout_ns") = s_to_ns(1))
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))

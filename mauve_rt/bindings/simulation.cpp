@@ -60,11 +60,12 @@ StepReport commit_one(PySimulation& self, PyArchitecture& architecture, Transact
 }
 
 TransactionReport commit_simulated(PySimulation& self, PyArchitecture& architecture,
-                                   const PyTransaction& steps, bool dry_run, std::uint64_t expected_epoch) {
+                                   const PyTransaction& steps, bool dry_run,
+                                   std::uint64_t expected_revision) {
   Transaction transaction = steps.build(architecture.registry);
   const py::gil_scoped_release release;
   return self.simulation.commit(architecture.architecture, std::move(transaction),
-                                {.dry_run = dry_run, .expected_epoch = expected_epoch});
+                                {.dry_run = dry_run, .expected_revision = expected_revision});
 }
 
 }  // namespace
@@ -121,7 +122,7 @@ void bind_simulation(py::module_& module) {
           },
           py::arg("architecture"), py::arg("component"), Unlocked())
       .def("commit", &commit_simulated, py::arg("architecture"), py::arg("transaction"), py::kw_only(),
-           py::arg("dry_run") = false, py::arg("expected_epoch") = 0)
+           py::arg("dry_run") = false, py::arg("expected_revision") = 0)
       .def(
           "replace_core",
           [](PySimulation& self, PyArchitecture& architecture, const std::string& component,

@@ -176,7 +176,7 @@ Transaction PyTransaction::build(const PluginRegistry& registry) const {
 void bind_transaction(py::module_& module) {
   py::class_<TransactionReport>(module, "TransactionReport")
       .def_readonly("steps", &TransactionReport::steps)
-      .def_readonly("epoch", &TransactionReport::epoch)
+      .def_readonly("revision", &TransactionReport::revision)
       .def_readonly("prepare_ns", &TransactionReport::prepare_ns)
       .def_readonly("blackout_ns", &TransactionReport::blackout_ns);
   py::class_<ArchitectureDescription>(module, "ArchitectureDescription")

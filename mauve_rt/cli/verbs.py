@@ -25,7 +25,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cause", default="", help="why, for the record")
     parser.add_argument("--request-id", default="", help="a repeated id returns the first outcome")
     parser.add_argument(
-        "--expected-epoch", type=int, default=0, metavar="N", help="refuse at any other epoch"
+        "--expected-revision", type=int, default=0, metavar="N", help="refuse at any other revision"
     )
 
 
@@ -118,7 +118,7 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
 
     request = service_type.Request(
         request_id=args.request_id,
-        expected_epoch=max(args.expected_epoch, 0),
+        expected_revision=max(args.expected_revision, 0),
         requested_by="mauve",
         cause=args.cause,
         **fields,

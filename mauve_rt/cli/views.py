@@ -79,7 +79,7 @@ def print_components(reply: Any) -> None:
             out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
-    out.print(f"epoch {reply.epoch}", style="dim")
+    out.print(f"revision {reply.revision}", style="dim")
 
 
 def report_lines(report: Sequence[Any]) -> list[str]:
@@ -102,7 +102,9 @@ def report_lines(report: Sequence[Any]) -> list[str]:
 
 def event_line(event: Any) -> str:
     """One line about a ReconfigurationEvent."""
-    outcome = f"done, epoch {event.epoch}" if event.success else f"refused ({event.code}): {event.message}"
+    outcome = (
+        f"done, revision {event.revision}" if event.success else f"refused ({event.code}): {event.message}"
+    )
     who = f" by {event.requested_by}" if event.requested_by else ""
     why = f" because {event.cause}" if event.cause else ""
     stamp = f"{event.stamp.sec}.{event.stamp.nanosec // 1_000_000:03d}"

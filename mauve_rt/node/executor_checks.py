@@ -52,26 +52,26 @@ def check_time(request: Request, runtime: Runtime) -> None:
     """Whether it is the moment for a request.
 
     Raises:
-        RefusalError: NOT_ACTIVE or WRONG_EPOCH.
+        RefusalError: NOT_ACTIVE or WRONG_REVISION.
     """
     only_properties = all(step.kind == "set_property" for step in request.steps)
     if not runtime.active and not (only_properties and runtime.configured):
         needed = "configure" if only_properties else "activate"
         text = f"the executor is not active; {needed} it first (lifecycle)"
         raise RefusalError(Code.NOT_ACTIVE, text)
-    check_epoch(request, runtime)
+    check_revision(request, runtime)
 
 
-def check_epoch(request: Request, runtime: Runtime) -> None:
-    """Whether the architecture is at the epoch that the request expects.
+def check_revision(request: Request, runtime: Runtime) -> None:
+    """Whether the architecture is at the revision that the request expects.
 
     Raises:
-        RefusalError: WRONG_EPOCH.
+        RefusalError: WRONG_REVISION.
     """
-    epoch = runtime.epoch
-    if request.expected_epoch not in (0, epoch):
-        text = f"the architecture is at epoch {epoch}, the request expected {request.expected_epoch}"
-        raise RefusalError(Code.WRONG_EPOCH, f"{text}; look at ~/state and decide again")
+    revision = runtime.revision
+    if request.expected_revision not in (0, revision):
+        text = f"the architecture is at revision {revision}, the request expected {request.expected_revision}"
+        raise RefusalError(Code.WRONG_REVISION, f"{text}; look at ~/state and decide again")
 
 
 def _check_recording(order: RecordingOrder) -> None:

@@ -15,7 +15,7 @@ from mauve_rt._kernel import (
 )
 from mauve_rt.errors import MauveError, error_code, one_line
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.node.executor_checks import check_epoch, check_form, check_state, check_time
+from mauve_rt.node.executor_checks import check_form, check_revision, check_state, check_time
 from mauve_rt.node.executor_requests import (
     NOT_MEASURED,
     Code,
@@ -97,7 +97,7 @@ class Control:
             known = self._log.find(request)
             if known is not None:
                 if known.code is Code.REQUEST_ID_REUSED:
-                    return replace(known, epoch=self._runtime.epoch)
+                    return replace(known, revision=self._runtime.revision)
                 return replace(known, replayed=True)
             outcome = self._outcome(request)
             self._log.add(request, outcome)
@@ -105,15 +105,15 @@ class Control:
 
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
-        kernel_epoch = self._runtime.kernel_epoch()
-        epoch, parts = self._runtime.observe()
+        kernel_revision = self._runtime.kernel_revision()
+        revision, parts = self._runtime.observe()
         from_core, to_core = _replaced_core(request, parts)
         try:
             check_form(request)
             if request.recording is not None:
                 outcome = self._order(request, request.recording)
             else:
-                outcome = self._carry_out(request, parts, kernel_epoch=kernel_epoch)
+                outcome = self._carry_out(request, parts, kernel_revision=kernel_revision)
         except RefusalError as refusal:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
@@ -122,12 +122,12 @@ class Control:
             text = one_line(f"internal error: {type(error).__name__}: {error}")
             outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
         after = self._runtime.observe(
-            changed_since=epoch if outcome.success and request.steps and not request.dry_run else None
+            changed_since=revision if outcome.success and request.steps and not request.dry_run else None
         )
-        return replace(outcome, epoch=after.epoch, from_core=from_core, to_core=to_core)
+        return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core)
 
     def _carry_out(
-        self, request: Request, parts: Sequence[ComponentDescription], *, kernel_epoch: int
+        self, request: Request, parts: Sequence[ComponentDescription], *, kernel_revision: int
     ) -> Outcome:
         check_time(request, self._runtime)
         plan = Plan(request.steps, self._runtime, parts)
@@ -141,7 +141,7 @@ class Control:
             measured = self._runtime.deployer.commit(
                 plan.transaction,
                 dry_run=request.dry_run,
-                expected_epoch=kernel_epoch if request.expected_epoch else 0,
+                expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
                 phase_timeout_ns=self._phase_timeout_of(request),
             )
@@ -153,7 +153,7 @@ class Control:
         return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
-        check_epoch(request, self._runtime)
+        check_revision(request, self._runtime)
         if self._recordings is None:
             raise RefusalError(Code.UNSUPPORTED, "this executor does not record by request")
         message, bag = self._recordings.carry_out(order)

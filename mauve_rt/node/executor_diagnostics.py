@@ -186,7 +186,7 @@ class Diagnostics:
         if error:
             level, message = DiagnosticStatus.ERROR, error
         values = {
-            "epoch": self._runtime.epoch,
+            "revision": self._runtime.revision,
             "missing": "; ".join(missing),
             "page_faults_major": usage.ru_majflt,
             "page_faults_minor": usage.ru_minflt,

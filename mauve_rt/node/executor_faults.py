@@ -20,7 +20,7 @@ class NewFault(NamedTuple):
             return f"component '{self.part.name}' runs its fallback core {self.part.core} after a fault"
         return f"component '{self.part.name}' is faulted"
 
-    def event(self, epoch: int) -> tuple[Request, Outcome]:
+    def event(self, revision: int) -> tuple[Request, Outcome]:
         """What ~/events tells of a fallback core that took over: nobody asked for it but the kernel."""
         part = self.part
         step = Step("replace_core", part.name, part.core)
@@ -28,7 +28,7 @@ class NewFault(NamedTuple):
         outcome = Outcome(
             code=Code.OK,
             message=self.message,
-            epoch=epoch,
+            revision=revision,
             from_core=self.core_before,
             to_core=part.core,
         )

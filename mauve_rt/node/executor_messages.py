@@ -75,7 +75,7 @@ def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, erro
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
-        epoch=observed.epoch,
+        revision=observed.revision,
         deployment_epoch_ns=runtime.deployment_epoch_ns(),
         components=[
             ComponentStatus(
@@ -101,7 +101,7 @@ def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, ins
     return ReconfigurationEvent(
         stamp=stamp,
         instance_id=instance_id,
-        epoch=outcome.epoch,
+        revision=outcome.revision,
         requested_by=request.requested_by,
         request_id=request.request_id,
         request=str(request),

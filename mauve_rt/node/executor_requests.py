@@ -35,7 +35,7 @@ class Code(IntEnum):
     ALREADY_RUNNING = 5
     FAULTED = 6
     NOT_RECONFIGURABLE = 7
-    WRONG_EPOCH = 8
+    WRONG_REVISION = 8
     REQUEST_ID_REUSED = 9
     PREPARE_FAILED = 10
     ADOPT_REFUSED = 11
@@ -67,7 +67,7 @@ _CODES = {
     "already_running": Code.ALREADY_RUNNING,
     "faulted": Code.FAULTED,
     "not_reconfigurable": Code.NOT_RECONFIGURABLE,
-    "wrong_epoch": Code.WRONG_EPOCH,
+    "wrong_revision": Code.WRONG_REVISION,
     "adopt_refused": Code.ADOPT_REFUSED,
     "timeout": Code.TIMEOUT,
     "not_configured": Code.NOT_ACTIVE,
@@ -126,7 +126,7 @@ class Request:
     steps: tuple[Step, ...] = ()
     recording: RecordingOrder | None = None
     request_id: str = ""
-    expected_epoch: int = 0
+    expected_revision: int = 0
     requested_by: str = ""
     cause: str = ""
     dry_run: bool = False
@@ -159,7 +159,7 @@ class Outcome:
 
     code: Code
     message: str
-    epoch: int = 0  # after the request
+    revision: int = 0  # after the request
     report: tuple[Report, ...] = ()
     from_core: str = ""
     to_core: str = ""

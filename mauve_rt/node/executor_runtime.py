@@ -1,4 +1,4 @@
-"""An architecture at work: its deployer, its instance and its epoch. Knows nothing of ROS."""
+"""An architecture at work: its deployer, its instance and its revision. Knows nothing of ROS."""
 
 import threading
 import uuid
@@ -42,21 +42,21 @@ class _Declared:
 
 
 class Observed(NamedTuple):
-    """The components at an epoch."""
+    """The components at a revision."""
 
-    epoch: int
+    revision: int
     components: list[ComponentDescription]
 
 
 class Runtime:
     """One architecture from configure() to cleanup().
 
-    `epoch` grows with every change: of a component's state, parts, properties or connections and of the lists
-    of components and resources, whoever made it (a fault too).
+    `revision` grows with every change: of a component's state, parts, properties or connections and of the
+    lists of components and resources, whoever made it (a fault too).
 
     | member        | written by                                 | guarded by      |
     | ------------- | ------------------------------------------ | --------------- |
-    | `_epoch` ...  | observe(): any thread                      | `_lock`         |
+    | `_revision` ...  | observe(): any thread                      | `_lock`         |
     | `_declared`   | configure(), declare(): one at a time      | exchanged whole |
     | `registry`    | who is in loading()                        | `_loading`      |
     | the others    | configure() ... cleanup(): one at a time   |                 |
@@ -79,7 +79,7 @@ class Runtime:
         self._architecture: Architecture | None = None
         self._deployer: Deployer | None = None
         self._lock = threading.Lock()
-        self._epoch = 0
+        self._revision = 0
         self._seen: object = None
         self._observed = Observed(0, [])
         self._mark: object = None  # by which the kernel tells whether there is anything new to be seen
@@ -213,10 +213,10 @@ class Runtime:
         architecture = self._architecture
         return [resource.name for resource in architecture.resources()] if architecture is not None else []
 
-    def kernel_epoch(self) -> int:
+    def kernel_revision(self) -> int:
         """The kernel's own count of changes, by which a commit tells whether there was one meanwhile."""
         architecture = self._architecture
-        return architecture.epoch() if architecture is not None else 0
+        return architecture.revision() if architecture is not None else 0
 
     @contextmanager
     def loading(self) -> Iterator[PluginLoader]:
@@ -257,26 +257,30 @@ class Runtime:
         return declared
 
     @property
-    def epoch(self) -> int:
+    def revision(self) -> int:
         """How many changes there were, from 1."""
         with self._lock:
-            return self._epoch
+            return self._revision
 
     def observe(self, *, changed_since: int | None = None) -> Observed:
         """The components; a change since the last look is counted. Figures may be those of the last change.
 
-        `changed_since`: an epoch after which there was a change, which need not show: a core replaced by
+        `changed_since`: a revision after which there was a change, which need not show: a core replaced by
         another one of its kind, or a restart, counts all the same.
         """
         with self._lock:
-            mark = (self._architecture, self.active, self.kernel_epoch())  # first: what comes after is news
-            if mark != self._mark or self._epoch == changed_since:
+            mark = (
+                self._architecture,
+                self.active,
+                self.kernel_revision(),
+            )  # first: what comes after is news
+            if mark != self._mark or self._revision == changed_since:
                 parts = self.components()
                 seen = (self.active, [_facts(part) for part in parts], self.resources())
-                if seen != self._seen or self._epoch == changed_since:
+                if seen != self._seen or self._revision == changed_since:
                     self._seen = seen
-                    self._epoch += 1
-                self._mark, self._observed = mark, Observed(self._epoch, parts)
+                    self._revision += 1
+                self._mark, self._observed = mark, Observed(self._revision, parts)
             return self._observed
 
 

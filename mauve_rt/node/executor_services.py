@@ -94,7 +94,7 @@ class Services:
 
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
-        response.epoch = self._runtime.epoch
+        response.revision = self._runtime.revision
         response.components = component_infos(self._runtime)
         response.realtime = realtime_status(self._runtime)
         return response
@@ -106,7 +106,7 @@ class Services:
             response.code = int(outcome.code)
             response.message = outcome.message
             response.instance_id = self._runtime.instance_id
-            response.epoch = outcome.epoch
+            response.revision = outcome.revision
             response.report = step_reports(outcome)
             if hasattr(response, "bag"):
                 response.bag = outcome.bag
@@ -151,7 +151,7 @@ def _stop_recording(ros: Any) -> Request:
 def _common(ros: Any) -> dict[str, Any]:
     return {
         "request_id": ros.request_id,
-        "expected_epoch": ros.expected_epoch,
+        "expected_revision": ros.expected_revision,
         "requested_by": ros.requested_by,
         "cause": ros.cause,
     }

@@ -32,7 +32,7 @@ class StatePublisher:
         self._events = node.create_publisher(ReconfigurationEvent, "~/events", self._event_qos)
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
-        self._published_epoch = -1
+        self._published_revision = -1
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -40,10 +40,10 @@ class StatePublisher:
         """Publish the state if it changed since it was published last, or in any case `again`."""
         with self._lock:
             observed = self._runtime.observe()
-            if again or observed.epoch != self._published_epoch:
+            if again or observed.revision != self._published_revision:
                 stamp = self._node.get_clock().now().to_msg()
                 state = architecture_state(self._runtime, observed, stamp, error=self.error)
-                self._published_epoch = observed.epoch
+                self._published_revision = observed.revision
                 self._recording.tell_architecture(observed)
                 self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
             return observed
@@ -76,7 +76,7 @@ class StatePublisher:
             for fault in watch.look(observed.components):
                 self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
                 if fault.part.fell_back:
-                    self.event(*fault.event(observed.epoch))
+                    self.event(*fault.event(observed.revision))
 
     def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
         data = serialize_message(message)

@@ -63,7 +63,7 @@ class SimulatedExecutor:
         for resource, described in model.resources.items():
             if described.topic is not None:
                 self._bind(resource, described, described.topic)
-        self._published_epoch = -1
+        self._published_revision = -1
         self._faults = FaultWatch()
         self._waiting: list[SentMessage] = []
         self._refused = 0
@@ -113,14 +113,14 @@ class SimulatedExecutor:
     def refresh(self) -> None:
         """Publish the state if it has changed, and that a fallback core took over."""
         observed = self._runtime.observe()
-        if observed.epoch != self._published_epoch:
+        if observed.revision != self._published_revision:
             state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
-            self._published_epoch = state.epoch
+            self._published_revision = state.revision
             self._architecture = serialize(trace_architecture(self._runtime, observed))
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
         for fault in self._faults.look(observed.components):
             if fault.part.fell_back:
-                self._event(*fault.event(observed.epoch))
+                self._event(*fault.event(observed.revision))
 
     def carry(self) -> None:
         """Publish what was written to the resources that are bound to topics."""

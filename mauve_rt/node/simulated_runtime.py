@@ -63,12 +63,12 @@ class SimulatedDeployer:
         transaction: Transaction,
         *,
         dry_run: bool = False,
-        expected_epoch: int = 0,
+        expected_revision: int = 0,
         **_timeouts_ns: int,
     ) -> TransactionReport:
         """As Deployer.commit; the phases of the next releases are not measured, they are yet to come."""
         return self._simulation.commit(
-            self._architecture, transaction, dry_run=dry_run, expected_epoch=expected_epoch
+            self._architecture, transaction, dry_run=dry_run, expected_revision=expected_revision
         )
 
     def realtime_status(self) -> NoRealtime:

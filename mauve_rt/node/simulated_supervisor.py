@@ -72,7 +72,7 @@ class SimulatedSupervisor:
             ExecutorRequest(
                 steps=steps,
                 request_id=f"{self.name}/{request.number}",
-                expected_epoch=request.expected_epoch,
+                expected_revision=request.expected_revision,
                 requested_by=self.name,
                 cause=request.cause,
             )
@@ -80,8 +80,8 @@ class SimulatedSupervisor:
         outcome = Outcome(
             success=done.success,
             message=done.message,
-            epoch=done.epoch,
-            wrong_epoch=done.code is Code.WRONG_EPOCH,
+            revision=done.revision,
+            wrong_revision=done.code is Code.WRONG_REVISION,
         )
         self._engine.on_outcome(self._now_s(), request.number, outcome)
 

@@ -24,7 +24,7 @@ class Decision:
     decision: str
     reason: str
     silence_s: float
-    epoch: int
+    revision: int
     message: str = ""
 
 
@@ -34,7 +34,7 @@ class Request:
 
     number: int
     steps: Sequence[Step]
-    expected_epoch: int
+    expected_revision: int
     cause: str
 
 
@@ -44,8 +44,8 @@ class Outcome:
 
     success: bool
     message: str
-    epoch: int = 0
-    wrong_epoch: bool = False
+    revision: int = 0
+    wrong_revision: bool = False
     answered: bool = True  # False: the request did not reach the executor
 
 
@@ -106,7 +106,7 @@ class RuleEngine:
         flight = self._flight
         if flight is None or flight.request.number != number or flight.outcome is not None:
             return
-        flight.life.epoch_floor = outcome.epoch
+        flight.life.revision_floor = outcome.revision
         if not outcome.success:
             self._fail(flight, "refused" if outcome.answered else "not sent", now_s, outcome)
             return
@@ -143,7 +143,7 @@ class RuleEngine:
 
     def _consider(self, life: RuleLife, kind: Kind, now_s: float) -> None:
         view = self._view
-        if view is None or view.epoch < life.epoch_floor or self._in_flight(life):
+        if view is None or view.revision < life.revision_floor or self._in_flight(life):
             return
         steps = life.steps(kind)
         if view.shows(steps, unknown=False):
@@ -163,7 +163,7 @@ class RuleEngine:
     def _send(self, life: RuleLife, kind: Kind, now_s: float, view: ArchitectureView) -> None:
         self._requests += 1
         cause = life.cause(kind, now_s)
-        request = Request(self._requests, tuple(life.steps(kind)), view.epoch, cause)
+        request = Request(self._requests, tuple(life.steps(kind)), view.revision, cause)
         self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
         self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))
         self._act(request)
@@ -190,11 +190,16 @@ class RuleEngine:
 
     def _verify(self, now_s: float) -> None:
         flight, view = self._flight, self._view
-        if flight is None or view is None or flight.outcome is None or view.epoch < flight.outcome.epoch:
+        if (
+            flight is None
+            or view is None
+            or flight.outcome is None
+            or view.revision < flight.outcome.revision
+        ):
             return
         present = view.describe(flight.request.steps)
-        # At a later epoch somebody else may have changed it again: that is no failure of ours.
-        if view.epoch == flight.outcome.epoch and not view.shows(flight.request.steps, unknown=True):
+        # At a later revision somebody else may have changed it again: that is no failure of ours.
+        if view.revision == flight.outcome.revision and not view.shows(flight.request.steps, unknown=True):
             self._fail(flight, f"~/state shows otherwise: {present}", now_s, flight.outcome)
             return
         self._flight = None
@@ -204,10 +209,10 @@ class RuleEngine:
 
     def _fail(self, flight: _Flight, reason: str, now_s: float, outcome: Outcome | None = None) -> None:
         self._flight = None
-        delay_s = flight.life.fail(now_s, wrong_epoch=outcome is not None and outcome.wrong_epoch)
+        delay_s = flight.life.fail(now_s, wrong_revision=outcome is not None and outcome.wrong_revision)
         reason = f"{flight.kind} failed: {reason}; next try in {delay_s:.2f} s if still needed"
         self._say(flight.life, "failed", reason, message=outcome.message if outcome else "")
 
     def _say(self, life: RuleLife, decision: str, reason: str, *, message: str = "") -> None:
-        epoch = self._view.epoch if self._view is not None else 0
-        self._decide(Decision(life.rule.name, decision, reason, life.last_look.silence_s, epoch, message))
+        revision = self._view.revision if self._view is not None else 0
+        self._decide(Decision(life.rule.name, decision, reason, life.last_look.silence_s, revision, message))

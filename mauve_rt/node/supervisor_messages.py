@@ -18,7 +18,7 @@ def architecture_view(state: Any) -> ArchitectureView:
         status.name: ComponentView(STATES.get(status.state, str(status.state)), status.core)
         for status in state.components
     }
-    return ArchitectureView(state.instance_id, state.epoch, components)
+    return ArchitectureView(state.instance_id, state.revision, components)
 
 
 def decision_message(decision: Decision, stamp: Any) -> Any:
@@ -29,6 +29,6 @@ def decision_message(decision: Decision, stamp: Any) -> Any:
         decision=decision.decision,
         reason=decision.reason,
         silence_s=decision.silence_s,
-        epoch=decision.epoch,
+        revision=decision.revision,
         message=decision.message,
     )

@@ -100,7 +100,7 @@ class Supervisor:
         self._pending = self._client.call_async(
             Reconfigure.Request(
                 request_id=str(uuid.uuid4()),
-                expected_epoch=request.expected_epoch,
+                expected_revision=request.expected_revision,
                 requested_by=self._node.get_fully_qualified_name(),
                 cause=request.cause,
                 steps=[
@@ -119,8 +119,8 @@ class Supervisor:
             outcome = Outcome(
                 success=reply.success,
                 message=reply.message,
-                epoch=reply.epoch,
-                wrong_epoch=reply.code == Reconfigure.Response.WRONG_EPOCH,
+                revision=reply.revision,
+                wrong_revision=reply.code == Reconfigure.Response.WRONG_REVISION,
             )
         self._engine.on_outcome(time.monotonic(), number, outcome)
 

@@ -15,7 +15,7 @@ from mauve_rt.node.supervisor_conditions import Condition, Look
 
 FIRST_RETRY_S = 0.5
 LONGEST_RETRY_S = 30.0
-EPOCH_RETRY_S = 0.05  # somebody else changed the architecture meanwhile: look again soon
+REVISION_RETRY_S = 0.05  # somebody else changed the architecture meanwhile: look again soon
 
 PRESENT = ("RUNNING", "HELD")  # held: in the middle of a commit
 
@@ -35,7 +35,7 @@ class ArchitectureView:
     """What ~/state said last."""
 
     instance_id: str
-    epoch: int
+    revision: int
     components: Mapping[str, ComponentView]
 
     def shows(self, steps: Iterable[Step], *, unknown: bool) -> bool:
@@ -73,7 +73,7 @@ class RuleLife:
         self.in_effect = False
         self.left_alone = False
         self.not_before_s = 0.0
-        self.epoch_floor = 0  # the view must have reached it before the next action
+        self.revision_floor = 0  # the view must have reached it before the next action
         self.failures = 0
         self.excused = ""  # the last reason given for not acting, so that it is given once
         self._since_s = 0.0
@@ -88,7 +88,7 @@ class RuleLife:
     def forget(self) -> None:
         """The executor was started anew: nothing of before counts."""
         self.armed = self.in_effect = self.left_alone = False
-        self.not_before_s, self.epoch_floor, self.failures, self.excused = 0.0, 0, 0, ""
+        self.not_before_s, self.revision_floor, self.failures, self.excused = 0.0, 0, 0, ""
 
     def watch(self, now_s: float) -> bool:
         """Look at the condition; True when it changed."""
@@ -133,9 +133,9 @@ class RuleLife:
         self.excused = ""
         self.not_before_s = now_s + self.rule.cooldown_s
 
-    def fail(self, now_s: float, *, wrong_epoch: bool) -> float:
+    def fail(self, now_s: float, *, wrong_revision: bool) -> float:
         """An action failed; returns the delay before the next one, s, doubled with every failure in a row."""
-        first_s = EPOCH_RETRY_S if wrong_epoch else max(self.rule.cooldown_s, FIRST_RETRY_S)
+        first_s = REVISION_RETRY_S if wrong_revision else max(self.rule.cooldown_s, FIRST_RETRY_S)
         delay_s = min(first_s * 2.0**self.failures, max(LONGEST_RETRY_S, self.rule.cooldown_s))
         self.failures = min(self.failures + 1, 16)
         self.excused = ""

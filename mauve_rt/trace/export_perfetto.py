@@ -97,7 +97,7 @@ def _write_request(file: PacketFile, process: int, request: Request) -> None:
         "code": int(said.code),
         "message": str(said.message),
         "request_id": str(said.request_id),
-        "epoch": int(said.epoch),
+        "revision": int(said.revision),
     }
     track = Track(file, file.add_track("requests", parent=process))
     flows = [swap.flow for swap in request.swaps]

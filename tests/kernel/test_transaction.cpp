@@ -49,7 +49,7 @@ TEST_F(Rule10Transaction, CoresAndPropertiesOfTwoComponentsChangeAtOnce) {
     EXPECT_NE(kNotMeasured, step.phase_actual_ns) << step.step;
     EXPECT_LE(step.blackout_ns, report.blackout_ns);
   }
-  EXPECT_EQ(report.epoch, architecture.epoch());
+  EXPECT_EQ(report.revision, architecture.revision());
   // Both were changed by one thread, between the park of one and the armed record of the other.
   const TraceDrain drain = deployer.drain_trace();
   witness->look(drain);
@@ -146,7 +146,7 @@ TEST_F(Rule10Transaction, StartAndStopAreStepsToo) {
 
 TEST_F(Rule10Transaction, ADryRunChangesNothingAndReportsPerStep) {
   const std::string before = described();
-  const std::uint64_t epoch = architecture.epoch();
+  const std::uint64_t revision = architecture.revision();
   Transaction transaction;
   transaction.replace_core("a", "t/Counting")
       .add_component("new", parts())
@@ -159,25 +159,25 @@ TEST_F(Rule10Transaction, ADryRunChangesNothingAndReportsPerStep) {
   EXPECT_EQ(0, report.blackout_ns);
   for (const StepReport& step : report.steps) EXPECT_EQ(kNotMeasured, step.phase_actual_ns) << step.step;
   EXPECT_EQ(before, described());
-  EXPECT_EQ(epoch, architecture.epoch());
+  EXPECT_EQ(revision, architecture.revision());
   expect_running("a");
   Transaction bad;
   bad.set_property("a", "gain", 1.0).replace_core("b", "t/Unready");
   EXPECT_EQ(2, error_of(bad, {.dry_run = true}).detail().step) << "a dry run prepares";
 }
 
-TEST_F(Rule10Transaction, AnEpochThatIsPastIsRefused) {
-  const std::uint64_t epoch = architecture.epoch();
+TEST_F(Rule10Transaction, ARevisionThatIsPastIsRefused) {
+  const std::uint64_t revision = architecture.revision();
   Transaction first;
   first.set_property("a", "gain", 2.0);
-  const TransactionReport report = commit(first, {.expected_epoch = epoch});
-  EXPECT_GT(report.epoch, epoch);
+  const TransactionReport report = commit(first, {.expected_revision = revision});
+  EXPECT_GT(report.revision, revision);
   Transaction second;
   second.set_property("a", "gain", 3.0);
-  EXPECT_EQ(ErrorCode::wrong_epoch, error_of(second, {.expected_epoch = epoch}).code());
+  EXPECT_EQ(ErrorCode::wrong_revision, error_of(second, {.expected_revision = revision}).code());
   EXPECT_EQ(PropertyValue(2.0), property("a", "gain"));
   deployer.stop("b");
-  EXPECT_GT(architecture.epoch(), report.epoch) << "a stop is a change too";
+  EXPECT_GT(architecture.revision(), report.revision) << "a stop is a change too";
 }
 
 TEST_F(Rule10Transaction, AComponentStoppedMeanwhileRefusesTheCommit) {
@@ -193,7 +193,7 @@ TEST_F(Rule10Transaction, AComponentStoppedMeanwhileRefusesTheCommit) {
   Transaction transaction;
   transaction.set_property("b", "gain", 2.0).replace_core("a", std::move(core));
   const Error error = error_of(transaction);
-  EXPECT_EQ(ErrorCode::wrong_epoch, error.code()) << error.what();
+  EXPECT_EQ(ErrorCode::wrong_revision, error.code()) << error.what();
   EXPECT_EQ("b", error.detail().component);
   EXPECT_EQ(1, error.detail().step);
   EXPECT_EQ(PropertyValue(1.0), property("b", "gain"));

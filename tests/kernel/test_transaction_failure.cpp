@@ -129,7 +129,7 @@ class Rule10Failure : public Transacted {
 
 TEST_F(Rule10Failure, AtEveryStepAndOfEveryKindLeavesAllAsItWas) {
   const std::string before = described();
-  const std::uint64_t epoch = architecture.epoch();
+  const std::uint64_t revision = architecture.revision();
   const std::size_t good = good_steps().size();
   for (const BadStep& bad : bad_steps()) {
     for (std::size_t place = 0; place <= good; ++place) {
@@ -145,7 +145,7 @@ TEST_F(Rule10Failure, AtEveryStepAndOfEveryKindLeavesAllAsItWas) {
       ASSERT_EQ(before, described()) << bad.what << " as step " << place + 1;
       witness->look(deployer.drain_trace());
     }
-    EXPECT_EQ(epoch, architecture.epoch()) << bad.what;
+    EXPECT_EQ(revision, architecture.revision()) << bad.what;
     for (const char* name : {"a", "b", "c", "e", "f", "g", "untouched"}) expect_running(name);
   }
   EXPECT_EQ(9U, architecture.trace_components().size()) << "no number was lost on a component that never was";

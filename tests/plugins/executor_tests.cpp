@@ -52,7 +52,7 @@ struct SetBool {
 struct Stop {
   struct Request {
     mauve::BoundedString<16> request_id;
-    std::uint64_t expected_epoch{};
+    std::uint64_t expected_revision{};
     mauve::BoundedString<16> requested_by;
     mauve::BoundedString<16> cause;
     mauve::BoundedString<16> component;
@@ -81,7 +81,7 @@ MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
 MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", data)
 MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
-MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_epoch,
+MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")

@@ -29,7 +29,7 @@ def test_arguments_of_the_verbs() -> None:
         ["replace-core", "robot_1/executor/", "exploration", "p/Core", "--timeout", "0.5"]
     )
     assert (args.executor, args.component, args.core) == ("/robot_1/executor", "exploration", "p/Core")
-    assert (args.timeout, args.expected_epoch, args.cause, args.json) == (0.5, 0, "", False)
+    assert (args.timeout, args.expected_revision, args.cause, args.json) == (0.5, 0, "", False)
     for words in (["list", "/e"], ["stop", "/e", "c"], ["start", "/e", "c"], ["events", "/e"], ["nodes"]):
         assert parser.parse_args(words).verb.name == words[0]
 

@@ -69,8 +69,8 @@ def control(runtime: Runtime) -> Control:
     return Control(runtime)
 
 
-def _ask(control: Control, *steps: Step, dry_run: bool = False, expected_epoch: int = 0) -> Outcome:
-    return control.handle(Request(steps=steps, dry_run=dry_run, expected_epoch=expected_epoch))
+def _ask(control: Control, *steps: Step, dry_run: bool = False, expected_revision: int = 0) -> Outcome:
+    return control.handle(Request(steps=steps, dry_run=dry_run, expected_revision=expected_revision))
 
 
 def _part(runtime: Runtime, name: str) -> ComponentDescription:
@@ -86,7 +86,7 @@ def _look(runtime: Runtime) -> tuple[object, ...]:
         )
         for part in runtime.components()
     ]
-    return (parts, runtime.resources(), runtime.epoch)
+    return (parts, runtime.resources(), runtime.revision)
 
 
 def _wait(condition: Callable[[], bool]) -> None:
@@ -110,7 +110,7 @@ def test_a_transaction_adds_wires_and_starts_and_another_one_removes(
         "connect set count.read",
         "start",
     ]
-    assert outcome.epoch > before[2]
+    assert outcome.revision > before[2]
     second = _part(runtime, "second")
     assert second.state == "RUNNING"
     assert {port.name: port.resource for port in second.ports} == {"set": "count", "count": "sum"}
@@ -234,10 +234,10 @@ def test_properties_are_set_before_the_start_and_between_two(tmp_path: Path, plu
     refused = _ask(control, *steps)
     assert (refused.code, "configure it first" in refused.message) == (Code.NOT_ACTIVE, True)
     runtime.configure()
-    epoch = runtime.epoch
+    revision = runtime.revision
     outcome = _ask(control, *steps)
     assert outcome.success, outcome.message
-    assert outcome.epoch > epoch
+    assert outcome.revision > revision
     assert {item.name: item.value for item in _part(runtime, "free").properties}["step"] == 2.5
     assert _ask(control, *steps, Step("set_property", "free", "step", "11")).code is Code.INVALID
     assert _ask(control, Step("set_property", "guard", "step", "2")).code is Code.NOT_RECONFIGURABLE
@@ -258,13 +258,13 @@ def test_components_stop_in_the_reverse_order_of_the_file(runtime: Runtime) -> N
     assert [runtime.deployer.trace_components()[component] for _, component in stops] == names[::-1]
 
 
-def test_expected_epoch(runtime: Runtime, control: Control) -> None:
-    epoch = runtime.epoch
-    assert _ask(control, *ADD, expected_epoch=epoch + 1).code is Code.WRONG_EPOCH
-    outcome = _ask(control, *ADD, expected_epoch=epoch)
+def test_expected_revision(runtime: Runtime, control: Control) -> None:
+    revision = runtime.revision
+    assert _ask(control, *ADD, expected_revision=revision + 1).code is Code.WRONG_REVISION
+    outcome = _ask(control, *ADD, expected_revision=revision)
     assert outcome.success, outcome.message
-    assert _ask(control, *REMOVE, expected_epoch=epoch).code is Code.WRONG_EPOCH
-    assert _ask(control, *REMOVE, expected_epoch=outcome.epoch).success
+    assert _ask(control, *REMOVE, expected_revision=revision).code is Code.WRONG_REVISION
+    assert _ask(control, *REMOVE, expected_revision=outcome.revision).success
 
 
 def test_an_fsm_is_replaced_with_its_grid(runtime: Runtime, control: Control) -> None:
@@ -299,20 +299,20 @@ def test_all_parts_are_replaced_as_one(runtime: Runtime, control: Control) -> No
 
 
 def test_a_core_replaced_by_its_like_counts_as_a_change(runtime: Runtime, control: Control) -> None:
-    before = runtime.epoch
+    before = runtime.revision
     outcome = _ask(control, Step("replace_core", "counter", "executor_tests/Counter"))
-    assert (outcome.success, outcome.epoch) == (True, before + 1)
+    assert (outcome.success, outcome.revision) == (True, before + 1)
 
 
 def test_a_fallback_core_takes_over_and_tells_the_fault(runtime: Runtime, control: Control) -> None:
-    before = runtime.epoch
+    before = runtime.revision
     assert runtime.deployer.write_resource("poison", POISON)
     _wait(lambda: _part(runtime, "brave").fell_back)
     brave = _part(runtime, "brave")
     assert (brave.state, brave.core, brave.fallback) == ("RUNNING", *["executor_tests/Backwards"] * 2)
     assert "set to something unheard of (in state Count" in brave.fault
     runtime.observe()
-    assert runtime.epoch > before
+    assert runtime.revision > before
     outcome = _ask(control, Step("replace_core", "brave", "executor_tests/Counter"))
     assert outcome.success, outcome.message
     brave = _part(runtime, "brave")

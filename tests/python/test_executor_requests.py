@@ -3,7 +3,7 @@
 from mauve_rt.node.executor_requests import Code, Outcome, Request, RequestLog, Step
 
 STOP = Request(steps=(Step("stop", "a"),), request_id="1")
-DONE = Outcome(code=Code.OK, message="done", epoch=4)
+DONE = Outcome(code=Code.OK, message="done", revision=4)
 
 
 def test_repeated_request_gets_the_first_outcome() -> None:
@@ -18,7 +18,7 @@ def test_same_id_with_other_contents_is_refused() -> None:
     log.add(STOP, DONE)
     for other in (
         Request(steps=(Step("stop", "b"),), request_id="1"),
-        Request(steps=(Step("stop", "a"),), request_id="1", expected_epoch=3),
+        Request(steps=(Step("stop", "a"),), request_id="1", expected_revision=3),
         Request(steps=(Step("stop", "a"),), request_id="1", dry_run=True),
         Request(steps=(Step("stop", "a"),), request_id="1", cause="another"),
     ):

@@ -42,7 +42,7 @@ def test_a_component_in_python_is_added_wired_and_removed(counting: Stage):
         .start("hear")
     )
     assert [step.component for step in report.steps] == ["hear"] * 3
-    assert report.epoch > 0
+    assert report.revision > 0
     hear = stage.architecture.component("hear")
     stage.until(lambda: len(hear.core.samples) > 3)
     assert stage.architecture.describe() != before
@@ -124,14 +124,14 @@ def test_a_dry_run_prepares_and_changes_nothing(counting: Stage):
             made.append("cleaned up")
 
     steps = Transaction().replace_core("count", Noted)
-    before, epoch = counting.architecture.describe(), counting.architecture.epoch()
+    before, revision = counting.architecture.describe(), counting.architecture.revision()
     counting.deployer.commit(steps, dry_run=True)
     assert made == ["configured", "cleaned up"]
     assert counting.architecture.describe() == before
-    counting.deployer.commit(steps, expected_epoch=epoch)
+    counting.deployer.commit(steps, expected_revision=revision)
     assert type(counting.architecture.component("count").core) is Noted
     with pytest.raises(MauveError):
-        counting.deployer.commit(steps, expected_epoch=epoch)
+        counting.deployer.commit(steps, expected_revision=revision)
 
 
 def test_a_resource_in_python_comes_and_goes(counting: Stage):

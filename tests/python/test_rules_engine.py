@@ -41,7 +41,7 @@ class World:
     decisions: list[Decision] = field(default_factory=list)
     requests: list[Request] = field(default_factory=list)
     asked_at_s: list[float] = field(default_factory=list)
-    epoch: int = 5
+    revision: int = 5
     instance_id: str = "first"
     components: dict[str, ComponentView] = field(default_factory=dict)
 
@@ -55,9 +55,9 @@ class World:
     def tell(self, components: Mapping[str, ComponentView] | None = None) -> None:
         """The executor publishes its state, changed."""
         self.components.update(components or {})
-        self.epoch += 1
+        self.revision += 1
         if self.telling:
-            view = ArchitectureView(self.instance_id, self.epoch, dict(self.components))
+            view = ArchitectureView(self.instance_id, self.revision, dict(self.components))
             self.engine.on_state(self.now_s, view)
 
     def run(self, seconds: float) -> None:
@@ -80,7 +80,7 @@ class World:
             return
         step = request.steps[0]
         self.tell({step.target: ComponentView("RUNNING", step.name)})
-        outcome = Outcome(success=True, message="done", epoch=self.epoch)
+        outcome = Outcome(success=True, message="done", revision=self.revision)
         self.engine.on_outcome(self.now_s, request.number, outcome)
 
     def said(self) -> list[str]:
@@ -126,7 +126,7 @@ def test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough():
     assert world.cores() == [LOCAL]
     request, do = world.requests[0], world.decisions[2]
     assert request.cause.startswith("link_lost: nothing on /in for 1.")
-    assert request.expected_epoch == 6
+    assert request.expected_revision == 6
     assert do.decision == "do"
     assert 1.0 < do.silence_s < 1.2
     world.talking = True
@@ -217,7 +217,9 @@ def test_an_answer_that_comes_too_late_is_ignored():
     world.talking = world.answering = False
     world.run(6.3)
     said = world.said()
-    world.engine.on_outcome(world.now_s, world.requests[0].number, Outcome(success=True, message="", epoch=9))
+    world.engine.on_outcome(
+        world.now_s, world.requests[0].number, Outcome(success=True, message="", revision=9)
+    )
     assert world.said() == said
 
 
@@ -236,7 +238,7 @@ def test_a_success_that_the_state_contradicts_is_a_failure():
     world.talking = world.answering = False
     world.run(1.2)
     world.tell()
-    outcome = Outcome(success=True, message="", epoch=world.epoch)
+    outcome = Outcome(success=True, message="", revision=world.revision)
     world.engine.on_outcome(world.now_s, world.requests[0].number, outcome)
     assert world.said()[-1] == "failed"
     assert USUAL in world.decisions[-1].reason
@@ -246,23 +248,23 @@ def test_a_state_that_comes_after_the_answer_confirms_it():
     world = started()
     world.talking = world.answering = False
     world.run(1.2)
-    outcome = Outcome(success=True, message="", epoch=world.epoch + 1)
+    outcome = Outcome(success=True, message="", revision=world.revision + 1)
     world.engine.on_outcome(world.now_s, world.requests[0].number, outcome)
     assert world.said()[-1] == "do"
     world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
     assert world.said()[-1] == "done"
 
 
-def test_a_wrong_epoch_is_tried_again_soon_but_with_the_new_state_only():
+def test_a_wrong_revision_is_tried_again_soon_but_with_the_new_state_only():
     world = started()
     world.talking = False
-    world.refusals = [Outcome(success=False, message="wrong epoch", epoch=7, wrong_epoch=True)]
+    world.refusals = [Outcome(success=False, message="wrong revision", revision=7, wrong_revision=True)]
     world.run(2.0)
     assert world.said()[-1] == "failed"
     world.tell()
     world.run(0.1)
     assert world.said()[-1] == "done"
-    assert world.requests[1].expected_epoch == 7
+    assert world.requests[1].expected_revision == 7
 
 
 def test_what_is_done_already_is_not_done_again_but_undone():
@@ -314,7 +316,7 @@ def test_one_action_at_a_time():
     assert [d.rule for d in world.decisions if d.decision == "suppressed"] == ["two"]
     world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
     world.answering = True
-    world.engine.on_outcome(world.now_s, 1, Outcome(success=True, message="", epoch=world.epoch))
+    world.engine.on_outcome(world.now_s, 1, Outcome(success=True, message="", revision=world.revision))
     world.run(0.1)
     assert [request.steps[0].target for request in world.requests] == ["exploration", "mapping"]
 

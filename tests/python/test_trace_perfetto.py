@@ -42,7 +42,7 @@ def shape(events: list[Event]) -> list[tuple[Any, ...]]:
 def event_message(told_ns: int, *steps: dict[str, Any], **fields: Any) -> Message:
     """A ReconfigurationEvent as a bag yields it."""
     known = {"requested_by": "/boss", "cause": "why not", "message": "done", "request_id": "7", "code": 0}
-    known |= {"request": "replace_core a New", "success": True, "epoch": 2} | fields
+    known |= {"request": "replace_core a New", "success": True, "revision": 2} | fields
     report = [types.SimpleNamespace(**step) for step in steps]
     msg = types.SimpleNamespace(**known, report=report, __msgtype__="mauve_msgs/msg/ReconfigurationEvent")
     return Message("/robot_1/executor/events", told_ns, told_ns, msg)

@@ -180,7 +180,9 @@ def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
     )
     deployer.commit(transaction, dry_run=True)
     assert_type(str(architecture.describe()), str)
-    return deployer.commit(transaction, expected_epoch=architecture.epoch(), commit_timeout_ns=ms_to_ns(50))
+    return deployer.commit(
+        transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50)
+    )
 
 
 def simulate(architecture: Architecture) -> TraceDrain:

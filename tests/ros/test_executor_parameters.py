@@ -92,14 +92,14 @@ def _messages(values: dict[str, object]) -> list[Any]:
 
 
 def _listed(graph: Any) -> Any:
-    """The kernel's properties by component.property, as YAML, and the epoch."""
+    """The kernel's properties by component.property, as YAML, and the revision."""
     reply = graph.ask(ListComponents, f"{NODE}/list_components")
     properties = {
         f"{part.name}.{name}": value
         for part in reply.components
         for name, _, value in (item.partition("=") for item in part.properties)
     }
-    return properties, reply.epoch
+    return properties, reply.revision
 
 
 def _change(graph: Any, transition: int) -> None:
@@ -143,18 +143,22 @@ def test_parameters_are_the_properties(face: Face, graph: Any) -> None:
 
 def _changes_are_the_kernel_s(face: Face, graph: Any) -> None:
     events = graph.hear_events(NODE)
-    _, epoch = _listed(graph)
+    _, revision = _listed(graph)
     odd = 'a: "b"\n\t\x7f\u2028é 😀 \\'
     assert [result.successful for result in face.set(counter__step=4, counter__label=odd)] == [True, True]
     assert face.get("counter.step", "counter.label") == [4.0, odd], "an integer serves as a float"
     face.await_told("changed", counter__step=4.0)
     face.await_told("changed", counter__label=odd)
     properties, after = _listed(graph)
-    assert (properties["counter.step"], after) == ("4.0", epoch + 2)
+    assert (properties["counter.step"], after) == ("4.0", revision + 2)
     assert face.set_all(counter__step=5.0, counter__enabled=False).successful
     face.await_told("changed", counter__step=5.0, counter__enabled=False)
     properties, after = _listed(graph)
-    assert (properties["counter.step"], properties["counter.enabled"], after) == ("5.0", "false", epoch + 3)
+    assert (properties["counter.step"], properties["counter.enabled"], after) == (
+        "5.0",
+        "false",
+        revision + 3,
+    )
     graph.spin_until(lambda: len(events) == 3, "their events")
     assert [event.success for event in events] == [True] * 3
     assert events[2].request == "set_property counter step 5.0; set_property counter enabled false"

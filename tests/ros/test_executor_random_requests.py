@@ -98,7 +98,7 @@ SECONDS = st.sampled_from([0.0, 0.0, 1.0, -1.0, 1e-300, 10.5, 1e308, float("nan"
 )
 COMMON = {
     "request_id": st.sampled_from(["", "", "", "", "once", "twice"]) | ODD,
-    "expected_epoch": st.sampled_from([0, 0, 0, 0, 0, 0, 1, 7, 2**64 - 1]),
+    "expected_revision": st.sampled_from([0, 0, 0, 0, 0, 0, 1, 7, 2**64 - 1]),
     "requested_by": ODD,
     "cause": ODD,
 }
@@ -208,7 +208,7 @@ def test_random_requests(
 
     model = Model()
     first = listed()
-    epochs = {first.epoch}  # that requests were accepted at
+    revisions = {first.revision}  # that requests were accepted at
     codes: dict[int, int] = {}
     answered = accepted = 0
 
@@ -236,14 +236,16 @@ def test_random_requests(
             assert reply.message, ask
             assert not reply.message.startswith("internal error"), f"{ask}: {reply.message}"
             assert reply.instance_id == first.instance_id
-            if reply.success and not ask.fields.get("dry_run") and reply.epoch not in epochs:
-                epochs.add(reply.epoch)  # or it is the answer to a repeated request, or to one beside it
-                changes.append((reply.epoch, ask))
+            if reply.success and not ask.fields.get("dry_run") and reply.revision not in revisions:
+                revisions.add(
+                    reply.revision
+                )  # or it is the answer to a repeated request, or to one beside it
+                changes.append((reply.revision, ask))
         for _, ask in sorted(changes, key=lambda change: change[0]):
             accepted += 1
             model.take(ask)
         now = listed()
-        assert now.epoch == max(epochs), "nothing else was changed"
+        assert now.revision == max(revisions), "nothing else was changed"
         assert {part.name: part.core for part in now.components} == model.cores
         running = {part.name for part in now.components if part.state == ComponentInfo.RUNNING}
         assert running == model.running

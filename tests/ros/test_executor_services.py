@@ -44,15 +44,15 @@ def test_stop_and_start(graph: Any) -> None:
     assert (stopped.success, stopped.code) == (True, Code.OK)
     assert _component(graph, "sleepy").state == ComponentInfo.STOPPED
     again = graph.ask(Stop, f"{NODE}/stop", component="sleepy")
-    assert (again.success, again.code, again.epoch) == (False, Code.NOT_RUNNING, stopped.epoch)
-    started = graph.ask(Start, f"{NODE}/start", component="sleepy", expected_epoch=stopped.epoch)
+    assert (again.success, again.code, again.revision) == (False, Code.NOT_RUNNING, stopped.revision)
+    started = graph.ask(Start, f"{NODE}/start", component="sleepy", expected_revision=stopped.revision)
     assert started.success
-    assert started.epoch > stopped.epoch
+    assert started.revision > stopped.revision
     sleepy = _component(graph, "sleepy")
     assert sleepy.state == ComponentInfo.RUNNING
     again = graph.ask(Start, f"{NODE}/start", component="sleepy")
     assert (again.code, again.message) == (Code.ALREADY_RUNNING, "component 'sleepy' is already running")
-    graph.spin_until(lambda: bool(states) and states[-1].epoch == started.epoch, "the last state")
+    graph.spin_until(lambda: bool(states) and states[-1].revision == started.revision, "the last state")
     assert states[-1].instance_id == started.instance_id
     assert states[-1].deployment_epoch_ns > 0
 
@@ -123,9 +123,9 @@ REFUSED = {
         Code.PREPARE_FAILED,
         "the core is not ready, and never will be",
     ),
-    "epoch": (
-        (Stop, "stop", {"component": "counter", "expected_epoch": 4711}),
-        Code.WRONG_EPOCH,
+    "revision": (
+        (Stop, "stop", {"component": "counter", "expected_revision": 4711}),
+        Code.WRONG_REVISION,
         "the request expected 4711; look at ~/state",
     ),
     "timeout": ((Stop, "stop", {"component": "counter", "timeout_s": -1.0}), Code.INVALID, "bad timeout"),
@@ -193,10 +193,10 @@ def test_refusals_have_their_code_and_change_nothing(graph: Any) -> None:
         reply = graph.ask(service_type, f"{NODE}/{service}", **fields)
         assert (reply.success, Code(reply.code)) == (False, code), name
         assert message in reply.message, name
-        assert (reply.epoch, reply.instance_id) == (before.epoch, before.instance_id), name
+        assert (reply.revision, reply.instance_id) == (before.revision, before.instance_id), name
         assert not reply.report, name
     after = graph.ask(ListComponents, f"{NODE}/list_components")
-    assert after.epoch == before.epoch
+    assert after.revision == before.revision
     assert [part.core for part in after.components] == [part.core for part in before.components]
     assert [part.state for part in after.components] == [part.state for part in before.components]
     graph.spin_until(lambda: len(events) == len(REFUSED), "an event for every refusal")
@@ -224,7 +224,7 @@ def test_event_tells_who_what_and_why(graph: Any) -> None:
         "one",
     )
     assert (event.from_core, event.to_core) == ("executor_tests/Counter", "executor_tests/Backwards")
-    assert (event.success, event.epoch) == (True, reply.epoch)
+    assert (event.success, event.revision) == (True, reply.revision)
     assert event.report == reply.report
 
 
@@ -238,9 +238,11 @@ def test_the_reply_is_true_already_and_events_follow_in_order(graph: Any) -> Non
         replies.append(graph.ask(service, f"{NODE}/{name}", component="sleepy"))
     assert all(reply.success for reply in replies), [reply.message for reply in replies]
     graph.spin_until(lambda: len(events) == len(replies), "an event for every request")
-    told = [(event.epoch, event.message) for event in events]
-    assert told == [(reply.epoch, reply.message) for reply in replies]
-    assert [epoch for epoch, _ in told] == sorted({epoch for epoch, _ in told}), "every change counts"
+    told = [(event.revision, event.message) for event in events]
+    assert told == [(reply.revision, reply.message) for reply in replies]
+    assert [revision for revision, _ in told] == sorted({revision for revision, _ in told}), (
+        "every change counts"
+    )
 
 
 def test_repeated_request_id_returns_the_first_outcome(graph: Any) -> None:
@@ -259,13 +261,13 @@ def test_repeated_request_id_returns_the_first_outcome(graph: Any) -> None:
 def test_set_property_and_dry_run(graph: Any) -> None:
     counts = graph.hear(Float64, "/robot_1/count")
     step = ReconfigurationStep(kind="set_property", target="counter", name="step", value="5.5")
-    before = graph.ask(ListComponents, f"{NODE}/list_components").epoch
+    before = graph.ask(ListComponents, f"{NODE}/list_components").revision
     dry = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step], dry_run=True)
-    assert (dry.success, dry.epoch) == (True, before)
+    assert (dry.success, dry.revision) == (True, before)
     assert "would be accepted" in dry.message
     done = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step])
     assert done.success, done.message
-    assert done.epoch == before + 1
+    assert done.revision == before + 1
     del counts[:]
     graph.spin_until(lambda: len(counts) > 5, "counts")
     assert counts[-1].data - counts[-2].data == 5.5

@@ -68,13 +68,15 @@ def test_components_and_resources_come_and_go(graph: Any) -> None:
     dry = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=ADD, dry_run=True)
     assert dry.success, dry.message
     assert _facts(_list(graph)) == _facts(before)
-    assert dry.epoch == before.epoch
+    assert dry.revision == before.revision
     wrong = [*ADD[:2], _step("connect", "second", "count", "sum.read"), *ADD[3:]]
     refused = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=wrong)
     assert (refused.success, refused.code, len(refused.report)) == (False, Code.INVALID, 0)
     assert "step 3 (connect second.count sum.read)" in refused.message
     assert _facts(_list(graph)) == _facts(before)
-    done = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=ADD, expected_epoch=before.epoch, cause="more")
+    done = graph.ask(
+        Reconfigure, f"{NODE}/reconfigure", steps=ADD, expected_revision=before.revision, cause="more"
+    )
     assert done.success, done.message
     assert [(step.component, step.step) for step in done.report] == [
         ("", "add_resource sum"),
@@ -105,7 +107,7 @@ def test_components_and_resources_come_and_go(graph: Any) -> None:
     )
     assert (events[2].cause, events[2].report) == ("more", done.report)
     graph.spin_until(lambda: len(states[-1].components) == 3, "the state without it")
-    assert (states[-1].epoch, states[-1].instance_id) == (removed.epoch, removed.instance_id)
+    assert (states[-1].revision, states[-1].instance_id) == (removed.revision, removed.instance_id)
 
 
 def test_a_fallback_core_that_took_over_is_shown_everywhere(

@@ -119,7 +119,7 @@ REFUSED = [
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
     ({"split_s": float("nan")}, "INVALID", "bad split_s"),
     ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
-    ({"expected_epoch": 1000}, "WRONG_EPOCH", "expected 1000"),
+    ({"expected_revision": 1000}, "WRONG_REVISION", "expected 1000"),
 ]
 
 

@@ -116,7 +116,7 @@ def test_a_core_is_replaced_in_flight_and_back(band: Band):
     band.until(lambda: band.said()[-2:] == ["undo", "done"])
     band.until(lambda: band.core() == "mauve_examples/Metronome")
     swapped = [decision for decision in band.decisions if decision.decision == "done"]
-    assert swapped[-1].epoch == band.states[-1].epoch
+    assert swapped[-1].revision == band.states[-1].revision
 
 
 def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: Band):

@@ -45,7 +45,7 @@ class StandIn:
         self.refuse_with = 0
         self.talking = True
         self.core = USUAL
-        self.epoch = 0
+        self.revision = 0
         self.node = Node("executor", namespace="/robot_1", context=context)
         latched = QoSProfile(depth=1, durability=LATCHED)
         self._state = self.node.create_publisher(ArchitectureState, "~/state", latched)
@@ -54,9 +54,9 @@ class StandIn:
         self.node.create_timer(0.1, self._speak)
 
     def tell(self) -> None:
-        self.epoch += 1
+        self.revision += 1
         status = ComponentStatus(name="exploration", state=ComponentInfo.RUNNING, core=self.core)
-        self._state.publish(ArchitectureState(instance_id="one", epoch=self.epoch, components=[status]))
+        self._state.publish(ArchitectureState(instance_id="one", revision=self.revision, components=[status]))
 
     def _speak(self) -> None:
         if self.talking:
@@ -71,7 +71,7 @@ class StandIn:
             self.core = request.steps[0].name
             self.tell()
             response.success = True
-        response.epoch = self.epoch
+        response.revision = self.revision
         return response
 
 
@@ -159,11 +159,11 @@ def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: 
     assert second.steps[0].name == USUAL
     assert first.requested_by == "/robot_1/supervisor"
     assert first.cause.startswith("link_lost: nothing on /robot_1/radio/in for 0.")
-    assert [first.expected_epoch, second.expected_epoch] == [1, 2]
+    assert [first.expected_revision, second.expected_revision] == [1, 2]
     assert uuid.UUID(first.request_id) != uuid.UUID(second.request_id)
     do = decisions[2]
     assert do.silence_s > 0.5
-    assert do.epoch == 1
+    assert do.revision == 1
     assert do.stamp.sec > 0
 
 

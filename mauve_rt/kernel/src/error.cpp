@@ -76,8 +76,8 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "prepare_failed";
     case ErrorCode::timeout:
       return "timeout";
-    case ErrorCode::wrong_epoch:
-      return "wrong_epoch";
+    case ErrorCode::wrong_revision:
+      return "wrong_revision";
     case ErrorCode::realtime_denied:
       return "realtime_denied";
     case ErrorCode::plugin:

@@ -89,10 +89,10 @@ void Simulation::every(time_ns_t first_ns, time_ns_t period_ns, Callback callbac
 }
 
 Simulation::Next Simulation::next_of(Processor& processor) {
-  const std::uint64_t epoch = processor.architecture->epoch();
-  if (processor.seen_lists != epoch) {
+  const std::uint64_t revision = processor.architecture->revision();
+  if (processor.seen_lists != revision) {
     processor.components = processor.architecture->components();
-    processor.seen_lists = epoch;
+    processor.seen_lists = revision;
   }
   const time_ns_t now = processor.clock.now_ns();
   Next next;

@@ -20,12 +20,12 @@ TransactionCommit::Work::Work(Architecture& architecture, TransactionHost host,
 void TransactionCommit::Work::make(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
   transaction_ = std::move(transaction);
-  if (const std::uint64_t epoch = architecture_.epoch();
-      options_.expected_epoch != 0 && options_.expected_epoch != epoch) {
-    throw Error(ErrorCode::wrong_epoch, "the architecture has changed since",
-                {.element = "epoch",
-                 .expected = std::to_string(options_.expected_epoch),
-                 .found = std::to_string(epoch),
+  if (const std::uint64_t revision = architecture_.revision();
+      options_.expected_revision != 0 && options_.expected_revision != revision) {
+    throw Error(ErrorCode::wrong_revision, "the architecture has changed since",
+                {.element = "revision",
+                 .expected = std::to_string(options_.expected_revision),
+                 .found = std::to_string(revision),
                  .remedy = "look at it again, then decide again"});
   }
   architecture_.reap();
@@ -115,7 +115,7 @@ void TransactionCommit::Work::carry_out_commit() {
 
 void TransactionCommit::Work::throw_refused(const std::string& what) const {
   if (commit_->refused_by() == &guard_) {
-    throw Error(ErrorCode::wrong_epoch, "the component was started or stopped, or it faulted, meanwhile",
+    throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
                 {.component = guard_.changed()->name(),
                  .element = "state",
                  .found = std::string(to_string(guard_.changed()->state())),
@@ -191,7 +191,7 @@ TransactionReport TransactionCommit::Work::report() {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
   TransactionReport report{
-      .steps = reports_, .epoch = architecture_.epoch(), .prepare_ns = prepare_ns_, .blackout_ns = 0};
+      .steps = reports_, .revision = architecture_.revision(), .prepare_ns = prepare_ns_, .blackout_ns = 0};
   for (StepReport& step : report.steps) {
     const auto found = measured.find(step.component);
     if (found == measured.end()) continue;

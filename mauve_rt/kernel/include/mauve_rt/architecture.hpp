@@ -112,7 +112,7 @@ class Architecture final : public Configurable {
 
   ChangeSignal& changes() noexcept { return changes_; }
   /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
-  std::uint64_t epoch() const noexcept {
+  std::uint64_t revision() const noexcept {
     return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
   }
   /// The instant that all grids are counted from; 0 before deployment. [rt]

@@ -40,7 +40,7 @@ enum class ErrorCode : std::uint16_t {
   adopt_refused,
   prepare_failed,
   timeout,
-  wrong_epoch,
+  wrong_revision,
   realtime_denied,
   plugin,
   io,

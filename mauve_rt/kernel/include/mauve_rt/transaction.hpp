@@ -99,15 +99,15 @@ class Transaction {
 
 struct TransactionOptions {
   CommitTimeouts timeouts{};
-  bool dry_run{false};              // check and prepare everything, then throw it away
-  std::uint64_t expected_epoch{0};  // of the architecture; 0: any
+  bool dry_run{false};                 // check and prepare everything, then throw it away
+  std::uint64_t expected_revision{0};  // of the architecture; 0: any
 };
 
 struct TransactionReport {
   std::vector<StepReport> steps;
-  std::uint64_t epoch{0};    // of the architecture, after
-  time_ns_t prepare_ns{0};   // all of it
-  time_ns_t blackout_ns{0};  // the longest of any component's
+  std::uint64_t revision{0};  // of the architecture, after
+  time_ns_t prepare_ns{0};    // all of it
+  time_ns_t blackout_ns{0};   // the longest of any component's
 };
 
 }  // namespace mauve
