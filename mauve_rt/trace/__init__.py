@@ -2,9 +2,9 @@
 
     trace = mauve_rt.trace.open("bag")
 
-Recording (`recorder`, `bag`, `mcap_file`, `cdr`, `definitions`) needs neither rosbags nor numpy, so that
-the executor stays small. Reading (`reader`, `statistics`, `reconfigurations`) needs both, and no installed
-message package: a bag carries the definitions of what it holds.
+Recording (`recorder`, `bag`, `mcap_file`, `cdr`, `definitions`) does without numpy: the executor stays
+small. Reading (`reader`, `statistics`, `reconfigurations`) needs it, and no installed message package: a bag
+carries the definitions of what it holds.
 """
 
 from pathlib import Path
@@ -33,6 +33,6 @@ def open(path: str | Path, *, progress: Progress = silent) -> "Trace":  # noqa: 
         mauve_rt, or one that cannot be read.
 
     """
-    from mauve_rt.trace.reader import open_trace  # noqa: PLC0415 - numpy and rosbags take their time to load
+    from mauve_rt.trace.reader import open_trace  # noqa: PLC0415 - numpy takes its time to load
 
     return open_trace(path, progress=progress)

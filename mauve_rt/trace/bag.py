@@ -48,7 +48,11 @@ class BagWriter:
     """A bag that is a finished one at every flush, in one file or, by split(), in several.
 
     The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the files (a
-    kill between the two) promises less than they hold, and readers open both. For one thread at a time.
+    kill between the two) promises less than they hold, and readers open both. Where it cannot be replaced (a
+    full disk), the file goes back to what it tells. For one thread at a time.
+
+    Chunks are in order of log time: a message that waited elsewhere while an earlier flush took later ones
+    gets the log time of that flush. Its publish time stays its own.
     """
 
     def __init__(self, directory: Path, *, ros_distro: str = "jazzy") -> None:
@@ -65,6 +69,8 @@ class BagWriter:
         self._topics: dict[str, _Topic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._stale = True  # metadata.yaml does not tell what the files hold
+        self._told_files = 0  # of the bag, by metadata.yaml
+        self._flushed_ns = 0  # latest log time of all that was flushed
         # Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it.
         unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
         try:
@@ -130,9 +136,10 @@ class BagWriter:
         topic = _Topic(name, definition, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
         _declare_channel(self._file, topic, schema_id)
         self._topics[name] = topic
+        self._stale = True
 
-    def write(self, topic: str, log_time_ns: int, data: bytes) -> None:
-        """Keep a message (CDR with its header) for the next flush; log time in ns of CLOCK_REALTIME.
+    def write(self, topic: str, log_time_ns: int, data: bytes, *, publish_time_ns: int | None = None) -> None:
+        """Keep a message (CDR with its header) for the next flush; times in ns of CLOCK_REALTIME.
 
         Raises:
             TraceError: the topic was not declared.
@@ -142,7 +149,9 @@ class BagWriter:
         if known is None:
             msg = f"topic {topic}: not declared in this bag; call add_topic first"
             raise TraceError(msg)
-        self._file.add_message(known.channel_id, log_time_ns, data)
+        published_ns = log_time_ns if publish_time_ns is None else publish_time_ns
+        log_time_ns = max(log_time_ns, self._flushed_ns)
+        self._file.add_message(known.channel_id, log_time_ns, data, publish_time_ns=published_ns)
 
     def set_custom_data(self, key: str, value: str) -> None:
         """Put a word about the recording into metadata.yaml at the next flush."""
@@ -174,16 +183,18 @@ class BagWriter:
             TraceError: the system refused; the bag stays as the flush before left it. Call abort() then.
 
         """
-        if self._file.pending_bytes:
+        if self._file.is_waiting:
             self._stale = True
         self._file.flush()
         if self._stale:
             try:
                 self._write_metadata(self.directory)
             except OSError as error:
-                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror})"
+                kept = self._file.undo_flush()
+                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror}); {kept}"
                 raise TraceError(msg) from error
             self._stale = False
+        self._flushed_ns = max(self._flushed_ns, self._file.flushed.end_ns)
 
     def close(self) -> None:
         """Flush and close.
@@ -200,6 +211,8 @@ class BagWriter:
     def abort(self) -> None:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
         self._file.abort()
+        if self._told_files == len(self._complete):  # the present file is a new one, and nothing tells of it
+            self._file.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         """Return the writer itself: the bag is open from its construction."""
@@ -229,6 +242,7 @@ class BagWriter:
         write_metadata(
             directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
         )
+        self._told_files = len(self._files())
 
 
 def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:

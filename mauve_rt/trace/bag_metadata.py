@@ -44,8 +44,12 @@ def write_metadata(
 
     """
     temporary = directory / f".{METADATA}.new"
-    temporary.write_text(_metadata(files, topics, custom_data, ros_distro), encoding="utf-8")
-    temporary.replace(directory / METADATA)
+    try:
+        temporary.write_text(_metadata(files, topics, custom_data, ros_distro), encoding="utf-8")
+        temporary.replace(directory / METADATA)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def _metadata(

@@ -39,6 +39,11 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         found.append(
             Finding(f"{dropped:,} messages of topics were dropped on their way into the bag", is_loss=True)
         )
+    found += [
+        Finding(f"{file.path.name}: its chunks are not in order of time; readers that need it sort them")
+        for file in state.files
+        if not file.is_in_order
+    ]
     return found + _notes(trace)
 
 

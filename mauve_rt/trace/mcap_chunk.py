@@ -2,16 +2,12 @@
 
 import struct
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from mcap.data_stream import RecordBuilder
-from mcap.opcode import Opcode
-from mcap.records import ChunkIndex, McapRecord
+from mauve_rt.trace.mcap_records import HEAD, ChunkIndex, Opcode
 
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MESSAGE_FIXED_BYTES = 22
-_RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK_HEAD = struct.Struct("<QQQIIQ")  # first, last log time, size, CRC, no compression (0), size
 _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
@@ -54,11 +50,11 @@ class PendingChunk:
         self.counts = Counts()
         self._indexes: dict[int, bytearray] = {}
 
-    def add(self, channel_id: int, log_time_ns: int, data: bytes) -> None:
+    def add(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
         """Append a message."""
         entry = _INDEX_ENTRY.pack(log_time_ns, len(self.records))
         self.records += _MESSAGE_HEAD.pack(
-            Opcode.MESSAGE, _MESSAGE_FIXED_BYTES + len(data), channel_id, 0, log_time_ns, log_time_ns
+            Opcode.MESSAGE, _MESSAGE_FIXED_BYTES + len(data), channel_id, 0, log_time_ns, publish_time_ns
         )
         self.records += data
         self.counts.add(channel_id, log_time_ns)
@@ -71,7 +67,7 @@ class PendingChunk:
             self.counts.start_ns, self.counts.end_ns, size, zlib.crc32(self.records), 0, size
         )
         parts: list[bytes | bytearray] = [
-            _RECORD_HEAD.pack(Opcode.CHUNK, len(head) + size),
+            HEAD.pack(Opcode.CHUNK, len(head) + size),
             head,
             self.records,
         ]
@@ -93,13 +89,4 @@ class PendingChunk:
             message_start_time=self.counts.start_ns,
             uncompressed_size=size,
         )
-        return b"".join(parts), serialized(index)
-
-
-def serialized(*records: McapRecord) -> bytes:
-    """Return the bytes of records, one behind the other."""
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    end: Callable[[], bytes] = builder.end  # which mcap leaves unannotated
-    return end()
+        return b"".join(parts), index.to_bytes()

@@ -14,8 +14,7 @@ leave it half done: the kernel gives up a write between two pages when a fatal s
 is another matter: nothing here waits for the disk.)
 
 The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
-the file. Format: https://mcap.dev/spec. Records are built by the mcap library where they are small;
-messages are not.
+the file. Format: https://mcap.dev/spec.
 """
 
 import os
@@ -25,19 +24,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mcap.opcode import Opcode
-from mcap.records import (
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_chunk import Counts, PendingChunk
+from mauve_rt.trace.mcap_records import (
     Channel,
     DataEnd,
     Footer,
     Header,
+    Opcode,
     Schema,
     Statistics,
     SummaryOffset,
+    serialized,
 )
-
-from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.mcap_chunk import Counts, PendingChunk, serialized
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -53,22 +52,21 @@ class McapFile:
 
         """
         self.path = path
-        self.flushed = Counts()
-        """What the file on disk holds now."""
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk = PendingChunk()
+        self._chunk = self._written = PendingChunk()
         self._chunk_indexes = bytearray()
-        self._chunk_count = 0
-        self._tail = b""
         start = MAGIC + serialized(Header(profile, library))
-        self._data_end = len(start)
-        self._data_crc = zlib.crc32(start)
-        self._tail = self._build_tail(self.flushed, self._data_end, self._data_crc)
+        self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
+        self._before = self._now
         self._descriptor = -1
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-            write_all(self._descriptor, start + self._tail, 0)
+            try:
+                write_all(self._descriptor, start + self._now.tail, 0)
+            except OSError:
+                path.unlink()
+                raise
         except OSError as error:
             self.abort()
             msg = f"bag file {path}: cannot be created ({error.strerror})"
@@ -77,12 +75,17 @@ class McapFile:
     @property
     def size(self) -> int:
         """Bytes on disk."""
-        return self._data_end + len(self._tail)
+        return self._now.data_end + len(self._now.tail)
 
     @property
-    def pending_bytes(self) -> int:
-        """Bytes of messages that wait for the next flush."""
-        return len(self._chunk.records)
+    def flushed(self) -> Counts:
+        """What the file on disk holds now."""
+        return self._now.counts
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether there are messages for the next flush."""
+        return bool(self._chunk.counts.messages)
 
     def add_schema(self, name: str, *, encoding: str, data: bytes) -> int:
         """Declare a schema; returns its id."""
@@ -104,39 +107,54 @@ class McapFile:
         self._chunk.records += serialized(channel)
         return channel.id
 
-    def add_message(self, channel_id: int, log_time_ns: int, data: bytes) -> None:
-        """Keep a message for the next flush. Log time in ns of CLOCK_REALTIME."""
-        self._chunk.add(channel_id, log_time_ns, data)
+    def add_message(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
+        """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
+        self._chunk.add(channel_id, log_time_ns, data, publish_time_ns=publish_time_ns)
 
     def flush(self) -> None:
         """Write what waits; the file is complete before and after.
+
+        Schemas and channels wait for a message: a chunk without one has no message index, and where the first
+        chunk has none, libmcap (rosbag2's reader) gives up the whole file.
 
         Raises:
             TraceError: the system refused, e.g. the disk is full. What was flushed before is still there
             and complete.
 
         """
-        chunk = self._chunk
-        if not chunk.records:
+        if not self.is_waiting:
             return
-        block, index = chunk.build(self._data_end)
-        flushed = self.flushed.plus(chunk.counts)
-        data_end = self._data_end + len(block)
-        data_crc = zlib.crc32(block, self._data_crc)
-        old_indexes = len(self._chunk_indexes)
+        chunk, before = self._chunk, self._now
+        self._written = chunk
+        block, index = chunk.build(before.data_end)
         self._chunk_indexes += index
-        self._chunk_count += 1
-        tail = self._build_tail(flushed, data_end, data_crc)
+        self._before = before
+        self._now = self._finished(
+            before.counts.plus(chunk.counts),
+            before.chunk_count + 1,
+            before.data_end + len(block),
+            zlib.crc32(block, before.data_crc),
+        )
         try:
-            write_all(self._descriptor, block + tail, self._data_end)
+            write_all(self._descriptor, block + self._now.tail, before.data_end)
         except OSError as error:
-            del self._chunk_indexes[old_indexes:]
-            self._chunk_count -= 1
-            kept = self._restore_tail()
-            msg = f"bag file {self.path}: writing failed ({error.strerror}); {kept}"
+            msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
             raise TraceError(msg) from error
-        self._tail, self._data_end, self._data_crc, self.flushed = tail, data_end, data_crc, flushed
         self._chunk = PendingChunk()
+
+    def undo_flush(self) -> str:
+        """Make the file what it was before the last flush, or attempt at one; says what came of it.
+
+        What was flushed waits again. It needs no room on the disk: the old end's blocks are there already.
+        """
+        self._now, self._chunk = self._before, self._written
+        del self._chunk_indexes[self._now.index_bytes :]
+        try:
+            write_all(self._descriptor, self._now.tail, self._now.data_end)
+            os.ftruncate(self._descriptor, self.size)
+        except OSError as error:
+            return f"the old end could not be put back either ({error.strerror}): the file needs repair"
+        return f"the file is complete up to the flush before, {self.flushed.messages} messages"
 
     def close(self) -> None:
         """Flush and close.
@@ -156,20 +174,22 @@ class McapFile:
         if descriptor >= 0:
             os.close(descriptor)
 
-    def _build_tail(self, counts: Counts, data_end: int, data_crc: int) -> bytes:
-        summary = Summary(
-            self._schemas, self._channels, counts, self._chunk_count, bytes(self._chunk_indexes)
-        )
-        return build_tail(summary, data_end=data_end, data_crc=data_crc)
+    def _finished(self, counts: Counts, chunk_count: int, data_end: int, data_crc: int) -> "_Finished":
+        summary = Summary(self._schemas, self._channels, counts, chunk_count, bytes(self._chunk_indexes))
+        tail = build_tail(summary, data_end=data_end, data_crc=data_crc)
+        return _Finished(counts, chunk_count, data_end, data_crc, len(self._chunk_indexes), tail)
 
-    def _restore_tail(self) -> str:
-        """Put the old tail back after a write that failed halfway (its blocks are there already)."""
-        try:
-            write_all(self._descriptor, self._tail, self._data_end)
-            os.ftruncate(self._descriptor, self._data_end + len(self._tail))
-        except OSError as error:
-            return f"the old end could not be put back either ({error.strerror}): the file needs repair"
-        return f"the file is complete up to the flush before, {self.flushed.messages} messages"
+
+class _Finished(NamedTuple):
+    """The file as a flush left it."""
+
+    counts: Counts
+    chunk_count: int
+    data_end: int
+    data_crc: int
+    index_bytes: int
+    """Of `_chunk_indexes`."""
+    tail: bytes
 
 
 class Summary(NamedTuple):

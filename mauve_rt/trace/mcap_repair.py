@@ -1,24 +1,39 @@
-"""Tells whether an MCAP file is a finished one, and makes one of it that is whole up to some place only."""
+"""Tells whether an MCAP file is one that every reader reads, and makes one of it.
+
+Readers that go by the summary (rosbag2's libmcap, mcap, rosbags) ask this of it: its CRC fits; its statistics
+count what the chunks hold; it has an index of each chunk that holds messages, with the place of a message
+index for each of their channels, and of no chunk without messages. libmcap gives up a file whose first chunk
+index has no message index, and says so only in its log.
+"""
 
 import os
-import struct
 import zlib
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, MessageIndex, Schema
-from mcap.stream_reader import get_chunk_data_stream
-
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.mcap_chunk import Counts, serialized
+from mauve_rt.trace.mcap_chunk import Counts
 from mauve_rt.trace.mcap_file import Summary, build_tail, write_all
-from mauve_rt.trace.mcap_scan import Found, McapScan, OtherRecord
+from mauve_rt.trace.mcap_records import (
+    MESSAGE_HEAD,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Message,
+    MessageIndex,
+    Opcode,
+    OtherRecord,
+    Schema,
+    serialized,
+    split_records,
+    unpacked,
+)
+from mauve_rt.trace.mcap_scan import Found, McapScan, Told
 from mauve_rt.trace.progress import Progress, silent
 
 _BLOCK_BYTES = 1 << 20
-_HEAD = struct.Struct("<BQ")  # opcode, length
-_MESSAGE = struct.Struct("<H4xQ")  # channel, (sequence), log time
 
 
 Entries = dict[int, list[tuple[int, int]]]
@@ -36,7 +51,6 @@ class _ChunkSeen:
         self.is_followed = False
         """By anything but its indexes."""
         self.end = found.end
-        data = chunk.data if not chunk.compression else _unpacked(chunk)
         self._index = ChunkIndex(
             chunk_length=found.end - found.offset,
             chunk_start_offset=found.offset,
@@ -48,13 +62,11 @@ class _ChunkSeen:
             message_start_time=chunk.message_start_time,
             uncompressed_size=chunk.uncompressed_size,
         )
-        at = 0
-        while at + _HEAD.size <= len(data):
-            opcode, length = _HEAD.unpack_from(data, at)
+        data = unpacked(chunk)
+        for opcode, at, body, _ in split_records(data):
             if opcode == Opcode.MESSAGE:
-                channel, log_time = _MESSAGE.unpack_from(data, at + _HEAD.size)
+                channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(data, body)
                 self.messages.setdefault(channel, []).append((log_time, at))
-            at += _HEAD.size + length
 
     def add_index(self, offset: int, end: int, index: MessageIndex) -> None:
         """Take note of a message index behind it."""
@@ -76,9 +88,9 @@ class _ChunkSeen:
         self._index.message_index_length = len(out)
         return out
 
-    def entry(self) -> bytes:
-        """Return its record in the summary."""
-        return serialized(self._index)
+    def entry(self) -> ChunkIndex | None:
+        """Return its record in the summary; None: it has no place there, as it holds no message."""
+        return self._index if self.messages else None
 
 
 class _Chunks:
@@ -86,7 +98,7 @@ class _Chunks:
 
     def __init__(self) -> None:
         self.last: _ChunkSeen | None = None
-        self._before: list[bytes] = []  # entries of those before the last one
+        self._before: list[ChunkIndex] = []  # of those before the last one
 
     def note(self, found: Found) -> None:
         """Take note of the next record of the data section."""
@@ -99,11 +111,11 @@ class _Chunks:
         elif self.last is not None and not isinstance(record, DataEnd):
             self.last.is_followed = True
 
-    def entries(self) -> list[bytes]:
+    def entries(self) -> list[ChunkIndex]:
         """Their records in the summary."""
-        if self.last is not None:
-            self._before.append(self.last.entry())
-            self.last = None
+        if self.last is not None and (entry := self.last.entry()) is not None:
+            self._before.append(entry)
+        self.last = None
         return self._before
 
 
@@ -123,7 +135,9 @@ class FileState:
     schemas: list[Schema]
     channels: list[Channel]
     counts: Counts
-    _chunk_indexes: bytes
+    is_in_order: bool
+    """Whether its chunks are in order of log time."""
+    _chunk_indexes: list[ChunkIndex]
     _chunk_count: int
     _missing_indexes: bytes
     """What has to be written behind the last chunk."""
@@ -157,7 +171,7 @@ class FileState:
                     self.channels,
                     self.counts,
                     self._chunk_count,
-                    self._chunk_indexes,
+                    serialized(*self._chunk_indexes),
                     self._attachments,
                     self._metadata,
                 )
@@ -181,23 +195,27 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
     """
     counts = Counts()
     chunks = _Chunks()
+    chunk_count = 0
     others = {Opcode.ATTACHMENT: 0, Opcode.METADATA: 0}
     with McapScan(path) as scan:
         for found in scan.found():
             record = found.record
             chunks.note(found)
+            chunk_count += isinstance(record, Chunk)
             if isinstance(record, OtherRecord) and record.opcode in others:
                 others[Opcode(record.opcode)] += 1
             for one in scan.inside(record):
                 if isinstance(one, Message):
                     counts.add(one.channel_id, one.log_time)
             progress(scan.whole_bytes / max(scan.size, 1), "examining")
-        damage = scan.damage or scan.summary_damage()
+        told = scan.summary()
         whole_bytes, missing = scan.whole_bytes, b""
         last = chunks.last
-        if damage and last is not None and not last.is_followed and not last.is_indexed():
+        is_last_torn = last is not None and not last.is_followed and not last.is_indexed()
+        if last is not None and is_last_torn and (scan.damage or told.damage):
             whole_bytes, missing = last.end, last.index_again()
         entries = chunks.entries()
+        damage = scan.damage or told.damage or _untrue(told, counts, entries)
         return FileState(
             path=path,
             library=scan.header.library,
@@ -208,21 +226,39 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             schemas=list(scan.schemas.values()),
             channels=list(scan.channels.values()),
             counts=counts,
-            _chunk_indexes=b"".join(entries),
-            _chunk_count=len(entries),
+            is_in_order=all(
+                one.message_start_time <= other.message_start_time for one, other in pairwise(entries)
+            ),
+            _chunk_indexes=entries,
+            _chunk_count=chunk_count,
             _missing_indexes=missing,
             _attachments=others[Opcode.ATTACHMENT],
             _metadata=others[Opcode.METADATA],
         )
 
 
+def _untrue(told: Told, counts: Counts, entries: list[ChunkIndex]) -> str:
+    """Say what the summary tells other than the data section; empty where it tells the same."""
+    statistics = told.statistics
+    if statistics is None:
+        return "the summary has no statistics"
+    expected = (counts.messages, counts.by_channel, counts.start_ns, counts.end_ns)
+    by_channel = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+    times = (statistics.message_start_time, statistics.message_end_time)
+    if (statistics.message_count, by_channel, *times) != expected:
+        return f"its statistics tell of {statistics.message_count:,} messages other than those there are"
+    places = {one.chunk_start_offset for one in entries}
+    for one in told.chunk_indexes:
+        if one.chunk_start_offset not in places:
+            where = f"the chunk at byte {one.chunk_start_offset:,}"
+            return f"{where} holds no message: rosbag2 reads nothing of a file that begins with such a chunk"
+    if sorted(told.chunk_indexes, key=lambda one: one.chunk_start_offset) != entries:
+        return "the summary's indexes are not those of its chunks"
+    return ""
+
+
 def _sorted(entries: Entries) -> Entries:
     return {channel: sorted(found) for channel, found in entries.items() if found}
-
-
-def _unpacked(chunk: Chunk) -> bytes:
-    stream, length = get_chunk_data_stream(chunk)
-    return bytes(stream.read(length))
 
 
 def _crc(descriptor: int, size: int) -> int:

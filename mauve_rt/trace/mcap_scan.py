@@ -1,49 +1,40 @@
 """Reads an MCAP file from its begin to where it is whole; needs neither its end nor its summary.
 
 So the bag of a process that was killed in the middle of a write, or that is still writing, is read up to
-its last whole chunk. Records are taken apart by the mcap library; this only finds them.
+its last whole chunk.
 """
 
-import io
 import os
-import struct
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, MessageIndex, Schema
-from mcap.stream_reader import CRCValidationError, breakup_chunk
-
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_file import MAGIC
-
-_HEAD = struct.Struct("<BQ")  # opcode, length
-_FOOTER_BYTES = _HEAD.size + 20
-_ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
-_UNREADABLE = (
-    McapError,
-    ValueError,
-    KeyError,
-    IndexError,
-    EOFError,
-    struct.error,
-    OverflowError,
-    MemoryError,
+from mauve_rt.trace.mcap_records import (
+    HEAD,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Opcode,
+    Record,
+    Schema,
+    Statistics,
+    read_record,
+    split_records,
+    unpacked,
 )
-_READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
-    Opcode.HEADER: Header.read,
-    Opcode.SCHEMA: Schema.read,
-    Opcode.CHANNEL: Channel.read,
-    Opcode.CHUNK: Chunk.read,
-    Opcode.MESSAGE_INDEX: MessageIndex.read,
-    Opcode.DATA_END: DataEnd.read,
-    Opcode.FOOTER: Footer.read,
-}
+
+_FOOTER_BYTES = HEAD.size + 20
+_ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
+_UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError, MemoryError)
 
 
 class Found(NamedTuple):
@@ -51,7 +42,17 @@ class Found(NamedTuple):
 
     offset: int
     end: int
-    record: McapRecord
+    record: Record
+
+
+@dataclass
+class Told:
+    """What the summary tells, by which other readers find their way."""
+
+    damage: str = ""
+    """Why it cannot be read; empty when it can."""
+    statistics: Statistics | None = None
+    chunk_indexes: list[ChunkIndex] = field(default_factory=list)
 
 
 class McapScan:
@@ -119,9 +120,12 @@ class McapScan:
                 if isinstance(record, Message):
                     yield self.channels[record.channel_id], record
 
-    def inside(self, record: McapRecord) -> list[McapRecord]:
+    def inside(self, record: Record) -> list[Record]:
         """Return the records of a chunk, or the record itself; schemas and channels are noted."""
-        records = breakup_chunk(record) if isinstance(record, Chunk) else [record]
+        records = [record]
+        if isinstance(record, Chunk):
+            data = memoryview(unpacked(record))
+            records = [read_record(opcode, data[body:end]) for opcode, _, body, end in split_records(data)]
         for one in records:
             if isinstance(one, Schema):
                 self.schemas[one.id] = one
@@ -134,26 +138,26 @@ class McapScan:
         schema = self.schemas.get(channel.schema_id)
         return "" if schema is None else schema.name
 
-    def summary_damage(self) -> str:
-        """What is wrong behind the data section, which other readers need; empty when nothing is."""
+    def summary(self) -> Told:
+        """Read what stands behind the data section."""
         if self.data_end is None:
-            return "the end is missing"
+            return Told("the end is missing")
         size = self.size
         try:
             tail = os.pread(self._file.fileno(), size - self.whole_bytes, self.whole_bytes)
             if not tail.endswith(MAGIC):
-                return "the closing magic bytes are missing"
+                return Told("the closing magic bytes are missing")
             at = len(tail) - len(MAGIC) - _FOOTER_BYTES
-            footer = _record(Opcode.FOOTER, tail[at + _HEAD.size : -len(MAGIC)])
-            if tail[at] != Opcode.FOOTER or not isinstance(footer, Footer):
-                return "the footer is missing"
+            if tail[at] != Opcode.FOOTER:
+                return Told("the footer is missing")
+            footer = Footer.from_bytes(tail[at + HEAD.size : -len(MAGIC)])
             begin = footer.summary_start - self.whole_bytes if footer.summary_start else at
             crc = zlib.crc32(tail[begin : at + _FOOTER_BYTES - 4])
             if footer.summary_crc not in (0, crc):
-                return "the summary's CRC does not fit"
+                return Told("the summary's CRC does not fit")
+            return _told(tail[begin:at])
         except (*_UNREADABLE, OSError) as error:
-            return f"the summary cannot be read ({_reason(error)})"
-        return ""
+            return Told(f"the summary cannot be read ({_reason(error)})")
 
     def _read_header(self) -> Header:
         if self._file.read(len(MAGIC)) != MAGIC:
@@ -181,12 +185,12 @@ class McapScan:
 
     def _once(self, offset: int) -> Found:
         self._file.seek(offset)
-        head = self._file.read(_HEAD.size)
-        if len(head) < _HEAD.size:
+        head = self._file.read(HEAD.size)
+        if len(head) < HEAD.size:
             msg = "the file ends in the middle of a record"
             raise EOFError(msg)
-        opcode, length = _HEAD.unpack(head)
-        end = offset + _HEAD.size + length
+        opcode, length = HEAD.unpack(head)
+        end = offset + HEAD.size + length
         if end > self.size:
             msg = f"a record of {length:,} bytes does not fit into the file's {self.size:,}"
             raise EOFError(msg)
@@ -197,27 +201,21 @@ class McapScan:
         if len(data) < length:
             msg = "the file became shorter"
             raise EOFError(msg)
-        record = _record(opcode, data)
+        record = read_record(opcode, data)
         if isinstance(record, Chunk):
             _check(record)
         return Found(offset, end, record)
 
 
-class OtherRecord(McapRecord):
-    """A record that the trace does not use: an attachment, metadata, one of a later version of the format."""
-
-    def __init__(self, opcode: int) -> None:
-        self.opcode = opcode
-
-
-def _record(opcode: int, data: bytes) -> McapRecord:
-    stream = ReadDataStream(io.BytesIO(data))
-    if opcode == Opcode.MESSAGE:
-        message: McapRecord = Message.read(stream, len(data))  # which mcap leaves unannotated
-        return message
-    read = _READ.get(opcode)
-    record: McapRecord = OtherRecord(opcode) if read is None else read(stream)
-    return record
+def _told(summary: bytes) -> Told:
+    told = Told()
+    for opcode, _, body, end in split_records(summary):
+        record = read_record(opcode, summary[body:end])
+        if isinstance(record, Statistics):
+            told.statistics = record
+        elif isinstance(record, ChunkIndex):
+            told.chunk_indexes.append(record)
+    return told
 
 
 def _check(chunk: Chunk) -> None:
@@ -227,16 +225,10 @@ def _check(chunk: Chunk) -> None:
         ValueError: it is not.
 
     """
-    if not chunk.compression:  # as all of ours: without a copy
-        crc = zlib.crc32(chunk.data)
-        if chunk.uncompressed_crc not in (0, crc):
-            raise CRCValidationError(expected=chunk.uncompressed_crc, actual=crc, record=chunk)
-        return
-    try:
-        breakup_chunk(chunk, validate_crc=True)
-    except Exception as error:  # each compression has an error of its own
-        msg = f"a chunk cannot be unpacked ({_reason(error)})"
-        raise ValueError(msg) from error
+    crc = zlib.crc32(unpacked(chunk))
+    if chunk.uncompressed_crc not in (0, crc):
+        msg = f"a chunk's CRC does not fit: expected {chunk.uncompressed_crc:08x}, found {crc:08x}"
+        raise ValueError(msg)
 
 
 def _reason(error: BaseException) -> str:

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mcap.records import Channel
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
 from mauve_rt.trace.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.cdr import Batch, decode_batch
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_records import Channel
 from mauve_rt.trace.mcap_scan import McapScan
+from mauve_rt.trace.message_decoding import Decoder
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.records import RECORD, Records
 from mauve_rt.trace.trace import BagFile, Deployment, Loss, Message, Trace
@@ -167,10 +166,10 @@ class _Content:
 
 
 class _Types:
-    """Classes that rosbags makes of the definitions in a bag."""
+    """What reads the messages of a bag, by the definitions in it."""
 
     def __init__(self) -> None:
-        self._stores: dict[tuple[str, bytes], Typestore] = {}
+        self._decoders: dict[tuple[str, bytes], Decoder] = {}
 
     def decoded(self, scan: McapScan, channel: Channel, data: bytes) -> Any:
         """Return a message as an object.
@@ -185,12 +184,10 @@ class _Types:
             raise TraceError(msg)
         key = (schema.name, schema.data)
         try:
-            if key not in self._stores:
-                store = get_typestore(Stores.EMPTY)
-                store.register(get_types_from_msg(schema.data.decode(), schema.name))
-                self._stores[key] = store
-            return self._stores[key].deserialize_cdr(data, schema.name)
-        except Exception as error:  # rosbags raises whatever its parts raise
+            if key not in self._decoders:
+                self._decoders[key] = Decoder(schema.name, schema.data.decode())
+            return self._decoders[key].decode(data)
+        except ValueError as error:
             msg = f"topic {channel.topic}: a message cannot be read as {schema.name} ({error})"
             raise TraceError(msg) from error
 
@@ -283,7 +280,7 @@ def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.
                     continue
                 log_time_ns = message.log_time
                 said = types.decoded(scan, channel, message.data)
-                monotonic_ns = _monotonic_ns(log_time_ns, pairs)
+                monotonic_ns = _monotonic_ns(message.publish_time, pairs)
                 one = Message(channel.topic, log_time_ns, monotonic_ns, said)
                 heapq.heappush(waiting, (log_time_ns, count, one))
                 count += 1
@@ -293,9 +290,9 @@ def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.
         yield heapq.heappop(waiting)[-1]
 
 
-def _monotonic_ns(log_time_ns: int, pairs: npt.NDArray[np.int64]) -> int:
+def _monotonic_ns(published_ns: int, pairs: npt.NDArray[np.int64]) -> int:
     """Undo the recorder's mapping: it used the pair of the drain that followed the message."""
     if not len(pairs):
-        return log_time_ns
-    index = min(int(np.searchsorted(pairs[:, 1], log_time_ns)), len(pairs) - 1)
-    return log_time_ns - int(pairs[index, 1] - pairs[index, 0])
+        return published_ns
+    index = min(int(np.searchsorted(pairs[:, 1], published_ns)), len(pairs) - 1)
+    return published_ns - int(pairs[index, 1] - pairs[index, 0])

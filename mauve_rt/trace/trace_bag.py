@@ -108,9 +108,10 @@ class Split:
 class TraceBag:
     """Writes what a trace source yields, and messages on the same time base.
 
-    Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. Each file
-    begins with the words, the architecture, and a batch without records where there were records before it:
-    so it can be read alone.
+    Publish times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. Log times
+    are the same, but never run backwards: after that clock was set back they stay ahead of it by as much,
+    since readers play a bag by its log times. Each file begins with the words, the architecture, and a batch
+    without records where there were records before it: so it can be read alone.
     """
 
     def __init__(
@@ -144,13 +145,14 @@ class TraceBag:
             self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
             self._bag.add_topic(self._topic(ARCHITECTURE), _ARCHITECTURE_TYPE, qos=_LATCHED)
-            self._bag.flush()
+            self._bag.flush()  # metadata.yaml names them; the file does when it has a message
         except TraceError:
             self._bag.abort()
             raise
         self._names: tuple[Sequence[str], Sequence[str]] | None = None
         self._latched: dict[str, bytes] = {}  # each file begins with these
         self._last: Drain | None = None
+        self._ahead_ns: int | None = None  # log time - monotonic time
         self._refused_types: set[tuple[str, str]] = set()
 
     @property
@@ -169,21 +171,20 @@ class TraceBag:
         A batch without records (it tells of losses) is written if `whole`.
         """
         self._last = drain
-        self._write_names(drain.realtime_ns)
+        self._write_names(drain)
         if drain.records or messages or whole:
             self._write_batch(drain, drain.records)
-        offset_ns = drain.realtime_ns - drain.monotonic_ns
-        return sum(not self._write_message(message, message.monotonic_ns + offset_ns) for message in messages)
+        return sum(not self._write_message(message, drain) for message in messages)
 
     def discard(self, drain: Drain) -> None:
         """Leave out what was recorded before this bag; only how much it was gets into it."""
         self._last = drain
-        self._write_names(drain.realtime_ns)
+        self._write_names(drain)
         self._write_batch(drain, b"")
 
     def tell_architecture(self, data: bytes, drain: Drain) -> None:
         """Write a serialized mauve_msgs/msg/TraceArchitecture, unless it is the last one again."""
-        self._write_latched(ARCHITECTURE, data, drain.realtime_ns)
+        self._write_latched(ARCHITECTURE, data, drain)
 
     def tell_dropped(self, messages: int) -> None:
         """Note with the next flush how many messages did not get into the bag."""
@@ -192,11 +193,12 @@ class TraceBag:
     def flush(self) -> None:
         """Make the bag a finished one of all that was written; go on in a new file when it is time."""
         self._bag.flush()
-        if self._last is not None and self._is_time_to_split(self._last.realtime_ns):
+        last = self._last
+        if last is not None and self._is_time_to_split(self._log_time_ns(last, last.monotonic_ns)):
             self._bag.split()
             for topic, data in self._latched.items():
-                self._bag.write(self._topic(topic), self._last.realtime_ns, data)
-            self._write_batch(self._last, b"")
+                self._write(self._topic(topic), data, last, last.monotonic_ns)
+            self._write_batch(last, b"")
 
     def close(self) -> None:
         """Flush a last time."""
@@ -212,21 +214,21 @@ class TraceBag:
 
     def _write_batch(self, drain: Drain, records: bytes) -> None:
         batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, records)
-        self._bag.write(self._topic(BATCHES), drain.realtime_ns, encode_batch(batch))
+        self._write(self._topic(BATCHES), encode_batch(batch), drain, drain.monotonic_ns)
 
-    def _write_names(self, log_time_ns: int) -> None:
+    def _write_names(self, drain: Drain) -> None:
         """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
         words = (self._words.trace_components(), self._words.trace_names())
         if words != self._names:
             self._names = words
-            self._write_latched(NAMES, encode_names(*words), log_time_ns)
+            self._write_latched(NAMES, encode_names(*words), drain)
 
-    def _write_latched(self, topic: str, data: bytes, log_time_ns: int) -> None:
+    def _write_latched(self, topic: str, data: bytes, drain: Drain) -> None:
         if self._latched.get(topic) != data:
             self._latched[topic] = data
-            self._bag.write(self._topic(topic), log_time_ns, data)
+            self._write(self._topic(topic), data, drain, drain.monotonic_ns)
 
-    def _write_message(self, message: SentMessage, log_time_ns: int) -> bool:
+    def _write_message(self, message: SentMessage, drain: Drain) -> bool:
         try:
             self._bag.add_topic(message.topic, message.type_name, qos=message.qos)
         except TraceError as error:
@@ -235,8 +237,19 @@ class TraceBag:
                 self._refused_types.add(refused)
                 self._on_error(f"topic {message.topic} is not recorded: {error}")
             return False
-        self._bag.write(message.topic, log_time_ns, message.data)
+        self._write(message.topic, message.data, drain, message.monotonic_ns)
         return True
+
+    def _write(self, topic: str, data: bytes, drain: Drain, monotonic_ns: int) -> None:
+        """Write what was sent at a time, mapped by a drain's clock pair."""
+        published_ns = monotonic_ns + drain.realtime_ns - drain.monotonic_ns
+        log_time_ns = self._log_time_ns(drain, monotonic_ns)
+        self._bag.write(topic, log_time_ns, data, publish_time_ns=published_ns)
+
+    def _log_time_ns(self, drain: Drain, monotonic_ns: int) -> int:
+        ahead_ns = drain.realtime_ns - drain.monotonic_ns
+        self._ahead_ns = ahead_ns if self._ahead_ns is None else max(ahead_ns, self._ahead_ns)
+        return monotonic_ns + self._ahead_ns
 
     def _topic(self, name: str) -> str:
         return f"{self._node_name}/{name}"

@@ -12,14 +12,14 @@ import mauve_rt
 ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = ("mauve_rt", "mauve_examples", "mauve_msgs", "cmake")
 OF_TESTS = ("tests", "mauve_examples/tests", "benchmarks")
-ON_THE_PATH_OF_TESTS = ("tests/plugins", "benchmarks")
+ON_THE_PATH_OF_TESTS = ("tests", "tests/plugins", "benchmarks")
 OWN = {"mauve_rt", "mauve_examples", "mauve_msgs"}
 # Of modules that are no ROS packages: rosdep's key (rosdep/python.yaml) and the name in requirements/.
 MODULES = {
     "argcomplete": ("python3-argcomplete", "argcomplete"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
-    "mcap": ("mcap-ros2-support", "mcap"),  # rosdep has no key for it alone
+    "mcap": ("", "mcap"),  # no distribution packages it: the tests' only
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
     "pandas": ("python3-pandas", "pandas"),
@@ -28,8 +28,9 @@ MODULES = {
     "pydantic_core": ("python3-pydantic", "pydantic"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
-    "rosbags": ("python3-rosbags-pip", "rosbags"),
+    "rosbags": ("", "rosbags"),  # no distribution packages it: the tests' only
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
+    "yaml": ("python3-yaml", "PyYAML"),
 }
 # Of CMake's packages that rosdep calls otherwise: its keys (rosdep/base.yaml); none if nothing is installed.
 CMAKE_PACKAGES: dict[str, set[str]] = {

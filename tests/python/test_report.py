@@ -10,12 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from mauve_examples.mission.evidence import CoverageHistory, read_robot, replay_coverage
-from mauve_examples.mission.facts import MissionArea, MissionFacts
-from mauve_examples.mission.results import write_results
-from mauve_examples.mission.summary import build_summary, failure_reasons
-from mauve_examples.mission.synthetic import (
+from synthetic_mission import (
     ALONE,
     BLACKOUT_NS,
     PEERS,
@@ -26,6 +21,11 @@ from mauve_examples.mission.synthetic import (
     make_mission,
     office,
 )
+
+from mauve_examples.mission.evidence import CoverageHistory, read_robot, replay_coverage
+from mauve_examples.mission.facts import MissionArea, MissionFacts
+from mauve_examples.mission.results import write_results
+from mauve_examples.mission.summary import build_summary, failure_reasons
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,8 @@
 """A bag is a finished one at every flush, whatever happens in between."""
 
+import errno
 import inspect
+import os
 import random
 import resource
 import shutil
@@ -11,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
@@ -58,6 +61,8 @@ def read(directory: Path):
         scanned = sum(isinstance(record, Message) for record in records)
     assert by_folder == by_file == indexed
     assert scanned == len(indexed)
+    if indexed:
+        assert_rosbag2_reads(directory)
     return indexed
 
 
@@ -105,6 +110,7 @@ def test_metadata_older_than_the_file_still_opens(tmp_path: Path):
     write(bag, range(3, 8))
     write(bag, range(20, 22), "/robot/later")
     bag.flush()
+    assert_rosbag2_reads(directory)
     (directory / "metadata.yaml").write_bytes(older)  # as a kill between the two writes leaves it
     with Reader(directory) as reader:
         assert [time - T0 for _, time, _ in reader.messages()] == list(range(8))
@@ -177,6 +183,93 @@ def test_a_full_disk_leaves_the_bag_as_the_flush_before_left_it(tmp_path: Path):
     bag.flush()  # room again: nothing was lost
     assert len(read(directory)) == 5000
     bag.close()
+
+
+def test_no_chunk_is_written_for_topics_alone(tmp_path: Path):
+    """libmcap 1.3, by which Jazzy's rosbag2 reads, gives up a file that begins with such a chunk."""
+    directory = tmp_path / "bag"
+    with BagWriter(directory) as bag:
+        bag.add_topic("/robot/words", TEXT)
+        bag.flush()
+        assert "/robot/words" in (directory / "metadata.yaml").read_text()
+        write(bag, [1])
+        bag.flush()
+        bag.add_topic("/robot/later", "mauve_test_msgs/msg/Number")
+        bag.flush()
+        write(bag, [2])
+        bag.split()
+        bag.flush()
+        write(bag, [3])
+        bag.flush()
+    assert_rosbag2_reads(directory)
+
+
+def test_a_message_that_comes_late_does_not_put_chunks_out_of_order(tmp_path: Path):
+    with BagWriter(tmp_path / "bag") as bag:
+        write(bag, [10, 20])
+        bag.flush()
+        bag.write("/robot/words", T0 + 15, text(15), publish_time_ns=T0 + 15)
+        bag.split()
+        bag.write("/robot/words", T0 + 5, text(5), publish_time_ns=T0 + 5)
+    assert_rosbag2_reads(tmp_path / "bag")
+    found = []
+    for file in sorted((tmp_path / "bag").glob("*.mcap")):
+        with file.open("rb") as stream:
+            for _, _, message in make_reader(stream).iter_messages():
+                found.append((message.log_time - T0, message.publish_time - T0))
+    assert found == [(10, 10), (20, 20), (20, 15), (20, 5)]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "none", disk]
+    if os.geteuid() or subprocess.run(mount, check=False, stderr=subprocess.DEVNULL).returncode:
+        pytest.skip("needs the right to mount a file system of 300 kB")
+    yield disk
+    subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.parametrize("size", [10, 900, 3500])  # of what is flushed: the metadata or the file does not fit
+@pytest.mark.parametrize("splits", [False, True])
+def test_what_a_full_disk_leaves_tells_what_it_holds(small_disk: Path, size: int, *, splits: bool):
+    bag = BagWriter(small_disk / "bag")
+    bag.add_topic("/robot/words", TEXT)
+
+    def fill() -> None:
+        for number in range(100_000):
+            bag.write("/robot/words", T0 + number, text(number) + bytes(size))
+            bag.flush()
+            if splits and number % 7 == 6:
+                bag.split()
+
+    with pytest.raises(TraceError, match="No space left"):
+        fill()
+    bag.abort()
+    held = sorted(path.name for path in (small_disk / "bag").iterdir())
+    assert [name for name in held if not name.endswith(".mcap")] == ["metadata.yaml"], "nothing half-written"
+    assert_rosbag2_reads(small_disk / "bag")
+
+
+def test_when_the_metadata_does_not_fit_what_was_flushed_waits_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    bag = BagWriter(tmp_path / "bag")
+    write(bag, [1])
+    bag.flush()
+    write(bag, [2], "/robot/later")
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", refuse)
+        with pytest.raises(TraceError, match=r"cannot be written \(No space left\); .* 1 messages"):
+            bag.flush()
+    assert len(read(tmp_path / "bag")) == 1
+    bag.close()  # room again
+    assert len(read(tmp_path / "bag")) == 2
 
 
 WRITING = """

@@ -3,6 +3,7 @@
 import os
 import random
 import shutil
+import struct
 import subprocess
 import sys
 import textwrap
@@ -10,12 +11,15 @@ import time
 from pathlib import Path
 
 import pytest
+from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import Reader, ReaderError
 
 import mauve_rt.trace
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag_repair import examine_bag, repair_bag
+from mauve_rt.trace.mcap_file import McapFile
 from mauve_rt.trace.recorder import Recorder, Split
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.synthetic import SyntheticSource
@@ -63,6 +67,7 @@ def test_a_finished_bag_is_left_as_it_is(tmp_path: Path):
     state = examine_bag(bag)
     assert state.is_finished
     assert state.damages() == []
+    assert_rosbag2_reads(bag)
     repair_bag(state)
     assert {file: file.read_bytes() for file in bag.iterdir()} == before
 
@@ -85,6 +90,7 @@ def test_a_bag_cut_off_anywhere_is_finished_by_a_repair(tmp_path: Path):
         assert examine_bag(bag).is_finished
         assert marks(bag) == there == everything[: len(there)]
         assert messages_by_rosbags(bag) == messages_by_mcap(file) == state.files[0].counts.messages
+        assert_rosbag2_reads(bag)
         found.add(len(there))
         shutil.rmtree(bag)
     assert len(found) > 5
@@ -129,10 +135,59 @@ def test_metadata_that_is_missing_or_older_is_made_again(tmp_path: Path):
     assert metadata.read_text() == original
 
 
+def test_a_bag_that_begins_with_a_chunk_without_messages_is_found_and_mended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    with monkeypatch.context() as patch:  # as it was written before this was known
+        patch.setattr(McapFile, "is_waiting", property(lambda file: bool(file._chunk.records)))
+        bag = record(tmp_path / "bag")
+    with pytest.raises(AssertionError, match="libmcap gives up"):
+        assert_rosbag2_reads(bag)
+    there = marks(bag)
+    state = examine_bag(bag)
+    assert len(state.damages()) == 1
+    assert "holds no message: rosbag2 reads nothing of a file that begins with such" in state.damages()[0]
+    repair_bag(state)
+    assert examine_bag(bag).is_finished
+    assert_rosbag2_reads(bag)
+    assert marks(bag) == there == list(range(30))
+
+
+@pytest.mark.parametrize("what", ["count", "time", "channel"])
+def test_statistics_that_are_not_true_are_found_and_mended(tmp_path: Path, what: str):
+    bag = record(tmp_path / "bag", count=5)
+    (file,) = bag.glob("*.mcap")
+    with file.open("rb") as stream:
+        told = make_reader(stream).get_summary().statistics
+    data = file.read_bytes()
+    at = data.rindex(struct.pack("<QH", told.message_count, told.schema_count))
+    at += {"count": 0, "time": 26, "channel": 48}[what]
+    torn = bytearray(data)
+    torn[at] ^= 1
+    torn[-12:-8] = bytes(4)  # no CRC of the summary
+    file.write_bytes(torn)
+    state = examine_bag(bag)
+    assert "its statistics tell of" in state.damages()[0]
+    repair_bag(state)
+    assert_rosbag2_reads(bag)
+
+
+def test_chunks_out_of_order_are_told_but_no_damage(tmp_path: Path):
+    bag = record(tmp_path / "bag", count=5)
+    (file,) = bag.glob("*.mcap")
+    with file.open("wb") as stream:
+        writer = Writer(stream, chunk_size=1, compression=CompressionType.NONE)
+        writer.start("ros2", "somebody else")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data\n")
+        channel = writer.register_channel("/words", "cdr", schema)
+        for number in (2, 1):
+            writer.add_message(channel, number, bytes(50), number)
+        writer.finish()
+    assert not examine_bag(file).files[0].is_in_order
+
+
 def test_a_bag_of_another_writer_is_repaired_too(tmp_path: Path):
     """Compressed chunks, and messages in no chunk."""
-    from mcap.writer import CompressionType, Writer  # noqa: PLC0415
-
     for compression, chunked in ((CompressionType.ZSTD, True), (CompressionType.LZ4, True), (None, False)):
         file = tmp_path / f"{compression}.mcap"
         with file.open("wb") as stream:
@@ -166,6 +221,7 @@ def test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone(tmp_path: Path):
     assert [int(row["time_ns"]) for row in trace.of("a")] == list(range(60))
     assert trace.lost == 0
     assert messages_by_rosbags(bag) == sum(messages_by_mcap(file) for file in files)
+    assert_rosbag2_reads(bag)
     second = mauve_rt.trace.open(files[1])
     told, rows = second.losses["a"], second.of("a")
     assert told.written == told.received == len(rows) > 0
@@ -245,4 +301,5 @@ def test_after_a_kill_everything_flushed_is_there(tmp_path: Path, plugin_prefix:
             == state.files[0].counts.messages
             == messages_by_mcap(bag / f"{bag.name}_0.mcap")
         )
+        assert_rosbag2_reads(bag)
         assert len(mauve_rt.trace.open(bag).of("c0")) == len(rows)

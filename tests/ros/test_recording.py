@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros_processes import ExecutorProcess
 from rosbags.highlevel import AnyReader
@@ -68,6 +69,7 @@ def test_a_bag_begun_and_ended_while_the_executor_runs(executor: ExecutorProcess
     reply = stop(graph)
     assert reply.success, reply.message
     assert examine_bag(tmp_path / "first").is_finished
+    assert_rosbag2_reads(tmp_path / "first")
     trace = mauve_rt.trace.open(tmp_path / "first")
     assert trace.lost == 0
     found = {component.name: component for component in trace.architecture}
@@ -97,6 +99,7 @@ def test_one_bag_after_the_other(executor: ExecutorProcess, graph: Any):
         graph.spin_until(lambda: len(counts) > 5, "counts")  # noqa: B023 - called at once
         assert stop(graph).success
     for bag in bags:
+        assert_rosbag2_reads(bag)
         trace = mauve_rt.trace.open(bag)
         assert trace.lost == 0
         assert component_statistics(trace, "counter").releases > 3
@@ -156,4 +159,5 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     assert reply.success
     assert "it had ended by itself: recording stopped" in reply.message
     assert examine_bag(tmp_path / "bag").is_finished
+    assert_rosbag2_reads(tmp_path / "bag")
     assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from bag_reading import messages, topics
+from bag_rules import assert_rosbag2_reads
 from demo_harness import Demo, Starter
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
@@ -93,6 +94,7 @@ def test_the_components_are_those_of_the_paper(summary: dict[str, Any]):
 def test_the_bags_open_and_agree_with_the_summary(mission: Demo, summary: dict[str, Any]):
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
+        assert_rosbag2_reads(bag)
         counts = topics(bag)
         names = ("pose", "goal", "map_updates", "executor/events", "supervisor/decisions")
         assert {f"/{robot}/{name}" for name in names} <= counts.keys()

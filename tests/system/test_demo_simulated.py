@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from bag_reading import messages, topics
+from bag_rules import assert_rosbag2_reads
 from demo_harness import Demo, Starter
 from rosbags.highlevel import AnyReader
 
@@ -83,6 +84,7 @@ def test_the_bags_hold_what_those_of_the_real_demo_hold(mission: Demo):
     executor = ("executor/state", "executor/events", "executor/trace/batches", "executor/trace/names")
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
+        assert_rosbag2_reads(bag)
         assert {*(f"/{robot}/{name}" for name in own + executor), "/radio/link"} <= topics(bag).keys()
         decisions = [one.decision for one in messages(bag, f"/{robot}/supervisor/decisions")]
         assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
