@@ -7,9 +7,12 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 _TIMEOUT_S = 60.0
@@ -18,6 +21,15 @@ _TIMEOUT_S = 60.0
 def find_browser() -> str | None:
     """Path of a Chromium: the environment's CHROME, else the first on PATH; None when there is none."""
     return os.environ.get("CHROME") or next(filter(None, map(shutil.which, NAMES)), None)
+
+
+def started_browser(*, size: tuple[int, int] = (1400, 1000), fineness: float = 1) -> "Iterator[Browser]":
+    """Yield a browser; skip the test where there is none."""
+    program = find_browser()
+    if program is None:
+        pytest.skip(f"no browser: none of {', '.join(NAMES)} on PATH, and CHROME is not set")
+    with Browser(program, size=size, fineness=fineness) as started:
+        yield started
 
 
 class Browser:
@@ -61,14 +73,7 @@ class Browser:
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._call(f"{domain}.enable")
-        width, height = self._size
-        self._call(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=self._fineness,
-            mobile=False,
-        )
+        self.resize(*self._size)
         return self
 
     def __exit__(
@@ -82,6 +87,16 @@ class Browser:
             self._process.wait()
         os.close(self._from)
         self._folder.cleanup()
+
+    def resize(self, width: int, height: int) -> None:
+        """Make the window of another size, in CSS pixels."""
+        self._call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=self._fineness,
+            mobile=False,
+        )
 
     def scheme(self, name: str) -> None:
         """Prefer light or dark; less motion, so that jumps arrive at once."""

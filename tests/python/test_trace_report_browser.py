@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from headless_browser import NAMES, Browser, find_browser
+from headless_browser import Browser, started_browser
 from synthetic_traces import deploy, long_trace, overrun, run, swap, trace_of
 
 from mauve_rt.trace.report import write_report
@@ -45,11 +45,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip(f"no browser: none of {', '.join(NAMES)} on PATH, and CHROME is not set")
-    with Browser(program, fineness=1.5) as started:
-        yield started
+    yield from started_browser(fineness=1.5)
 
 
 @pytest.fixture(autouse=True)
@@ -162,6 +158,11 @@ def test_the_theme_button_changes_the_colours(browser: Browser, page: Path):
     browser.settle()
     assert browser.evaluate(paper) != light
     assert min(browser.evaluate(INK)) > 200
+
+
+def test_a_canvas_of_a_new_size_is_drawn_in_the_same_frame(browser: Browser, page: Path):
+    browser.open(page)
+    assert min(browser.evaluate(f"(mauve.timeline.resize(), {INK})")) > 200
 
 
 def test_what_is_merged_says_so(browser: Browser, tmp_path: Path):

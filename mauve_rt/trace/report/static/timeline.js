@@ -43,7 +43,7 @@
       const box = this.overview.parentElement;
       this.overviewContext = fitted(this.overview, box.clientWidth, box.clientHeight);
       this.overviewPicture = null;
-      this.redraw();
+      this.draw(); // at once: a canvas of a new size is empty, and the frame that asked for it is to show something
     }
 
     recolour() {
