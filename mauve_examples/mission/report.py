@@ -6,7 +6,6 @@ coverage stand in front.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from mauve_examples.mission.figure_map import draw_map
 from mauve_examples.mission.story import cores_in_words, happenings, key_figures, realtime_in_words, verdict
 from mauve_examples.mission.swaps import Swap
 from mauve_rt.trace import report
-from mauve_rt.trace.report.blocks import bullets, picture
+from mauve_rt.trace.report.blocks import bullets, picture, prose
 from mauve_rt.trace.trace import Message, Trace, merge_traces
 
 REPORT, MAP, COVERAGE = "report.html", "map.png", "coverage.png"
@@ -79,7 +78,7 @@ def _events(data: ReportData) -> list[Message]:
 
 
 def _verdict(data: ReportData, told: report.Verdict) -> report.Verdict:
-    """Return the mission's verdict; what the traces tell follows."""
+    """Return the mission's verdict; whether the timing held, and what else the traces tell, follow."""
     success = bool(data.summary["success"])
     level, timing = realtime_in_words(data.facts)
     warnings = [report.Sentence("attention", warning) for warning in data.summary["warnings"]]
@@ -87,7 +86,8 @@ def _verdict(data: ReportData, told: report.Verdict) -> report.Verdict:
         "good" if success else "bad",
         verdict(data.facts, data.swaps, success=success),
         [*warnings, report.Sentence(level, timing), *told.sentences],
-        word="Mission succeeded" if success else "Mission failed",
+        also=report.Sentence(told.level, f"{told.lead} {told.sentence}"),
+        lead="Mission succeeded" if success else "Mission failed",
     )
 
 
@@ -105,7 +105,7 @@ def _sections(out_dir: Path, data: ReportData) -> Iterator[report.Section]:
 
 def _story(data: ReportData) -> str:
     lines = "".join(
-        f"<li><time>{one.time_s:.1f} s</time><span>{escape(one.text)}</span></li>"
+        f"<li><time>{one.time_s:.1f} s</time><span>{prose(one.text)}</span></li>"
         for one in happenings(data.facts, data.coverage, data.swaps)
     )
     cores = bullets(cores_in_words(data.facts, data.swaps))

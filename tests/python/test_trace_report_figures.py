@@ -88,6 +88,11 @@ def test_times_read_with_three_digits_and_a_unit(time_ns: int | None, text: str)
     assert plain(time_text(time_ns)) == text
 
 
+@pytest.mark.parametrize("time_ns", [1, 1_234, 12_345_678, 90 * 10**9, 150 * 10**9, 7_500 * 10**9])
+def test_a_time_offers_no_place_to_end_a_line(time_ns: int):
+    assert " " not in time_text(time_ns)
+
+
 def test_ticks_that_differ_little_read_apart():
     assert [plain(text) for text in tick_texts([200_000, 200_002])] == ["200.000 us", "200.002 us"]
     assert [plain(text) for text in tick_texts([0, 500_000_000, 1_000_000_000])] == [

@@ -23,9 +23,11 @@ from mauve_rt.cli.main import main
 from mauve_rt.trace.architecture import ComponentInfo, PortInfo
 from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
-from mauve_rt.trace.report import Card, Section, write_report
+from mauve_rt.trace.report import Card, Section, Sentence, Verdict, judge, write_report
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.bags import bag_names
+from mauve_rt.trace.report.blocks import prose
+from mauve_rt.trace.report.verdict import verdict_html
 from mauve_rt.trace.synthetic import SyntheticSource
 from mauve_rt.trace.trace import Message, Trace, merge_traces
 
@@ -81,6 +83,54 @@ def test_a_page_needs_nothing_but_itself(tmp_path: Path):
         "Components",
     ):
         assert f"<h2>{heading}</h2>" in page
+
+
+def test_the_verdict_comes_first_then_the_tiles_then_the_rest(tmp_path: Path):
+    page = page_of(eventful_trace(), tmp_path, extra=[Section("The map", "<p>here</p>")])
+    body = page[page.index("<body>") + len("<body>") :].lstrip()
+    assert body.startswith('<header><div class="verdict bad">')
+    marks = (
+        *("<h1><strong>No</strong>: ", '<ul class="sentences">', "<details>", '<div class="cards">'),
+        *("</header>", "<nav>", "<main>", "<h2>The map</h2>"),
+    )
+    places = [body.index(mark) for mark in marks]
+    assert places == sorted(places)
+    assert body.count("<h1>") == 1
+
+
+def test_the_first_reasons_are_read_at_once_and_all_others_folded(tmp_path: Path):
+    trace = eventful_trace()
+    page = page_of(trace, tmp_path)
+    header = page[page.index("<header>") : page.index("</header>")]
+    at_once, folded = header.split("<details>")
+    expected = [prose(one.text) for one in judge(analyse(trace)).sentences]
+    assert len(expected) > 6
+    assert re.findall("<li[^>]*>(.*?)</li>", at_once) == expected[:5]
+    assert re.findall("<li[^>]*>(.*?)</li>", folded) == expected[5:]
+    assert f"<summary>{len(expected) - 5} more facts</summary>" in folded
+
+
+def test_a_single_further_reason_is_not_folded():
+    def page(count: int) -> str:
+        return verdict_html(
+            Verdict("good", "all is well", [Sentence("", "a fact")] * count, "Yes"), title="t"
+        )
+
+    assert [page(count).count("<details>") for count in (0, 5, 6, 7)] == [0, 0, 0, 1]
+    assert [page(count).count("<li") for count in (0, 5, 6, 7)] == [0, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("text", "html"),
+    [
+        ("silent for 1.03 s", "silent for 1.03_s"),
+        ("58.3 ms (4 \N{MICRO SIGN}s), 20 Hz", "58.3_ms (4_\N{MICRO SIGN}s), 20_Hz"),
+        ("80 % of 2 min 3 s", "80_% of 2_min 3_s"),
+        ("4 states, 3 moments & 2 hours", "4 states, 3 moments &amp; 2 hours"),
+    ],
+)
+def test_no_line_ends_between_a_number_and_its_unit(text: str, html: str):
+    assert prose(text) == html.replace("_", "\N{NARROW NO-BREAK SPACE}")
 
 
 def test_names_cannot_write_html(tmp_path: Path):

@@ -34,7 +34,7 @@ def said(verdict: Verdict) -> str:
 
 def test_a_punctual_trace_is_good():
     found = verdict_on(periodic_trace(("a", "b"), 50))
-    assert (found.level, found.headline) == ("good", "The timing held: no overrun, no fault.")
+    assert (found.level, found.sentence) == ("good", "Yes: no overrun, no fault.")
     assert "2 components" in said(found)
     assert "none was lost" in said(found)
     assert "No overrun in 100 releases" in said(found)
@@ -48,7 +48,7 @@ def test_overruns_name_the_component_and_what_took_the_time():
     run(source, "good", 1000)
     overrun(source, "late", run(source, "late", 1000))
     found = verdict_on(trace_of(source))
-    assert (found.level, found.headline) == ("attention", "The timing held, but for 1 overrun.")
+    assert (found.level, found.sentence) == ("attention", "No: 1 overrun in 2,001 releases.")
     assert "late overran once" in said(found)
     assert "skipped 1 instant; in that cycle its state act took longest, 11 ms" in said(found)
     assert "good had no overrun" in said(found)
@@ -76,8 +76,10 @@ def test_what_came_from_outside_is_not_laid_to_the_components():
     source = SyntheticSource(["hog", "a", "b", "c"])
     late_together(source, hog_ns=1000)
     found = said(verdict_on(trace_of(source)))
-    assert "At one moment several components woke late together while none of them was executing" in found
-    assert "3 of them by up to 5 ms" in found
+    assert (
+        "The machine stalled once: several components woke late together while none of them was executing, "
+        "3 of them by up to 5 ms" in found
+    )
 
 
 def test_a_component_that_kept_the_others_waiting_is_not_excused():
@@ -97,6 +99,58 @@ def test_nor_is_one_whose_state_never_ended():
     assert "woke late together" not in said(verdict_on(trace_of(source)))
 
 
+def overrun_at(source: SyntheticSource, component: str, due_ns: int, late_ns: int) -> None:
+    source.add(component, Kind.OVERRUN, due_ns + late_ns, name="wait", a=due_ns, b=due_ns + late_ns, c=1)
+
+
+def test_overruns_that_a_stall_brought_about_are_told_apart_from_those_of_a_component():
+    source = SyntheticSource(["hog", "a", "b", "c", "own"])
+    for component in source.components:
+        deploy(source, component)
+    run(source, "own", 3)
+    overrun(source, "own", EPOCH_NS + 3 * PERIOD_NS)
+    late_together(source, hog_ns=0)
+    overrun_at(source, "a", EPOCH_NS + 4 * MS, 1_000_100)  # without the 5 ms it had ended in time
+    overrun_at(source, "b", EPOCH_NS + 4 * MS, 5_000_100)  # without them it had not
+    found = verdict_on(trace_of(source))
+    assert found.sentence == "No: 3 overruns in 8 releases (1 of them while the machine stalled)."
+    told = {one.text.split()[0]: one.text for one in found.sentences if " overran " in one.text}
+    assert told["a"].endswith("; the machine stalled then.")
+    assert "stalled" not in told["b"]
+    assert "stalled" not in told["own"]
+    assert found.sentences[3].level == "attention"
+    assert found.sentences[3].text.startswith("The machine stalled once")
+
+
+def test_when_all_overruns_are_the_machines_the_first_sentence_says_so():
+    source = SyntheticSource(["hog", "a", "b", "c"])
+    late_together(source, hog_ns=0)
+    overrun_at(source, "a", EPOCH_NS + 4 * MS, 1_000_100)
+    overrun_at(source, "b", EPOCH_NS + 4 * MS, 1_000_100)
+    found = verdict_on(trace_of(source))
+    assert found.sentence == "No: 2 overruns in 4 releases (all while the machine stalled)."
+    source = SyntheticSource(["hog", "a", "b", "c"])
+    late_together(source, hog_ns=4_900_000)
+    overrun_at(source, "a", EPOCH_NS + 4 * MS, 1_000_100)
+    assert verdict_on(trace_of(source)).sentence == "No: 1 overrun in 4 releases."
+
+
+def test_the_most_serious_reason_comes_first():
+    source = SyntheticSource(["rarely", "faulty"])
+    for component in source.components:
+        deploy(source, component)
+    overrun(source, "rarely", run(source, "rarely", 300))
+    run(source, "faulty", 3)
+    source.add("faulty", Kind.FAULT, EPOCH_NS + 50 * MS, name="act")
+    found = verdict_on(trace_of(source))
+    assert found.sentence == "No: 1 fault and 1 overrun in 304 releases."
+    weights = ["bad", "attention", "good", ""]
+    levels = [one.level for one in found.sentences]
+    assert levels == sorted(levels, key=weights.index)
+    assert set(levels) == set(weights)
+    assert found.sentences[0].text.startswith("faulty was parked faulted")
+
+
 def test_overruns_as_a_habit_are_bad():
     source = SyntheticSource(["c"])
     deploy(source, "c")
@@ -104,7 +158,7 @@ def test_overruns_as_a_habit_are_bad():
     for _ in range(10):
         instant = overrun(source, "c", run(source, "c", 5, begin_ns=instant))
     found = verdict_on(trace_of(source))
-    assert (found.level, found.headline) == ("bad", "The timing did not hold: 10 overruns.")
+    assert (found.level, found.sentence) == ("bad", "No: 10 overruns in 60 releases.")
 
 
 def test_a_swap_that_cost_nothing_is_told_with_its_figures():
@@ -115,7 +169,7 @@ def test_a_swap_that_cost_nothing_is_told_with_its_figures():
     run(source, "c", 20, begin_ns=pending)
     found = verdict_on(trace_of(source))
     assert found.level == "good"
-    assert "1 reconfiguration without a missed release" in found.headline
+    assert found.sentence == "Yes: no overrun, no fault, and 1 reconfiguration without a missed release."
     assert "1 reconfiguration of c; the blackout lasted 20 \N{MICRO SIGN}s." in said(found)
     assert "on the grid of the deployment, and came at most 10 \N{MICRO SIGN}s after it" in said(found)
 
@@ -128,10 +182,8 @@ def test_missed_releases_and_a_lost_phase_are_told():
     run(source, "c", 20, begin_ns=pending + 2 * PERIOD_NS + 3)
     found = verdict_on(trace_of(source))
     assert found.level == "bad"
-    assert found.headline == (
-        "The timing did not hold: 2 releases missed in reconfigurations and a phase that was not kept."
-    )
-    assert "1 left the component off its grid, by up to 3 ns" in said(found)
+    assert found.sentence == "No: 2 releases missed in reconfigurations and a phase that was not kept."
+    assert "1 reconfiguration left the component off its grid, by up to 3 ns" in said(found)
 
 
 def test_a_fault_is_bad():
@@ -140,7 +192,7 @@ def test_a_fault_is_bad():
     run(source, "c", 3)
     source.add("c", Kind.FAULT, EPOCH_NS + 50 * MS, name="act")
     found = verdict_on(trace_of(source))
-    assert (found.level, found.headline) == ("bad", "The timing did not hold: 1 fault.")
+    assert (found.level, found.sentence) == ("bad", "No: 1 fault.")
     assert "c was parked faulted in its state act, 70 ms after the begin." in said(found)
 
 
@@ -152,7 +204,7 @@ def test_lost_records_make_every_count_a_lower_bound():
     run(source, "c", 20, begin_ns=pending + 5 * PERIOD_NS)
     found = verdict_on(trace_of(source))
     assert found.level == "attention"
-    assert found.headline == "Nothing was late in what was recorded, but records are missing."
+    assert found.sentence == "Not proved: nothing was late in what was recorded, but records are missing."
     assert "at least 7 more were lost" in said(found)
     assert "No overrun in 40 releases that were recorded" in said(found)
     assert "Records of c are missing: their counts here are lower bounds" in said(found)
@@ -165,7 +217,7 @@ def test_without_releases_nothing_is_proved():
     ):
         found = verdict_on(trace)
         assert found.level == "attention"
-        assert found.headline == "This trace proves nothing about timing: it holds no release."
+        assert found.sentence == "Not proved: the trace holds no release."
 
 
 def test_of_a_sporadic_component_no_phase_is_claimed():
@@ -174,11 +226,13 @@ def test_of_a_sporadic_component_no_phase_is_claimed():
     pending = run(source, "events", 5)
     swap(source, "events", pending)
     run(source, "events", 5, begin_ns=pending)
-    found = said(verdict_on(trace_of(source)))
+    verdict = verdict_on(trace_of(source))
+    assert verdict.sentence == "Yes: no overrun, no fault, and 1 reconfiguration."
+    found = said(verdict)
     assert "events is event-triggered: phase and missed releases do not apply" in found
     assert "grid" not in found
     assert "missed a release" not in found
-    assert "Of 1 no missed releases can be told" in found
+    assert "Of 1 reconfiguration no missed releases can be told" in found
 
 
 def test_ordinary_scheduling_is_not_hidden():

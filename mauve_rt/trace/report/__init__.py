@@ -2,13 +2,15 @@
 
     write_report(Path("report.html"), mauve_rt.trace.open("bag"))
 
-`analysis` computes everything once; `verdict`, `key_figures`, `timeline`, `comparison`, `distributions`,
-`architecture_graph` and `tables` are the page's parts; `blocks`, `svg`, `histograms` what they are made of.
+`analysis` computes everything once; `verdict` with its `sentences`, `key_figures`, `timeline`, `comparison`,
+`distributions`, `architecture_graph` and `tables` are the page's parts; `blocks`, `svg`, `histograms` what
+they are made of.
 The timeline is drawn by the scripts in `static`, from `columns` that hold what `detail` keeps.
 """
 
 from mauve_rt.trace.report.blocks import Card, Section
 from mauve_rt.trace.report.report import write_report
-from mauve_rt.trace.report.verdict import Sentence, Verdict, judge
+from mauve_rt.trace.report.sentences import Sentence
+from mauve_rt.trace.report.verdict import Verdict, judge
 
 __all__ = ["Card", "Section", "Sentence", "Verdict", "judge", "write_report"]

@@ -1,6 +1,7 @@
 """What pages are made of: sections, cards, tables, lists. Texts are escaped here, and only `html` is not."""
 
 import base64
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,6 +11,9 @@ from typing import NamedTuple
 from mauve_rt.trace.report.units import digits
 
 _KEPT_TOGETHER = ("wake-up", "wake\N{NON-BREAKING HYPHEN}up")
+_BEFORE_A_UNIT = re.compile(
+    r"(?<=\d) (?=(?:[num\N{MICRO SIGN}]?s|min|h|k?Hz|[kMG]?B|%|\N{MULTIPLICATION SIGN})(?!\w))"
+)
 _WORDY = 26  # characters from which a column of words may break
 
 
@@ -30,7 +34,7 @@ class Section:
         """Return its HTML."""
         identity = f' id="{attribute(self.anchor)}"' if self.anchor else ""
         css = ' class="wide"' if self.wide else ""
-        remark = f'<p class="note">{escape(self.note)}</p>' if self.note else ""
+        remark = f'<p class="note">{prose(self.note)}</p>' if self.note else ""
         return f"<section{identity}{css}><h2>{escape(self.heading)}</h2>{remark}{self.html}</section>"
 
 
@@ -59,10 +63,20 @@ def attribute(text: str) -> str:
     return escape(text, quote=True)
 
 
+def prose(text: str) -> str:
+    """Return a text as HTML in which no line ends between a number and its unit."""
+    return escape(_BEFORE_A_UNIT.sub("\N{NARROW NO-BREAK SPACE}", text))
+
+
+def _label(text: str) -> str:
+    """Return a text for where there is little room as HTML."""
+    return prose(text.replace(*_KEPT_TOGETHER))
+
+
 def cards(figures: Iterable[Card]) -> str:
     """Return key figures side by side."""
     inside = "".join(
-        f'<div class="card {one.level}"><b>{escape(one.value)}</b><span>{escape(one.meaning)}</span></div>'
+        f'<div class="card {one.level}"><b>{prose(one.value)}</b><span>{_label(one.meaning)}</span></div>'
         for one in figures
     )
     return f'<div class="cards">{inside}</div>'
@@ -70,13 +84,13 @@ def cards(figures: Iterable[Card]) -> str:
 
 def bullets(lines: Iterable[str], *, css: str = "") -> str:
     """Return a list of texts."""
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    items = "".join(f"<li>{prose(line)}</li>" for line in lines)
     return f'<ul class="{css}">{items}</ul>'
 
 
 def paragraph(text: str, *, css: str = "") -> str:
     """Return a paragraph of text."""
-    return f'<p class="{css}">{escape(text)}</p>' if css else f"<p>{escape(text)}</p>"
+    return f'<p class="{css}">{prose(text)}</p>' if css else f"<p>{prose(text)}</p>"
 
 
 def picture(path: Path, described: str) -> str:
@@ -94,10 +108,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, css: str 
     """Return a table. Columns with numbers are set to the right; None is a dash."""
     body = [list(row) for row in rows]
     kinds = [_column_css([row[index] for row in body]) for index in range(len(columns))]
-    head = "".join(
-        f"<th{kinds[index]}>{escape(text.replace(*_KEPT_TOGETHER))}</th>"
-        for index, text in enumerate(columns)
-    )
+    head = "".join(f"<th{kinds[index]}>{_label(text)}</th>" for index, text in enumerate(columns))
     lines = "".join(
         "<tr>" + "".join(_cell(value, kinds[index]) for index, value in enumerate(row)) + "</tr>"
         for row in body
@@ -114,7 +125,7 @@ def _column_css(values: list[object]) -> str:
 
 def _cell(value: object, css: str) -> str:
     if not isinstance(value, Cell):
-        return f"<td{css}>{escape(_text(value))}</td>"
+        return f"<td{css}>{prose(_text(value))}</td>"
     tip = f' data-tip="{attribute(value.tip)}"' if value.tip else ""
     level = f' data-level="{attribute(value.level)}"' if value.level else ""
     return f"<td{css}{level}{tip}>{value.html or escape(value.text)}</td>"

@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from mauve_rt.trace.report.analysis import Analysis, Swap
-from mauve_rt.trace.report.blocks import Cell, Section, table
+from mauve_rt.trace.report.blocks import Cell, Section, prose, table
 from mauve_rt.trace.report.cycles import UNKNOWN
 from mauve_rt.trace.report.histograms import Values, histogram
 from mauve_rt.trace.report.neighbours import neighbours_in_words
@@ -65,7 +65,7 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
     wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout}{phase}</div>'
     return (
         f'<div class="swap" data-chosen="swap" data-value="{index}"{" hidden" if index else ""}>'
-        f"<p>{escape(_in_words(analysis, swap))}</p>{wide}{neighbours_in_words(analysis, one)}"
+        f"<p>{prose(_in_words(analysis, swap))}</p>{wide}{neighbours_in_words(analysis, one)}"
         f"{_before_and_after(analysis, swap)}</div>"
     )
 

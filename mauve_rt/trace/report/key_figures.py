@@ -12,9 +12,9 @@ def key_figures(analysis: Analysis) -> list[Card]:
     overruns = sum(one.overruns for one in found)
     figures = [
         Card(time_text(analysis.duration_ns), "recorded"),
-        Card(f"{len(found):,}", "component" if len(found) == 1 else "components"),
-        Card(f"{releases:,}", "releases"),
-        Card(f"{overruns:,}", "overruns", "attention" if overruns else "good" if releases else ""),
+        _counted(len(found), "component"),
+        _counted(releases, "release"),
+        _counted(overruns, "overrun", "attention" if overruns else "good" if releases else ""),
     ]
     released = [one for one in found if one.wakeup.count]
     if released:
@@ -25,13 +25,17 @@ def key_figures(analysis: Analysis) -> list[Card]:
     if analysis.swaps:
         measured = [swap.measured for swap in analysis.swaps]
         missed = [one.missed_releases for one in measured if one.missed_releases is not None]
-        figures.append(Card(f"{len(measured):,}", "reconfigurations"))
+        figures.append(_counted(len(measured), "reconfiguration"))
         figures.append(Card(time_text(max(one.blackout_ns for one in measured)), "longest blackout"))
         if missed:
             level = "attention" if sum(missed) else "good"
             figures.append(Card(f"{sum(missed):,}", "releases missed by them", level))
     if analysis.faults:
-        figures.append(Card(f"{len(analysis.faults):,}", "faults", "bad"))
+        figures.append(_counted(len(analysis.faults), "fault", "bad"))
     lost = analysis.trace.lost
     figures.append(Card(f"{lost:,}", "records lost", "attention" if lost else ""))
     return figures
+
+
+def _counted(count: int, what: str, level: str = "") -> Card:
+    return Card(f"{count:,}", what if count == 1 else what + "s", level)

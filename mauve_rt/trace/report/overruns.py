@@ -4,8 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.records import Kind, Records
 from mauve_rt.trace.report.analysis import Analysis
+
+
+class LateCycles(NamedTuple):
+    """The cycles that overran, row by row: the records that they began and ended with."""
+
+    released: Records
+    overran: Records
 
 
 class Culprit(NamedTuple):
@@ -21,17 +28,13 @@ class Culprit(NamedTuple):
 
 def culprits(analysis: Analysis, component: str) -> list[Culprit]:
     """What took longest, by in how many overruns of the component; empty when the trace does not tell."""
-    records = analysis.trace.of(component)
-    (late,) = np.nonzero(records["kind"] == Kind.OVERRUN)
-    (released,) = np.nonzero(records["kind"] == Kind.RELEASE)
-    states = analysis.slices[component]
-    before = np.searchsorted(released, late) - 1
-    late, before = late[before >= 0], before[before >= 0]
-    if not len(late):
+    released, overran = late_cycles(analysis, component)
+    if not len(overran):
         return []
-    begin_ns, end_ns = records["time_ns"][released[before]], records["time_ns"][late]
-    took = np.zeros((len(states) + 1, len(late)), np.int64)
-    took[-1] = records["b"][released[before]] - records["a"][released[before]]
+    states = analysis.slices[component]
+    begin_ns, end_ns = released["time_ns"], overran["time_ns"]
+    took = np.zeros((len(states) + 1, len(overran)), np.int64)
+    took[-1] = released["b"] - released["a"]
     for index, slices in enumerate(states.values()):
         total = np.concatenate([[0], np.cumsum(slices["busy_ns"])])
         first, last = (np.searchsorted(slices["begin_ns"], time_ns) for time_ns in (begin_ns, end_ns))
@@ -43,3 +46,13 @@ def culprits(analysis: Analysis, component: str) -> list[Culprit]:
         if (mine := longest == index).any()
     ]
     return sorted(found, key=lambda one: -one.overruns)
+
+
+def late_cycles(analysis: Analysis, component: str) -> LateCycles:
+    """Return the cycles that overran, but for one whose release is not in the trace."""
+    records = analysis.trace.of(component)
+    (late,) = np.nonzero(records["kind"] == Kind.OVERRUN)
+    (released,) = np.nonzero(records["kind"] == Kind.RELEASE)
+    before = np.searchsorted(released, late) - 1
+    late, before = late[before >= 0], before[before >= 0]
+    return LateCycles(records[released[before]], records[late])

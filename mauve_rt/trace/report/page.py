@@ -17,11 +17,14 @@ _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inl
 """The browser itself sees to it that nothing is loaded from elsewhere."""
 
 
-def page(title: str, parts: Iterable[str], *, sections: Sequence[Section] = (), data: str = "") -> str:
+def page(
+    title: str, outcome: str, parts: Iterable[str], *, sections: Sequence[Section] = (), data: str = ""
+) -> str:
     """Return the document.
 
     Args:
         title: of the window.
+        outcome: HTML that stands before everything else, the navigation included.
         parts: HTML.
         sections: those that the navigation names.
         data: script elements with data.
@@ -37,6 +40,7 @@ def page(title: str, parts: Iterable[str], *, sections: Sequence[Section] = (), 
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{escape(title)}</title>\n<style>\n{style}\n</style></head>\n<body>\n"
+        f"<header>{outcome}</header>\n"
         f'<nav><div>{links}<button type="button" id="theme" title="light or dark">'
         '<span aria-hidden="true"></span>Theme</button></div></nav>\n'
         f'<main>\n{chr(10).join(parts)}\n</main>\n<div id="tip" role="status" hidden></div>\n'

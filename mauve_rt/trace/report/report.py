@@ -78,13 +78,10 @@ def write_report(
         if made is not None:
             sections.append(made)
     told_by_trace = judge(analysis)
-    parts = [
-        verdict_html(verdict(told_by_trace) if verdict else told_by_trace, title=title),
-        cards([*figures, *key_figures(analysis)]),
-        *(section.render() for section in sections),
-        words_section(),
-    ]
+    outcome = verdict_html(verdict(told_by_trace) if verdict else told_by_trace, title=title)
+    outcome += cards([*figures, *key_figures(analysis)])
+    parts = [*(section.render() for section in sections), words_section()]
     elements = data_element("timeline-described", "application/json", json_for_script(described))
     elements += data_element("timeline-columns", "text/plain", data)
-    write_page(path, page(title, parts, sections=sections, data=elements))
+    write_page(path, page(title, outcome, parts, sections=sections, data=elements))
     progress(1.0, "done")

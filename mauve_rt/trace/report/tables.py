@@ -30,6 +30,8 @@ WORDS = {
     "Missed releases": "(first nominal instant after the commit minus the instant pending at the park) / g.",
     "Adopt, take": "the new core adopts the state of the old one, which may fail; then it takes its bulk.",
     "Sporadic": "triggered by events, not by time: it has no period, no phase and no missed releases.",
+    "Stall": "a moment at which three components or more woke late by a millisecond or more, while none of "
+    "them executed: the machine, its host or another program held the processors.",
     "Lost": "records that a full ring dropped, or that are missing by their sequence numbers.",
 }
 

@@ -20,8 +20,8 @@ def time_text(time_ns: float | None) -> str:
         minutes, seconds = divmod(round(size_ns / 1e9), 60)
         if minutes >= _LONGEST_IN_MINUTES:
             hours, minutes = divmod(minutes, 60)
-            return f"{sign}{hours}{_NARROW_SPACE}h {minutes}{_NARROW_SPACE}min"
-        return f"{sign}{minutes}{_NARROW_SPACE}min {seconds}{_NARROW_SPACE}s"
+            return f"{sign}{hours}{_NARROW_SPACE}h{_NARROW_SPACE}{minutes}{_NARROW_SPACE}min"
+        return f"{sign}{minutes}{_NARROW_SPACE}min{_NARROW_SPACE}{seconds}{_NARROW_SPACE}s"
     factor, unit = next(pair for pair in reversed(_UNITS) if size_ns >= pair[0] or pair[0] == 1)
     return f"{sign}{digits(size_ns / factor)}{_NARROW_SPACE}{unit}"
 

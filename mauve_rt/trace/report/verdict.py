@@ -1,29 +1,19 @@
-"""Did it hold its timing? In sentences, none of which claims more than the trace proves."""
+"""Did it hold its timing? Yes, no, or not proved: in one sentence, with the reasons by their weight."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import NamedTuple
 
 from mauve_rt.trace.report.analysis import Analysis
-from mauve_rt.trace.report.overruns import culprits
-from mauve_rt.trace.report.stalls import stalls
-from mauve_rt.trace.report.units import counted, listed, share_text, time_text, times
-from mauve_rt.trace.statistics import ComponentStatistics
+from mauve_rt.trace.report.blocks import details, prose
+from mauve_rt.trace.report.machine import Machine, machine_of
+from mauve_rt.trace.report.sentences import ATTENTION, BAD, GOOD, Sentence, sentences_on
+from mauve_rt.trace.report.units import counted, listed
 
-GOOD, ATTENTION, BAD = "good", "attention", "bad"
-_ORDER = (GOOD, ATTENTION, BAD)
-_MANY = 0.01
-"""Share of releases from which overruns are more than an exception."""
-_NAMED = 6
-"""Components with overruns that get a sentence each."""
-
-
-class Sentence(NamedTuple):
-    """A sentence and how serious it is: good, attention, bad, or empty for a mere fact."""
-
-    level: str
-    text: str
+QUESTION = "Did the timing hold?"
+YES, NO, NOT_PROVED = "Yes", "No", "Not proved"
+_ORDER = ("", GOOD, ATTENTION, BAD)
+_READ_AT_ONCE = 5
+"""Sentences that are not folded."""
 
 
 @dataclass(frozen=True)
@@ -31,236 +21,89 @@ class Verdict:
     """What stands at the top of a report."""
 
     level: str
+    """good, attention, bad"""
     headline: str
-    sentences: list[Sentence]
-    word: str = ""
-    """The level in a word; good, attention or bad when empty."""
+    """One sentence, without the answer."""
+    sentences: Sequence[Sentence]
+    """The reasons, the most important first."""
+    answer: str = ""
+    """Yes, No or Not proved; empty when the headline answers no question."""
+    lead: str = QUESTION
+    """Above the headline: the question that is answered, or the outcome in a word."""
+
+    also: Sentence | None = None
+    """A second outcome, below the headline."""
+
+    @property
+    def sentence(self) -> str:
+        """Answer and headline."""
+        return f"{self.answer}: {self.headline}" if self.answer else self.headline
 
 
 def judge(analysis: Analysis) -> Verdict:
     """Return the verdict on a trace."""
-    sentences = [
-        *_scope(analysis),
-        *_overruns(analysis),
-        *_latencies(analysis),
-        *_stalls(analysis),
-        *_swaps(analysis),
-        *_faults(analysis),
-        *_doubts(analysis),
-    ]
-    level = max((one.level or GOOD for one in sentences), key=_ORDER.index)
-    return Verdict(level, _headline(analysis, level), sentences)
+    machine = machine_of(analysis)
+    sentences = sentences_on(analysis, machine)
+    level = max((GOOD, *(one.level for one in sentences)), key=_ORDER.index)
+    answer, headline = _answer(analysis, machine)
+    return Verdict(level, headline, sentences, answer)
 
 
 def verdict_html(verdict: Verdict, *, title: str) -> str:
     """Return the top of the page."""
-    items = "".join(f'<li class="{one.level}">{escape(one.text)}</li>' for one in verdict.sentences)
-    word = verdict.word or verdict.level
+    also = verdict.also
+    second = f'<p class="also {also.level}">{prose(also.text)}</p>' if also else ""
+    answer = f"<strong>{prose(verdict.answer)}</strong>: " if verdict.answer else ""
+    at_once, rest = verdict.sentences[:_READ_AT_ONCE], verdict.sentences[_READ_AT_ONCE:]
+    folded = details(f"{len(rest)} more facts", _list(rest)) if len(rest) > 1 else ""
     return (
-        f'<header class="verdict {verdict.level}"><p class="title">{escape(title)}</p>'
-        f'<p class="level"><i aria-hidden="true"></i>{escape(word.capitalize())}</p>'
-        f'<h1>{escape(verdict.headline)}</h1><ul class="sentences">{items}</ul></header>'
+        f'<div class="verdict {verdict.level}"><p class="title">{prose(title)}</p>'
+        f'<p class="lead"><i aria-hidden="true"></i>{prose(verdict.lead)}</p>'
+        f"<h1>{answer}{prose(verdict.headline)}</h1>{second}"
+        f"{_list(at_once if folded else verdict.sentences)}{folded}</div>"
     )
 
 
-def _headline(analysis: Analysis, level: str) -> str:
+def _list(sentences: Sequence[Sentence]) -> str:
+    items = "".join(f'<li class="{one.level}">{prose(one.text)}</li>' for one in sentences)
+    return f'<ul class="sentences">{items}</ul>'
+
+
+def _answer(analysis: Analysis, machine: Machine) -> tuple[str, str]:
+    if not any(one.releases for one in analysis.statistics.values()):
+        return NOT_PROVED, "the trace holds no release."
+    wrong = list(_wrong(analysis, machine))
+    if wrong:
+        return NO, f"{listed(wrong)}."
+    if analysis.trace.lost:
+        return NOT_PROVED, "nothing was late in what was recorded, but records are missing."
+    if not analysis.swaps:
+        return YES, "no overrun, no fault."
+    swaps = counted(len(analysis.swaps), "reconfiguration")
+    known = all(swap.measured.missed_releases is not None for swap in analysis.swaps)
+    return YES, f"no overrun, no fault, and {swaps}{' without a missed release' if known else ''}."
+
+
+def _wrong(analysis: Analysis, machine: Machine) -> Iterator[str]:
+    """Whatever makes the answer No."""
     found = analysis.statistics.values()
-    if not any(one.releases for one in found):
-        return "This trace proves nothing about timing: it holds no release."
     overruns = sum(one.overruns for one in found)
     missed = sum(swap.measured.missed_releases or 0 for swap in analysis.swaps)
-    wrong = []
     if analysis.faults:
-        wrong.append(counted(len(analysis.faults), "fault"))
+        yield counted(len(analysis.faults), "fault")
     if overruns:
-        wrong.append(counted(overruns, "overrun"))
+        releases = counted(sum(one.releases for one in found), "release")
+        least = "at least " if analysis.trace.lost else ""
+        yield f"{least}{counted(overruns, 'overrun')} in {releases}{_excuse(machine, overruns)}"
     if missed:
-        wrong.append(counted(missed, "release") + " missed in reconfigurations")
+        yield counted(missed, "release") + " missed in reconfigurations"
     if any(swap.measured.phase_nominal_ns for swap in analysis.swaps):
-        wrong.append("a phase that was not kept")
-    if level == BAD:
-        return f"The timing did not hold: {listed(wrong)}."
-    if wrong:
-        return f"The timing held, but for {listed(wrong)}."
-    if analysis.trace.lost:
-        return "Nothing was late in what was recorded, but records are missing."
-    if analysis.swaps:
-        swaps = counted(len(analysis.swaps), "reconfiguration")
-        return f"The timing held: no overrun, no fault, and {swaps} without a missed release."
-    return "The timing held: no overrun, no fault."
+        yield "a phase that was not kept"
 
 
-def _scope(analysis: Analysis) -> Iterator[Sentence]:
-    lost = analysis.trace.lost
-    components = counted(len(analysis.trace.components), "component")
-    yield Sentence(
-        ATTENTION if lost else "",
-        f"{components}, {time_text(analysis.duration_ns)}, {counted(analysis.records, 'record')}; "
-        + (f"at least {lost:,} more were lost." if lost else "none was lost."),
-    )
-
-
-def _overruns(analysis: Analysis) -> Iterator[Sentence]:
-    found = analysis.statistics
-    releases = sum(one.releases for one in found.values())
-    late = sorted((one for one in found.values() if one.overruns), key=lambda one: -one.overruns)
-    if not releases:
-        yield Sentence(ATTENTION, "No component was released while this was recorded.")
-        return
-    if not late:
-        told = " that were recorded" if analysis.trace.lost else ""
-        yield Sentence(GOOD, f"No overrun in {counted(releases, 'release')}{told}: each cycle ended in time.")
-        return
-    for one in late[:_NAMED]:
-        share = one.overruns / max(one.releases, 1)
-        least = "at least " if one.lost_records else ""
-        text = (
-            f"{one.component} overran {least}{times(one.overruns)} "
-            f"({share_text(share)} of {counted(one.releases, 'release')}) "
-            f"and skipped {counted(one.skipped, 'instant')}"
-        )
-        blamed = culprits(analysis, one.component)
-        if blamed:
-            worst = blamed[0]
-            which = "all" if worst.overruns == one.overruns else f"{worst.overruns:,}"
-            which = "in that cycle" if one.overruns == 1 else f"in {which} of these cycles"
-            what = f"its state {worst.state}" if worst.state else "the wake-up itself"
-            limit = "" if one.overruns == 1 else "up to "
-            text += f"; {which} {what} took longest, {limit}{time_text(worst.longest_ns)}"
-        yield Sentence(BAD if share > _MANY else ATTENTION, text + ".")
-    if len(late) > _NAMED:
-        rest = sum(one.overruns for one in late[_NAMED:])
-        yield Sentence(ATTENTION, f"{len(late) - _NAMED} more components overran {rest:,} times.")
-    punctual = [one.component for one in found.values() if one.releases and not one.overruns]
-    if punctual:
-        yield Sentence(GOOD, f"{listed(punctual)} had no overrun.")
-
-
-def _latencies(analysis: Analysis) -> Iterator[Sentence]:
-    released = [one for one in analysis.statistics.values() if one.wakeup.count]
-    if not released:
-        return
-    worst = max(released, key=lambda one: one.wakeup.max_ns)
-    if worst.wakeup.max_ns == 0 and all(one.wakeup.min_ns == 0 for one in released):
-        yield Sentence(
-            "", "Every wake-up came exactly on time, as in simulated time: no machine is measured."
-        )
-        return
-    text = (
-        f"The latest wake-up came {time_text(worst.wakeup.max_ns)} after its instant ({worst.component}); "
-        f"the 99th percentile of its latencies is {time_text(worst.wakeup.p99_ns)}"
-    )
-    periodic = [one for one in released if one.phase_error.count]
-    # beyond half a period the nearest instant of the grid is another one: nothing would be said by it
-    if periodic and all(2 * one.wakeup.max_ns < one.period_ns for one in periodic):
-        most = max(periodic, key=lambda one: _off_ns(one) / one.period_ns)
-        text += (
-            ". Against the grids of the deployment, no release was further off than "
-            f"{share_text(_off_ns(most) / most.period_ns)} of its period "
-            f"({most.component}, {time_text(_off_ns(most))})"
-        )
-    yield Sentence("", text + ".")
-
-
-def _stalls(analysis: Analysis) -> Iterator[Sentence]:
-    found = [] if analysis.trace.lost else stalls(analysis)  # who knows what the lost records told
-    if not found:
-        return
-    worst = max(found, key=lambda one: one.latency_ns)
-    moments = "At one moment" if len(found) == 1 else f"At {len(found):,} moments"
-    at_worst = "" if len(found) == 1 else "at worst "
-    yield Sentence(
-        "",
-        f"{moments} several components woke late together while none of them was executing, {at_worst}"
-        f"{worst.components} of them by up to {time_text(worst.latency_ns)} "
-        f"({time_text(worst.end_ns - analysis.zero_ns)} after the begin): something outside of them held "
-        "the processors.",
-    )
-
-
-def _off_ns(one: ComponentStatistics) -> int:
-    return max(abs(one.phase_error.max_ns), abs(one.phase_error.min_ns))
-
-
-def _swaps(analysis: Analysis) -> Iterator[Sentence]:
-    measured = [swap.measured for swap in analysis.swaps]
-    if not measured:
-        yield Sentence("", "Nothing was reconfigured.")
-        return
-    longest = max(measured, key=lambda one: one.blackout_ns)
-    touched = sorted({one.component for one in measured})
-    whose = f" ({longest.component})" if len(touched) > 1 else ""
-    lasted = "blackout" if len(measured) == 1 else "longest blackout"
-    yield Sentence(
-        "",
-        f"{counted(len(measured), 'reconfiguration').capitalize()} of {listed(touched)}; "
-        f"the {lasted} lasted {time_text(longest.blackout_ns)}{whose}.",
-    )
-    known = [one for one in measured if one.missed_releases is not None]
-    missed = sum(one.missed_releases or 0 for one in known)
-    if missed:
-        names = listed(sorted({one.component for one in known if one.missed_releases}))
-        yield Sentence(ATTENTION, f"{counted(missed, 'release').capitalize()} missed by {names}.")
-    elif known:
-        which = "None of them" if len(known) == len(measured) else f"Of {len(known):,} with a period none"
-        yield Sentence(GOOD, f"{which} missed a release.")
-    off = [one for one in known if one.phase_nominal_ns]
-    if off:
-        worst_ns = max(abs(one.phase_nominal_ns or 0) for one in off)
-        yield Sentence(BAD, f"{len(off):,} left the component off its grid, by up to {time_text(worst_ns)}.")
-    elif known:
-        latest_ns = max(one.phase_actual_ns or 0 for one in known)
-        yield Sentence(
-            GOOD,
-            "The next release of each was due on the grid of the deployment, "
-            f"and came at most {time_text(latest_ns)} after it.",
-        )
-    refused = [one for one in measured if not one.committed]
-    if refused:
-        yield Sentence(
-            ATTENTION, f"{len(refused):,} of them refused by the new core's adopt: all went on as before."
-        )
-    unknown = len(measured) - len(known)
-    if unknown:
-        yield Sentence(
-            "", f"Of {unknown:,} no missed releases can be told: no period, or no release came after."
-        )
-
-
-def _faults(analysis: Analysis) -> Iterator[Sentence]:
-    for fault in analysis.faults[:_NAMED]:
-        at = time_text(fault.time_ns - analysis.zero_ns)
-        where = f" in its state {fault.state}" if fault.state else ""
-        yield Sentence(BAD, f"{fault.component} was parked faulted{where}, {at} after the begin.")
-    if len(analysis.faults) > _NAMED:
-        yield Sentence(BAD, f"{len(analysis.faults) - _NAMED} more faults followed.")
-
-
-def _doubts(analysis: Analysis) -> Iterator[Sentence]:
-    damaged = [file for file in analysis.trace.files if file.damage]
-    if damaged:
-        files = counted(len(damaged), "file")
-        yield Sentence(ATTENTION, f"Of {files} not all could be read: {damaged[0].damage}.")
-    lossy = [name for name, found in analysis.statistics.items() if found.lost_records]
-    if lossy:
-        yield Sentence(
-            ATTENTION, f"Records of {listed(lossy)} are missing: their counts here are lower bounds."
-        )
-    torn = [swap for swap in analysis.swaps if not swap.measured.complete]
-    if torn:
-        yield Sentence(
-            ATTENTION,
-            f"Of {counted(len(torn), 'reconfiguration')} records are missing: the figures are doubtful.",
-        )
-    silent = [name for name, found in analysis.statistics.items() if not found.releases]
-    if silent and len(silent) < len(analysis.statistics):
-        yield Sentence(ATTENTION, f"No release of {listed(silent)} is in the trace.")
-    sporadic = [name for name in analysis.trace.components if analysis.sporadic(name)]
-    if sporadic:
-        verb = "is" if len(sporadic) == 1 else "are"
-        yield Sentence(
-            "", f"{listed(sporadic)} {verb} event-triggered: phase and missed releases do not apply."
-        )
-    ordinary = [one.name for one in analysis.trace.architecture if one.policy == "SCHED_OTHER"]
-    if ordinary:
-        yield Sentence(ATTENTION, f"Without real-time scheduling (SCHED_OTHER): {listed(ordinary)}.")
+def _excuse(machine: Machine, overruns: int) -> str:
+    stalled = sum(machine.overruns.values())
+    if not stalled:
+        return ""
+    which = "" if overruns == 1 else "all " if stalled == overruns else f"{stalled:,} of them "
+    return f" ({which}while the machine stalled)"

@@ -22,8 +22,8 @@
       const minutes = Math.floor(seconds / 60);
       const text =
         minutes < 120
-          ? minutes + NARROW + "min " + (seconds % 60) + NARROW + "s"
-          : Math.floor(minutes / 60) + NARROW + "h " + (minutes % 60) + NARROW + "min";
+          ? minutes + NARROW + "min" + NARROW + (seconds % 60) + NARROW + "s"
+          : Math.floor(minutes / 60) + NARROW + "h" + NARROW + (minutes % 60) + NARROW + "min";
       return ns < 0 ? "\u2212" + text : text;
     }
     const [unit, factor] = UNITS.find((pair) => size >= pair[1]) || UNITS[3];
