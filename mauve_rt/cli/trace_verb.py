@@ -92,6 +92,7 @@ def _add_bag_and_json(parser: argparse.ArgumentParser) -> None:
 
 def _info(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.cli.tables import print_tables  # noqa: PLC0415
     from mauve_rt.cli.trace_views import info_values, info_view  # noqa: PLC0415
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
 
@@ -101,7 +102,7 @@ def _info(args: argparse.Namespace) -> int:
     if args.json:
         print_json(values)
     else:
-        console().print(info_view(values))
+        print_tables(info_view(values), console())
     return OK
 
 
@@ -137,6 +138,7 @@ def _repair(args: argparse.Namespace) -> int:
 
 def _stats(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.cli.tables import print_tables  # noqa: PLC0415
     from mauve_rt.cli.trace_views import statistics_values, statistics_view  # noqa: PLC0415
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
     from mauve_rt.trace.reconfigurations import reconfigurations  # noqa: PLC0415
@@ -148,7 +150,7 @@ def _stats(args: argparse.Namespace) -> int:
     if args.json:
         print_json({name: statistics_values(one) for name, one in statistics.items()})
     else:
-        console().print(statistics_view(statistics, reconfigurations(trace)))
+        print_tables(statistics_view(statistics, reconfigurations(trace)), console())
     return OK
 
 

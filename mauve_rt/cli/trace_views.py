@@ -4,15 +4,17 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from rich import box
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
+from mauve_rt.cli.tables import number_table
 from mauve_rt.trace.reconfigurations import Reconfiguration
 from mauve_rt.trace.statistics import ComponentStatistics, Distribution
 from mauve_rt.trace.trace import Trace
 
+_ROUNDED_UP = 0.9995
+"""From this share of the next unit on, three digits are no longer enough: 1e+03 us."""
 _FIGURES = ("count", "min", "p50", "p99", "p99.9", "max")
 
 
@@ -41,7 +43,7 @@ def info_values(trace: Trace) -> dict[str, Any]:
     }
 
 
-def info_view(values: Mapping[str, Any]) -> RenderableType:
+def info_view(values: Mapping[str, Any]) -> Group:
     """The same for people."""
     size = sum(file["bytes"] for file in values["files"])
     head = (
@@ -50,10 +52,10 @@ def info_view(values: Mapping[str, Any]) -> RenderableType:
         f"{len(values['files'])} files, {size / 1e6:.1f} MB"
     )
     damages = [f"{file['path']}: {file['damage']}" for file in values["files"] if file["damage"]]
-    components = Table("component", "records", "lost", box=box.SIMPLE_HEAD, pad_edge=False)
+    components = number_table(["component"], [], ["records", "lost"])
     for name, counts in values["components"].items():
         components.add_row(escape(name), f"{counts['records']:,}", f"{counts['lost']:,}")
-    topics = Table("topic", "type", "messages", box=box.SIMPLE_HEAD, pad_edge=False)
+    topics = number_table(["topic"], ["type"], ["messages"])
     for name, topic in values["topics"].items():
         topics.add_row(escape(name), escape(topic["type"]), f"{topic['messages']:,}")
     return Group(escape(head), *(f"[red]{escape(line)}" for line in damages), components, topics)
@@ -64,20 +66,14 @@ def statistics_values(found: ComponentStatistics) -> dict[str, Any]:
     return {name: _plain(value) for name, value in vars(found).items()}
 
 
-def statistics_view(
-    statistics: Mapping[str, ComponentStatistics], swaps: list[Reconfiguration]
-) -> RenderableType:
+def statistics_view(statistics: Mapping[str, ComponentStatistics], swaps: list[Reconfiguration]) -> Group:
     """A table of times, one of counts, one of reconfigurations."""
-    counts = Table(
-        *("component", "period", "load", "releases", "overruns", "skipped", "faults", "lost records"),
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
+    counts = number_table(
+        ["component"], [], ["period", "load", "releases", "overruns", "skipped", "faults", "lost records"]
     )
-    times = Table("component", "what", *_FIGURES, box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in (*counts.columns[1:], *times.columns[2:]):
-        column.justify = "right"
+    times = number_table(["component"], ["what"], _FIGURES)
     for name, one in statistics.items():
-        period = _time(one.period_ns) if one.period_ns else "sporadic"
+        period = time_text(one.period_ns) if one.period_ns else "sporadic"
         figures = (one.releases, one.overruns, one.skipped, one.faults, one.lost_records)
         counts.add_row(escape(name), period, f"{one.load:.1%}", *(f"{figure:,}" for figure in figures))
         for number, (what, distribution) in enumerate(_distributions(one)):
@@ -100,26 +96,21 @@ def _cells(distribution: Distribution) -> list[str]:
     if not distribution.count:
         return ["0", *("-" for _ in _FIGURES[1:])]
     count, *times = vars(distribution).values()
-    return [f"{count:,}", *(_time(time) for time in times)]
+    return [f"{count:,}", *(time_text(time) for time in times)]
 
 
 def _swap_table(swaps: list[Reconfiguration]) -> Table:
-    table = Table(
-        *("component", "what", "committed", "blackout", "missed", "phase", "woken"),
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        title="reconfigurations",
-        title_justify="left",
-    )
+    table = number_table(["component"], ["what"], ["committed", "blackout", "missed", "phase", "woken"])
+    table.title, table.title_justify = "reconfigurations", "left"
     for swap in swaps:
         known = (swap.phase_nominal_ns, swap.phase_actual_ns)
         table.add_row(
             escape(swap.component),
             escape(swap.what),
             "yes" if swap.committed else "refused",
-            _time(swap.blackout_ns),
+            time_text(swap.blackout_ns),
             "-" if swap.missed_releases is None else str(swap.missed_releases),
-            *("-" if time is None else _time(time) for time in known),
+            *("-" if time is None else time_text(time) for time in known),
         )
     return table
 
@@ -132,9 +123,9 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _time(time_ns: int) -> str:
+def time_text(time_ns: int) -> str:
     """A time with three digits and its unit."""
     for limit, unit in ((1e3, "ns"), (1e6, "us"), (1e9, "ms")):
-        if abs(time_ns) < limit:
+        if abs(time_ns) < limit * _ROUNDED_UP:
             return f"{time_ns / (limit / 1e3):.3g} {unit}"
     return f"{time_ns / 1e9:,.3f} s"

@@ -2,14 +2,21 @@
 
 import json
 import os
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import mauve_rt.trace
 from mauve_rt.cli.main import main
+from mauve_rt.cli.tables import print_tables
+from mauve_rt.cli.trace_views import statistics_view, time_text
+from mauve_rt.trace.reconfigurations import reconfigurations
 from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
+from mauve_rt.trace.statistics import all_statistics
 from mauve_rt.trace.synthetic import SyntheticSource
 
 
@@ -62,6 +69,34 @@ def test_stats(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["trace", "stats", bag, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["control"]
     assert (told["releases"], told["wakeup"]["max_ns"], told["execution"]["work"]["p50_ns"]) == (11, 30, 250)
+
+
+@pytest.mark.parametrize("width", [40, 80, 100])
+def test_stats_break_no_number_in_a_narrow_terminal(source: SyntheticSource, tmp_path: Path, width: int):
+    bag = record(source, tmp_path / "bag")
+    trace = mauve_rt.trace.open(Path(bag))
+    long = {
+        f"{name}_of_a_robot": replace(one, releases=12_345_678_901, period_ns=123_456_789)
+        for name, one in all_statistics(trace).items()
+    }
+    out = Console(file=StringIO(), width=width)
+    print_tables(statistics_view(long, reconfigurations(trace)), out)
+    shown = out.file.getvalue()
+    for whole in ("control_of_a_robot", "12,345,678,901", "123 ms", "20 ns", "250 ns", "lost records"):
+        assert whole in shown
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown
+    assert out.width == width
+
+
+@pytest.mark.parametrize(
+    ("time_ns", "told"),
+    [
+        (999, "999 ns"), (1_000, "1 us"), (999_499, "999 us"), (999_501, "1 ms"), (-999_999, "-1 ms"),
+        (999_500_001, "1.000 s"), (1_234_567_890_123, "1,234.568 s"),
+    ],
+)  # fmt: skip
+def test_a_time_has_three_digits_and_no_power(time_ns: int, told: str):
+    assert time_text(time_ns) == told
 
 
 def test_check_tells_losses(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
