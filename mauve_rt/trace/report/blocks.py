@@ -14,6 +14,8 @@ _KEPT_TOGETHER = ("wake-up", "wake\N{NON-BREAKING HYPHEN}up")
 _BEFORE_A_UNIT = re.compile(
     r"(?<=\d) (?=(?:[num\N{MICRO SIGN}]?s|min|h|k?Hz|[kMG]?B|%|\N{MULTIPLICATION SIGN})(?!\w))"
 )
+_FILLERS = '<i aria-hidden="true"></i>' * 7
+"""In the last row of cards: without height, so that its cards are as wide as those above."""
 _WORDY = 26  # characters from which a column of words may break
 
 
@@ -79,7 +81,7 @@ def cards(figures: Iterable[Card]) -> str:
         f'<div class="card {one.level}"><b>{prose(one.value)}</b><span>{_label(one.meaning)}</span></div>'
         for one in figures
     )
-    return f'<div class="cards">{inside}</div>'
+    return f'<div class="cards">{inside}{_FILLERS}</div>'
 
 
 def bullets(lines: Iterable[str], *, css: str = "") -> str:
