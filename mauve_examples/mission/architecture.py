@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-
 from mauve_examples import _mission
 from mauve_examples.mission.demo_errors import BadInputError
 from mauve_examples.mission.facts import MissionArea, MissionFacts, Pose, load_area
 from mauve_rt.model.ament_index import share_folder
+from mauve_rt.yaml_text import read_yaml
+from mauve_rt.yaml_writer import write_yaml
 
 ROBOT, SUPERVISOR = "robot.yaml", "supervisor.yaml"
 
@@ -86,10 +86,10 @@ def write_setups(world: World, folder: Path, *, seed: int, supervisor: bool) -> 
         changes |= dict(zip(("start_x", "start_y", "start_yaw"), pose, strict=True))
         peers = [peer for peer in world.starts if peer != name]
         cpu = cpus[index % len(cpus)]
-        _write(architecture, _robot(name, peers=peers, cpu=cpu, properties=changes))
+        _write(architecture, ROBOT, _robot(name, peers=peers, cpu=cpu, properties=changes))
         rules = folder / "supervisor" / f"{name}.yaml" if supervisor else None
         if rules is not None:
-            _write(rules, _template(SUPERVISOR))
+            _write(rules, SUPERVISOR, _template(SUPERVISOR))
         setups.append(RobotSetup(name=name, architecture=architecture, rules=rules))
     return setups
 
@@ -106,12 +106,10 @@ def _robot(name: str, *, peers: list[str], cpu: int, properties: Mapping[str, ob
 
 
 def _template(name: str) -> Any:
-    return YAML().load(data_file("architecture", name).read_text(encoding="utf-8"))
+    return read_yaml(data_file("architecture", name).read_text(encoding="utf-8"))
 
 
-def _write(path: Path, document: Any) -> None:
+def _write(path: Path, template: str, document: Any) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8") as file:
-        yaml = YAML()
-        yaml.width = 4096  # leave the lines as they are
-        yaml.dump(document, file)
+    origin = f"# Made for one mission from mauve_examples' architecture/{template}, which has the comments.\n"
+    path.write_text(origin + write_yaml(document), encoding="utf-8")

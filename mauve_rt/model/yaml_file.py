@@ -1,19 +1,12 @@
 """A YAML file with the place of every element, so that errors point at it."""
 
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.words import shown
+from mauve_rt.yaml_text import MAX_BYTES, Node, YamlError, parse_yaml
 
 Location = tuple[int | str, ...]
-MAX_BYTES = 1_000_000
 
 
 class YamlFile:
@@ -26,36 +19,28 @@ class YamlFile:
             ArchitectureFileError: no such file, too large, not UTF-8, not YAML, or a key given twice.
         """
         self.path = Path(path)
-        self._document = self._parse(self._read() if text is None else text)
         try:
-            self.data = _Plain().value(self._document)
-        except (RecursionError, OverflowError):
-            raise self.error(
-                "the file is nested too deeply", remedy="do its aliases refer to each other?"
-            ) from None
+            self._root = parse_yaml(self._read() if text is None else text)
+        except YamlError as error:
+            facts = {"code": error.code, "remedy": error.remedy}
+            raise self.error(error.what, line=error.line, column=error.column, **facts) from None
+        self.data = self._root.value
 
     def position(self, location: Location, *, key: bool = False) -> tuple[int, int]:
         """Line and column, from 1, of the deepest element of `location` that the file has.
 
         With `key`, of the last element's key rather than of its value.
         """
-        position = (1, 1)
-        node = self._document
+        position, node = (1, 1), self._root
         for index, part in enumerate(location):
-            marks = getattr(node, "lc", None)
             last = index == len(location) - 1
-            try:
-                if marks is None:
-                    break
-                if isinstance(node, Mapping):
-                    at_value = not (key and last) and _is_scalar(node[part])
-                    line, column = marks.value(part) if at_value else marks.key(part)
-                else:
-                    line, column = marks.item(part)
-                node = node[part]
-            except (KeyError, IndexError, TypeError):
-                break  # not in the file, or from a merged mapping: its nearest ancestor is the place
-            position = (line + 1, column + 1)
+            found = _part(node, part)
+            if found is None:
+                break  # not in the file: its nearest ancestor is the place
+            child, key_place = found
+            is_scalar = child.children is None
+            position = child.place if is_scalar and not (key and last) else key_place
+            node = child
         return position
 
     def problem(self, location: Location, what: str, **facts: str) -> Problem:
@@ -88,60 +73,12 @@ class YamlFile:
             column = error.start - raw.rfind(b"\n", 0, error.start)
             raise self.error("not text in UTF-8", line=line, column=column, code="io") from None
 
-    def _parse(self, text: str) -> Any:
-        try:
-            return YAML(typ="rt").load(io.StringIO(text))
-        except DuplicateKeyError as error:
-            line, column = _place(error)
-            problem = (error.problem or "").split('"')
-            name = problem[1] if len(problem) > 1 else "?"
-            text = f"key '{name}' given twice"
-            raise self.error(
-                text, line=line, column=column, code="duplicate_name", remedy="remove one"
-            ) from None
-        except MarkedYAMLError as error:
-            line, column = _place(error)
-            reasons = (
-                (error.context, error.problem)
-                if (error.problem or "").startswith("but ")
-                else (error.problem,)
-            )
-            reason = " ".join(reason for reason in reasons if reason) or "bad syntax"
-            raise self.error(f"not YAML: {reason}", line=line, column=column) from None
-        except (YAMLError, ValueError) as error:  # ValueError: e.g. a date such as 2001-99-99
-            raise self.error(f"not YAML: {str(error).splitlines()[0]}") from None
-        except RecursionError:
-            raise self.error("the file is nested too deeply") from None
 
-
-class _Plain:
-    """Plain Python values of a round-trip document; a key that is no text becomes text."""
-
-    MAX_NODES = 200_000  # what aliases of aliases may grow to
-
-    def __init__(self) -> None:
-        self._nodes = 0
-
-    def value(self, node: Any) -> Any:
-        self._nodes += 1
-        if self._nodes > self.MAX_NODES:
-            raise OverflowError
-        if isinstance(node, Mapping):
-            return {
-                key if isinstance(key, str) else shown(key): self.value(item) for key, item in node.items()
-            }
-        if isinstance(node, Sequence) and not isinstance(node, str | bytes):
-            return [self.value(item) for item in node]
-        for kind in (bool, int, float, str):
-            if isinstance(node, kind):
-                return kind(node)
-        return None if node is None else str(node)
-
-
-def _is_scalar(node: Any) -> bool:
-    return not isinstance(node, Mapping | list)
-
-
-def _place(error: MarkedYAMLError) -> tuple[int, int]:
-    mark = error.problem_mark or error.context_mark
-    return (mark.line + 1, mark.column + 1) if mark else (1, 1)
+def _part(node: Node, part: int | str) -> tuple[Node, tuple[int, int]] | None:
+    """A value in another, and the place of its key, or of itself in a list."""
+    children = node.children
+    if isinstance(children, Mapping) and isinstance(part, str) and part in children:
+        return children[part], node.key_places[part]
+    if children is not None and not isinstance(children, Mapping) and isinstance(part, int):
+        return (children[part], children[part].place) if 0 <= part < len(children) else None
+    return None

@@ -7,9 +7,6 @@ the kernel to tell (states, wiring, whether parts fit), the kernel tells at the 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from mauve_rt._kernel import ComponentDescription, PropertyDescription, ResourceDescription, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 from mauve_rt.model.architecture_file import ArchitectureModel
@@ -21,6 +18,7 @@ from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_requests import Code, RefusalError, Step, code_of
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.yaml_text import YamlError, read_yaml
 
 
 @dataclass
@@ -214,8 +212,8 @@ def _words(error: MauveError) -> str:
 
 def _yaml(step: Step, subject: str) -> object:
     try:
-        return YAML(typ="safe", pure=True).load(step.value)
-    except (YAMLError, ValueError, RecursionError):
+        return read_yaml(step.value)
+    except YamlError:
         raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
 
 

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from mauve_rt.errors import ParameterError
+from mauve_rt.yaml_text import YamlError, read_yaml
 
 _REMAP, _PARAMETER = ("-r", "--remap"), ("-p", "--param")
 _NAME = r"[A-Za-z_]\w*"
@@ -102,16 +100,16 @@ def _options(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 def _parse(text: str) -> Any:
     try:
-        value = YAML(typ="safe", pure=True).load(text)
-    except (YAMLError, ValueError, RecursionError):
+        value = read_yaml(text)
+    except YamlError:
         return text
     return text if value is None else value
 
 
 def _of_file(path: str) -> list[tuple[str, dict[str, Any]]]:
     try:
-        return [*_sections(YAML(typ="safe", pure=True).load(Path(path).read_text(encoding="utf-8")), "")]
-    except (OSError, YAMLError, ValueError, RecursionError):
+        return [*_sections(read_yaml(Path(path).read_text(encoding="utf-8")), "")]
+    except (OSError, UnicodeDecodeError, YamlError):
         return []
 
 

@@ -1,20 +1,20 @@
 """Whole bags: what is wrong with one, and making it right."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write_metadata
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_repair import FileState, examine
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reader import bag_files
+from mauve_rt.yaml_text import YamlError, read_yaml
 
 _INFORMATION = "rosbag2_bagfile_information"
+_MAX_METADATA_BYTES = 64_000_000  # of hundreds of thousands of files
 
 
 @dataclass(frozen=True)
@@ -106,11 +106,12 @@ def _read_metadata(path: Path) -> Mapping[str, Any]:
 
     """
     try:
-        read = YAML(typ="safe").load((path / METADATA).read_text(encoding="utf-8"))
+        text = (path / METADATA).read_text(encoding="utf-8")
+        read = read_yaml(text, max_bytes=_MAX_METADATA_BYTES)
     except FileNotFoundError as error:
         msg = "not there"
         raise TraceError(msg) from error
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+    except (OSError, UnicodeDecodeError, YamlError) as error:
         msg = f"cannot be read ({str(error).splitlines()[0]})"
         raise TraceError(msg) from error
     told = read.get(_INFORMATION) if isinstance(read, dict) else None
@@ -165,11 +166,4 @@ def _one_line(yaml: str) -> str:
     """Return the profiles as flow YAML on one line, as they go into metadata.yaml."""
     if "\n" not in yaml.strip():
         return yaml.strip() or "[]"
-    from io import StringIO  # noqa: PLC0415
-
-    writer = YAML(typ="safe")
-    writer.default_flow_style = True
-    writer.width = 1_000_000
-    out = StringIO()
-    writer.dump(YAML(typ="safe").load(yaml), out)
-    return out.getvalue().strip()
+    return json.dumps(read_yaml(yaml))  # JSON is flow YAML

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
+import yaml
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.reader import open_trace
@@ -70,9 +70,8 @@ def records_in(directory: Path, component: str) -> int:
 
 
 def custom_data(directory: Path) -> dict[str, str]:
-    return YAML(typ="safe").load((directory / "metadata.yaml").read_text())["rosbag2_bagfile_information"][
-        "custom_data"
-    ]
+    told = yaml.safe_load((directory / "metadata.yaml").read_text())
+    return told["rosbag2_bagfile_information"]["custom_data"]
 
 
 def test_records_and_words_are_in_the_bag(recorder: Recorder, source: SyntheticSource):
