@@ -106,7 +106,10 @@ def _reconfigure(args: argparse.Namespace) -> int:
         args,
         Reconfigure,
         "reconfigure",
-        steps=[ReconfigurationStep(**step.model_dump()) for step in steps],
+        steps=[
+            ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
+            for step in steps
+        ],
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
     )

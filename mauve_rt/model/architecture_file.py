@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model.schema import (
     EVENT_TYPES,
@@ -16,7 +14,7 @@ from mauve_rt.model.schema import (
     PropertyValue,
     ResourceModel,
 )
-from mauve_rt.model.schema_errors import owner, schema_problems
+from mauve_rt.model.schema_errors import owner, read_content
 from mauve_rt.model.substitution import substituted_property
 from mauve_rt.model.words import did_you_mean
 from mauve_rt.model.yaml_file import Location, YamlFile
@@ -127,10 +125,7 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
         ArchitectureFileError: with every problem found; `str()` tells of the first.
     """
     file = YamlFile(path)
-    try:
-        content = FileModel.model_validate(file.data)
-    except ValidationError as error:
-        raise ArchitectureFileError(file.path, schema_problems(file, error)) from None
+    content = read_content(FileModel, file)
     model = ArchitectureModel(file, content, overrides or Overrides())
     problems = [
         *_override_problems(model, overrides or Overrides()),
@@ -211,7 +206,7 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
             ("overwrite", "ring_buffer"),
             ("max_readers", "latest_value"),
         ):
-            if resource.kind != kind and key in resource.model_fields_set:
+            if resource.kind != kind and key in resource.given:
                 what = f"resource '{name}' of kind {resource.kind} has no {key}"
                 yield model.key_problem((*location, key), what, remedy=f"only a {kind} has one")
 
@@ -237,7 +232,7 @@ def _service_problems(model: ArchitectureModel, name: str) -> Iterator[Problem]:
         yield model.problem(
             at, what, expected="offers: the name of a call", remedy="or kind: client, to call it"
         )
-    if not is_client and "timeout_ms" in service.model_fields_set:
+    if not is_client and "timeout_ms" in service.given:
         what = f"resource '{name}' of kind {resource.kind} has no timeout_ms"
         yield model.key_problem((*at, "timeout_ms"), what, remedy="only a client has one")
 

@@ -1,13 +1,9 @@
 """A component or a resource more for an architecture that runs, described as in the architecture file."""
 
-from typing import Any
-
-from pydantic import ValidationError
-
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.architecture_file import ArchitectureModel, Overrides, element_problems
 from mauve_rt.model.schema import FragmentModel
-from mauve_rt.model.schema_errors import schema_problems
+from mauve_rt.model.schema_errors import read_content
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 
@@ -32,10 +28,7 @@ def fragment(model: ArchitectureModel, text: str, *, section: str, name: str) ->
         ArchitectureFileError: no YAML, or it breaks the schema; the problems' text() tells all.
     """
     file = _Section(model, text, (section, name))
-    try:
-        content: Any = FragmentModel.model_validate(file.data)
-    except ValidationError as error:
-        raise ArchitectureFileError(file.path, schema_problems(file, error)) from None
+    content = read_content(FragmentModel, file)
     surroundings = Overrides(namespace=model.namespace, peers=model.peers)
     found = ArchitectureModel(file, content, surroundings)
     if problems := [*element_problems(found)]:

@@ -14,53 +14,49 @@ Names of topics and of the executor are resolved against the supervisor's namesp
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing import Literal
 
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.schema import Identifier, RosName
-from mauve_rt.model.steps import Step, form_problem
+from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Text
+from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
+from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.model.steps import STEPS, Step, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
 
-Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-MessageType = Annotated[str, Field(pattern=r"^[a-z]\w*/msg/[A-Z]\w*$")]
+_SECONDS = Real(least=0)
+_MESSAGE_TYPE = Text(r"[a-z]\w*/msg/[A-Z]\w*", "a message type such as std_msgs/msg/Float64")
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Silence(_Model):
+class Silence(Section):
     """Holds while the last sample on `topic` (before a first one: the arming) is older than a limit."""
 
-    topic: RosName
-    type: MessageType
-    longer_than_s: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    topic: str = setting(ROS_NAME)
+    type: str = setting(_MESSAGE_TYPE)
+    longer_than_s: float = setting(Real(above=0))
 
 
-class When(_Model):
+class When(Section):
     """What a rule waits for: exactly one kind of condition."""
 
-    silence: Silence
+    silence: Silence = setting(Part(Silence))
 
 
-class Undo(_Model):
+class Undo(Section):
     """What a rule does once its condition has been false for `for_s` seconds without a break."""
 
-    for_s: Seconds = 0.0
-    do: Annotated[list[Step], Field(min_length=1)]
+    for_s: float = setting(_SECONDS, default=0.0)
+    do: list[Step] = setting(STEPS)
 
 
-class Rule(_Model):
+class Rule(Section):
     """One condition and what to do about it. Times in seconds."""
 
-    name: Identifier
-    when: When
-    for_s: Seconds = 0.0
-    do: Annotated[list[Step], Field(min_length=1)]
-    undo: Undo | None = None
-    cooldown_s: Seconds = 0.0
+    name: str = setting(IDENTIFIER)
+    when: When = setting(Part(When))
+    for_s: float = setting(_SECONDS, default=0.0)
+    do: list[Step] = setting(STEPS)
+    undo: Undo | None = setting(Part(Undo), default=None)
+    cooldown_s: float = setting(_SECONDS, default=0.0)
 
     def targets(self) -> set[str]:
         """Components that must run before the rule is armed: those of which it replaces or sets something."""
@@ -68,12 +64,12 @@ class Rule(_Model):
         return {step.target for step in self.do if step.kind in kinds}
 
 
-class Rules(_Model):
+class Rules(Section):
     """A whole rules file."""
 
-    mauve: Literal[1]
-    executor: RosName = "executor"
-    rules: Annotated[list[Rule], Field(min_length=1)]
+    mauve: Literal[1] = setting(Choice(1))
+    executor: str = setting(ROS_NAME, default="executor")
+    rules: list[Rule] = setting(ListOf(Part(Rule), few=1))
 
 
 class RulesFile:
@@ -87,11 +83,10 @@ class RulesFile:
                 `FILE:LINE:COLUMN: what`, one line.
         """
         self._file = YamlFile(path)
-        try:
-            self.rules = Rules.model_validate(self._file.data)
-        except ValidationError as error:
-            problems = [form_problem(self._file, item) for item in error.errors(include_url=False)]
-            raise ArchitectureFileError(self._file.path, problems) from None
+        faults: Faults = []
+        self.rules = Rules.read(self._file.data, (), faults)
+        if faults:
+            raise form_error(self._file, faults)
         seen: set[str] = set()
         for index, rule in enumerate(self.rules.rules):
             if rule.name in seen:

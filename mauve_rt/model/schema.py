@@ -38,11 +38,22 @@ not wait for other components, or for another CPU to wake up, say where it runs 
 Nothing here looks at plug-ins, so a file can be read where none is installed.
 """
 
-import re
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from mauve_rt.model.kinds import (
+    Choice,
+    Fault,
+    Faults,
+    Flag,
+    ListOf,
+    Real,
+    Scalar,
+    TableOf,
+    Text,
+    Whole,
+)
+from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.model.yaml_file import Location
 
 PropertyValue = bool | int | float | str
 
@@ -58,171 +69,166 @@ DEFAULT_MESSAGE_BYTES = 65_536
 MAX_MESSAGE_BYTES = 2**28
 MAX_READERS = 1000
 MAX_TRACE_RECORDS = 1_048_576
+_LONGEST_MS = 1e9
+
+_PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
+_ROS_WORDS = r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*"
+PLUGIN_NAME = Text(_PLUGIN, "package/Class")
+IDENTIFIER = Text(
+    r"[A-Za-z]\w*",
+    "a name of letters, digits and single underscores that starts with a letter",
+    without="__",
+)
+ROS_NAME = Text(rf"(?:~/|/)?{_ROS_WORDS}", "a ROS name such as scan, /map or ~/status", without="__")
+_NAMESPACE = Text(
+    rf"/*(?:{_ROS_WORDS})?/*",
+    "a namespace such as /robot_1",
+    without="__",
+    made=lambda text: "/" + text.strip("/"),
+)
+_ENDPOINT = Text(r"\w+\.\w+", "name.port or name.service")
+_RESOURCE_KIND = Text(
+    rf"{'|'.join(GIVEN_RESOURCES)}|{_PLUGIN}",
+    f"{', '.join(GIVEN_RESOURCES)} or the name of a plug-in, package/Class",
+)
+_CPUS = ListOf(Whole(0, 65_535), few=1)
+_PRIORITY = Whole(1, MAX_PRIORITY)
+_DURATION_MS = Real(least=0, most=_LONGEST_MS)
+_PRIORITY_HINT = "1 is the lowest, 98 the highest; 99 is kept for the conductor"
+_CPUS_HINT = "leave the key out to allow every CPU"
 
 
-def _plugin_name(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z]\w*/[A-Za-z_]\w*", value, re.ASCII):
-        raise PydanticCustomError("expected", "{text}", {"text": "package/Class"})
-    return value
+class _Alternatives(ListOf):
+    """A list of plug-ins, or the word `installed`."""
 
-
-def _identifier(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z]\w*", value, re.ASCII) or "__" in value:
-        text = "a name of letters, digits and single underscores that starts with a letter"
-        raise PydanticCustomError("expected", "{text}", {"text": text})
-    return value
-
-
-def _ros_name(value: str) -> str:
-    if not re.fullmatch(r"(~/|/)?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", value, re.ASCII) or "__" in value:
-        text = "a ROS name such as scan, /map or ~/status"
-        raise PydanticCustomError("expected", "{text}", {"text": text})
-    return value
-
-
-def _namespace(value: str) -> str:
-    full = "/" + value.strip("/")
-    return full if full == "/" else "/" + _ros_name(full[1:])
-
-
-def _endpoint(value: str) -> str:
-    if not re.fullmatch(r"\w+\.\w+", value, re.ASCII):
-        raise PydanticCustomError("expected", "{text}", {"text": "name.port or name.service"})
-    return value
-
-
-def _scalar(value: Any) -> Any:
-    if isinstance(value, bool | int | float | str):
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        if value == "installed" or isinstance(value, list):
+            return value if value == "installed" else super().read(value, place, faults)
+        expected = "a list of cores, fsms and shells, or the word installed"
+        faults.append(Fault(place, "form", limit=expected, found=value))
         return value
-    raise PydanticCustomError("expected", "{text}", {"text": "true, false, a number or text"})
 
 
-def _resource_kind(value: str) -> str:
-    if value not in GIVEN_RESOURCES and "/" not in value:
-        text = f"{', '.join(GIVEN_RESOURCES)} or the name of a plug-in, package/Class"
-        raise PydanticCustomError("expected", "{text}", {"text": text})
-    return value if value in GIVEN_RESOURCES else _plugin_name(value)
-
-
-def _plugin_names_or_installed(value: Any) -> Any:
-    if value == "installed" or isinstance(value, list):
-        return value
-    raise PydanticCustomError(
-        "expected", "{text}", {"text": "a list of cores, fsms and shells, or the word installed"}
-    )
-
-
-def _qos(value: Any) -> Any:
-    if not isinstance(value, str):
-        return value
-    if value not in QOS_NAMES:
-        text = f"{', '.join(QOS_NAMES)}, or a mapping with profile, reliability, depth, deadline_ms, ..."
-        raise PydanticCustomError("expected", "{text}", {"text": text})
-    return {"profile": value}
-
-
-PluginName = Annotated[str, AfterValidator(_plugin_name)]
-Identifier = Annotated[str, AfterValidator(_identifier)]
-RosName = Annotated[str, AfterValidator(_ros_name)]
-Endpoint = Annotated[str, AfterValidator(_endpoint)]
-Cpu = Annotated[int, Field(ge=0, le=65535)]
-Threshold = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Int64 = Annotated[int, Field(ge=0, le=2**63 - 1)]
-Milliseconds = Annotated[float, Field(ge=0, le=1e9)]
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class ThresholdModel(_Section):
+class ThresholdModel(Section):
     """From which figure on a status is a warning, and from which an error."""
 
-    warn: Threshold | None = None
-    error: Threshold | None = None
+    warn: float | None = setting(Real(above=0), default=None)
+    error: float | None = setting(Real(above=0), default=None)
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def misfit(self) -> Fault | None:
+        """One of them at least, and in order."""
         if self.warn is None and self.error is None:
-            raise PydanticCustomError("expected", "{text}", {"text": "warn or error or both of them"})
+            return Fault((), "form", limit="warn or error or both of them")
         if self.warn is not None and self.error is not None and self.warn > self.error:
-            raise PydanticCustomError("expected", "{text}", {"text": "an error that is no less than warn"})
-        return self
+            return Fault((), "form", limit="an error that is no less than warn")
+        return None
 
 
-class DiagnosticsModel(_Section):
+_THRESHOLD = Part(ThresholdModel)
+
+
+class DiagnosticsModel(Section):
     """Thresholds of what /diagnostics tells of a component; figures since the last status."""
 
-    wakeup_max_us: ThresholdModel | None = None  # the largest wake-up latency
-    execution_max_us: ThresholdModel | None = None  # the longest execution of a state
-    overruns: ThresholdModel | None = None
-    skipped: ThresholdModel | None = None  # instants
-    allocations: ThresholdModel | None = None  # of its thread
-    page_faults: ThresholdModel | None = None
+    wakeup_max_us: ThresholdModel | None = setting(_THRESHOLD, default=None)  # the largest wake-up latency
+    execution_max_us: ThresholdModel | None = setting(_THRESHOLD, default=None)  # the longest of a state
+    overruns: ThresholdModel | None = setting(_THRESHOLD, default=None)
+    skipped: ThresholdModel | None = setting(_THRESHOLD, default=None)  # instants
+    allocations: ThresholdModel | None = setting(_THRESHOLD, default=None)  # of its thread
+    page_faults: ThresholdModel | None = setting(_THRESHOLD, default=None)
 
     def overridden_by(self, other: Self) -> Self:
         """These thresholds, but those that `other` sets, or switches off, in their place."""
-        return self.model_copy(update={key: getattr(other, key) for key in other.model_fields_set})
+        return self.changed(**{key: getattr(other, key) for key in other.given})
 
 
-class SenderModel(_Section):
+class SenderModel(Section):
     """The thread that sends the messages of bound topics."""
 
-    priority: Annotated[int, Field(ge=1, le=MAX_PRIORITY)] = 1
-    cpus: Annotated[list[Cpu], Field(min_length=1)] | None = None  # absent: any
+    priority: int = setting(_PRIORITY, default=1, hint=_PRIORITY_HINT)
+    cpus: list[int] | None = setting(_CPUS, default=None, hint=_CPUS_HINT)  # absent: any
 
 
-class ExecutorModel(_Section):
+class ExecutorModel(Section):
     """The process as a whole."""
 
-    namespace: Annotated[str, AfterValidator(_namespace)] = "/"
-    peers: list[Identifier] = []
-    require_realtime: bool = False
-    diagnostics: DiagnosticsModel = DiagnosticsModel()  # of every component
-    sender: SenderModel = SenderModel()
+    namespace: str = setting(_NAMESPACE, default="/")
+    peers: list[str] = setting(ListOf(IDENTIFIER), default=[])
+    require_realtime: bool = setting(Flag(), default=False)
+    diagnostics: DiagnosticsModel = setting(
+        Part(DiagnosticsModel), default=DiagnosticsModel()
+    )  # of every component
+    sender: SenderModel = setting(Part(SenderModel), default=SenderModel())
 
 
-class QosModel(_Section):
+class QosModel(Section):
     """Quality of service: a profile by name, and fields that say otherwise. Durations in ms, 0: none."""
 
-    profile: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = "reliable"
-    reliability: Literal["reliable", "best_effort"] | None = None
-    durability: Literal["volatile", "transient_local"] | None = None
-    depth: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None
-    deadline_ms: Milliseconds = 0
-    lifespan_ms: Milliseconds = 0
-    liveliness: Literal["automatic", "manual_by_topic"] = "automatic"
-    lease_ms: Milliseconds = 0  # a publisher silent for longer counts as gone
+    profile: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = setting(
+        Choice(*QOS_NAMES), default="reliable"
+    )
+    reliability: Literal["reliable", "best_effort"] | None = setting(
+        Choice("reliable", "best_effort"), default=None
+    )
+    durability: Literal["volatile", "transient_local"] | None = setting(
+        Choice("volatile", "transient_local"), default=None
+    )
+    depth: int | None = setting(Whole(1, MAX_CAPACITY), default=None)
+    deadline_ms: float = setting(_DURATION_MS, default=0.0)
+    lifespan_ms: float = setting(_DURATION_MS, default=0.0)
+    liveliness: Literal["automatic", "manual_by_topic"] = setting(
+        Choice("automatic", "manual_by_topic"), default="automatic"
+    )
+    lease_ms: float = setting(_DURATION_MS, default=0.0)  # a publisher silent for longer counts as gone
 
 
-class TopicModel(_Section):
+class _Qos(Part):
+    """A QosModel, or the name of a profile."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        if isinstance(value, str) and value not in QOS_NAMES:
+            expected = (
+                f"{', '.join(QOS_NAMES)}, or a mapping with profile, reliability, depth, deadline_ms, ..."
+            )
+            faults.append(Fault(place, "form", limit=expected, found=value))
+            return value
+        return super().read({"profile": value} if isinstance(value, str) else value, place, faults)
+
+
+class TopicModel(Section):
     """The ROS topic that a resource is bound to; the name is relative to the executor's namespace."""
 
-    name: RosName
-    direction: Literal["publish", "subscribe"]
-    qos: Annotated[QosModel, BeforeValidator(_qos)] = QosModel()
+    name: str = setting(ROS_NAME)
+    direction: Literal["publish", "subscribe"] = setting(Choice("publish", "subscribe"))
+    qos: QosModel = setting(_Qos(QosModel), default=QosModel())
 
 
-class ServiceModel(_Section):
+class ServiceModel(Section):
     """The ROS service that a client calls, or that a resource offers; names as TopicModel."""
 
-    name: RosName
-    offers: Identifier | None = None  # the resource's call; absent: the resource is a client
-    timeout_ms: Annotated[float, Field(gt=0, le=1e9)] = 100.0  # of a client: no call blocks longer
+    name: str = setting(ROS_NAME)
+    offers: str | None = setting(
+        IDENTIFIER, default=None
+    )  # the resource's call; absent: the resource is a client
+    timeout_ms: float = setting(
+        Real(above=0, most=_LONGEST_MS), default=100.0
+    )  # of a client: no call blocks longer
 
 
-class ResourceModel(_Section):
+class ResourceModel(Section):
     """Data that components share."""
 
-    kind: Annotated[str, AfterValidator(_resource_kind)]
-    type: str = ""
-    capacity: Annotated[int, Field(ge=1, le=MAX_CAPACITY)] | None = None  # elements; ring_buffer only
-    overwrite: bool = False  # a full ring_buffer drops its oldest element rather than the new one
-    topic: TopicModel | None = None
-    service: ServiceModel | None = None
-    max_readers: Annotated[int, Field(ge=1, le=MAX_READERS)] = DEFAULT_READERS  # ports; latest_value only
-    # of one message, where no plug-in registered its type: what is larger is refused and counted
-    max_bytes: Annotated[int, Field(ge=1, le=MAX_MESSAGE_BYTES)] = DEFAULT_MESSAGE_BYTES
+    kind: str = setting(_RESOURCE_KIND)
+    type: str = setting(Text(), default="")
+    capacity: int | None = setting(Whole(1, MAX_CAPACITY), default=None)  # elements; ring_buffer only
+    # A full ring_buffer drops its oldest element rather than the new one.
+    overwrite: bool = setting(Flag(), default=False)
+    topic: TopicModel | None = setting(Part(TopicModel), default=None)
+    service: ServiceModel | None = setting(Part(ServiceModel), default=None)
+    # Ports; latest_value only.
+    max_readers: int = setting(Whole(1, MAX_READERS), default=DEFAULT_READERS)
+    # Of one message, where no plug-in registered its type: what is larger is refused and counted.
+    max_bytes: int = setting(Whole(1, MAX_MESSAGE_BYTES), default=DEFAULT_MESSAGE_BYTES)
 
     @property
     def topic_type(self) -> str:
@@ -230,27 +236,31 @@ class ResourceModel(_Section):
         return self.type or (EVENT_TYPES[-1] if self.kind == "event" else "")
 
 
-class ComponentModel(_Section):
+class ComponentModel(Section):
     """A component and the thread it runs on."""
 
-    shell: PluginName
-    core: PluginName
-    fsm: PluginName
-    alternatives: Annotated[
-        list[PluginName] | Literal["installed"], BeforeValidator(_plugin_names_or_installed)
-    ] = []
-    fallback: PluginName | None = None
-    priority: Annotated[int, Field(ge=1, le=MAX_PRIORITY)] = 50
-    cpus: Annotated[list[Cpu], Field(min_length=1)] | None = None  # absent: any
-    offset_ms: Annotated[float, Field(ge=0.0, le=1e9, allow_inf_nan=False)] = 0.0
-    period_ns: Int64 = 0  # 0: as the FSM says
-    overrun: Literal["skip", "catch_up", "fault"] = "skip"
-    max_backlog: Annotated[int, Field(ge=1, le=1_000_000)] = 10
-    stack_bytes: Annotated[int, Field(ge=MIN_STACK_BYTES, le=2**30)] = 524_288
-    trace_records: Annotated[int, Field(ge=2, le=MAX_TRACE_RECORDS)] | None = None  # None: by the period
-    reconfigurable: bool = True
-    properties: dict[str, Annotated[PropertyValue, BeforeValidator(_scalar)]] = {}
-    diagnostics: DiagnosticsModel = DiagnosticsModel()
+    shell: str = setting(PLUGIN_NAME)
+    core: str = setting(PLUGIN_NAME)
+    fsm: str = setting(PLUGIN_NAME)
+    alternatives: list[str] | Literal["installed"] = setting(_Alternatives(PLUGIN_NAME), default=[])
+    fallback: str | None = setting(PLUGIN_NAME, default=None)
+    priority: int = setting(_PRIORITY, default=50, hint=_PRIORITY_HINT)
+    cpus: list[int] | None = setting(_CPUS, default=None, hint=_CPUS_HINT)  # absent: any
+    offset_ms: float = setting(_DURATION_MS, default=0.0, hint="milliseconds after the epoch")
+    period_ns: int = setting(Whole(0, 2**63 - 1), default=0)  # 0: as the FSM says
+    overrun: Literal["skip", "catch_up", "fault"] = setting(
+        Choice("skip", "catch_up", "fault"), default="skip"
+    )
+    max_backlog: int = setting(Whole(1, 1_000_000), default=10)
+    stack_bytes: int = setting(
+        Whole(MIN_STACK_BYTES, 2**30),
+        default=524_288,
+        hint="the default of 524288 does for most components",
+    )
+    trace_records: int | None = setting(Whole(2, MAX_TRACE_RECORDS), default=None)  # None: by the period
+    reconfigurable: bool = setting(Flag(), default=True)
+    properties: dict[str, PropertyValue] = setting(TableOf(Scalar()), default={})
+    diagnostics: DiagnosticsModel = setting(Part(DiagnosticsModel), default=DiagnosticsModel())
 
     @property
     def offset_ns(self) -> int:
@@ -258,17 +268,19 @@ class ComponentModel(_Section):
         return round(self.offset_ms * 1e6)
 
 
-class FileModel(_Section):
+class FileModel(Section):
     """A whole architecture file."""
 
-    mauve: Literal[1]
-    executor: ExecutorModel = ExecutorModel()
-    components: Annotated[dict[Identifier, ComponentModel], Field(min_length=1)]
-    resources: dict[Identifier, ResourceModel] = {}
-    connections: list[Annotated[list[Endpoint], Field(min_length=2, max_length=2)]] = []
+    mauve: Literal[1] = setting(Choice(1), hint="this program reads version 1 of the schema")
+    executor: ExecutorModel = setting(Part(ExecutorModel), default=ExecutorModel())
+    components: dict[str, ComponentModel] = setting(TableOf(Part(ComponentModel), names=IDENTIFIER, few=1))
+    resources: dict[str, ResourceModel] = setting(TableOf(Part(ResourceModel), names=IDENTIFIER), default={})
+    connections: list[list[str]] = setting(ListOf(ListOf(_ENDPOINT, few=2, many=2)), default=[])
 
 
 class FragmentModel(FileModel):
     """A part of an architecture file: what one step of a transaction adds."""
 
-    components: dict[Identifier, ComponentModel] = {}
+    components: dict[str, ComponentModel] = setting(
+        TableOf(Part(ComponentModel), names=IDENTIFIER), default={}
+    )

@@ -1,145 +1,77 @@
 """What is wrong with the form of an architecture file, in words."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import TypeVar
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
-
-from mauve_rt.errors import Problem
-from mauve_rt.model.schema import (
-    ComponentModel,
-    DiagnosticsModel,
-    ExecutorModel,
-    FileModel,
-    QosModel,
-    ResourceModel,
-    SenderModel,
-    ServiceModel,
-    ThresholdModel,
-    TopicModel,
-)
+from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.kinds import Fault, Faults
+from mauve_rt.model.schema import FileModel
 from mauve_rt.model.words import did_you_mean, listed, shown
 from mauve_rt.model.yaml_file import Location, YamlFile
 
-_HINTS: Mapping[str, str] = {
-    "priority": "1 is the lowest, 98 the highest; 99 is kept for the conductor",
-    "mauve": "this program reads version 1 of the schema",
-    "offset_ms": "milliseconds after the epoch",
-    "stack_bytes": "the default of 524288 does for most components",
-    "cpus": "leave the key out to allow every CPU",
+_Read = TypeVar("_Read", bound=FileModel)
+
+_EXPECTED: Mapping[str, str] = {
+    "flag": "true or false",
+    "whole": "a whole number",
+    "number": "a number",
+    "finite": "a finite number",
+    "text": "text",
+    "list": "a list",
+    "mapping": "a mapping",
+    "more": "more than {limit}",
+    "least": "at least {limit}",
+    "most": "at most {limit}",
+    "few": "at least {limit} of them",
+    "many": "at most {limit} of them",
 }
 
 
-def schema_problems(file: YamlFile, error: ValidationError) -> list[Problem]:
-    """Every error of the schema as a problem with its place in the file."""
+def read_content(model: type[_Read], file: YamlFile) -> _Read:
+    """The content of a file.
+
+    Raises:
+        ArchitectureFileError: it breaks the schema, with every problem.
+    """
+    faults: Faults = []
     if not isinstance(file.data, dict):
         found = "an empty file" if file.data is None else shown(file.data)
-        keys = listed(FileModel.model_fields, last="and")
-        return [file.problem((), "not an architecture file", expected=f"the keys {keys}", found=found)]
-    by_place: dict[Location, Problem] = {}
-    for details in error.errors(include_url=False):
-        if str(details["loc"][-1]).startswith("literal[") and isinstance(details["input"], list):
-            continue  # the other member of a union, which the list does not mean to be
-        location = _in_file(details["loc"], file.data)
-        by_place.setdefault(location, _problem(file, location, details))
-    return list(by_place.values())
+        keys = listed(FileModel.settings, last="and")
+        raise file.error("not an architecture file", expected=f"the keys {keys}", found=found)
+    content = model.read(file.data, (), faults)
+    if faults:
+        raise ArchitectureFileError(file.path, [_problem(file, fault) for fault in faults])
+    return content
 
 
-def _problem(file: YamlFile, location: Location, details: ErrorDetails) -> Problem:
+def expected(fault: Fault) -> str:
+    """What a value should be, in words that follow `expected`."""
+    limit = f"{fault.limit:g}" if isinstance(fault.limit, float) else fault.limit
+    return _EXPECTED.get(fault.what, "{limit}").format(limit=limit)
+
+
+def _problem(file: YamlFile, fault: Fault) -> Problem:
+    location = fault.place
     component, element = owner(location)
     facts = {"component": component, "element": element}
-    kind = details["type"]
     name = str(location[-1]) if location else "file"
     within = _words(location[:-1])
-    if kind == "extra_forbidden":
-        remedy = did_you_mean(name, _section(location).model_fields)
+    if fault.what == "unknown":
+        remedy = did_you_mean(name, fault.known)
         return file.key_problem(location, f"unknown key '{name}'{within}", remedy=remedy, **facts)
-    if kind == "missing":
-        missing = str(details["loc"][-1])
-        return file.problem(location, f"{_subject(location)} has no '{missing}'", remedy="add it", **facts)
-    if location and _is_key(details):
+    if fault.what == "missing":
+        what = f"{_subject(location)} has no '{fault.limit}'"
+        return file.problem(location, what, remedy="add it", **facts)
+    if fault.what == "name":
         what = f"bad name '{name}'{within}"
-        return file.key_problem(location, what, expected=_expected(details), **facts)
-    what = (
-        f"bad {_subject(location)}" if location and isinstance(location[-1], int) else f"bad {name}{within}"
-    )
-    remedy = next((_HINTS[str(part)] for part in reversed(location[-2:]) if str(part) in _HINTS), "")
+        return file.key_problem(location, what, expected=expected(fault), **facts)
+    is_element = bool(location) and isinstance(location[-1], int)
+    what = f"bad {_subject(location)}" if is_element else f"bad {name}{within}"
+    remedy = fault.hint
     if location[:1] == ("connections",):
         remedy = "a connection is [component.port, resource.service]"
-    found = shown(details["input"])
-    return file.problem(location, what, expected=_expected(details), found=found, remedy=remedy, **facts)
-
-
-_PLAIN_WORDS: Mapping[str, str] = {
-    "bool_type": "true or false",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "finite_number": "a finite number",
-    "string_type": "text",
-    "string_too_short": "text that is not empty",
-    "list_type": "a list",
-    "dict_type": "a mapping",
-    "model_type": "a mapping",
-}
-
-
-_CONTEXT_WORDS: Mapping[str, str] = {
-    "expected": "{text}",  # our own validators
-    "literal_error": "{expected}",
-    "greater_than": "more than {gt:g}",
-    "greater_than_equal": "at least {ge:g}",
-    "less_than_equal": "at most {le:g}",
-    "too_short": "at least {min_length} of them",
-    "too_long": "at most {max_length} of them",
-}
-
-
-def _expected(details: ErrorDetails) -> str:
-    kind = details["type"]
-    if kind in _CONTEXT_WORDS:
-        return _CONTEXT_WORDS[kind].format(**details.get("ctx", {})).replace("'", "")
-    return _PLAIN_WORDS.get(kind, str(details["msg"]).removeprefix("Input should be "))
-
-
-def _in_file(location: tuple[int | str, ...], data: Any) -> Location:
-    """The part of pydantic's location that stands in the file: it adds the names of a union's members."""
-    found: list[int | str] = []
-    node = data
-    for part in location:
-        is_key = isinstance(node, dict) and part in node
-        is_index = isinstance(node, list) and isinstance(part, int) and part < len(node)
-        if is_key or is_index:
-            node = node[part]
-            found.append(part)
-    return tuple(found)
-
-
-def _is_key(details: ErrorDetails) -> bool:
-    return details["loc"][-1] == "[key]"
-
-
-_RESOURCE_SECTIONS: Sequence[type[BaseModel]] = (ResourceModel, TopicModel, QosModel)  # resource, topic, qos
-
-
-def _section(location: Location) -> type[BaseModel]:
-    """The schema of the section that `location` is a key of."""
-    found: type[BaseModel] = FileModel
-    match location[:-1]:
-        case (*_, "diagnostics"):
-            found = DiagnosticsModel
-        case (*_, "diagnostics", _):
-            found = ThresholdModel
-        case ("executor", *rest):
-            found = (ExecutorModel, SenderModel)[len(rest)]
-        case ("components", _):
-            found = ComponentModel
-        case ("resources", _, "service"):
-            found = ServiceModel
-        case ("resources", _, *rest):
-            found = _RESOURCE_SECTIONS[len(rest)]
-    return found
+    found = shown(fault.found)
+    return file.problem(location, what, expected=expected(fault), found=found, remedy=remedy, **facts)
 
 
 def owner(location: Location) -> tuple[str, str]:

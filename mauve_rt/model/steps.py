@@ -7,22 +7,16 @@
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
-
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    TypeAdapter,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from typing import Any, Literal, get_args
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.schema import Identifier
-from mauve_rt.model.words import shown
+from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Text
+from mauve_rt.model.schema import IDENTIFIER
+from mauve_rt.model.schema_errors import expected
+from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 StepKind = Literal[
@@ -44,31 +38,38 @@ _NEED_NAME = ("replace_core", "replace_fsm", "replace_shell", "set_property", "c
 _NEED_VALUE = ("connect", "add_component", "add_resource")  # a property's value may be an empty text
 
 
-class Step(BaseModel):
+class _YamlText(Text):
+    """YAML text; what is written as a value becomes text."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        is_value = isinstance(value, bool | int | float | dict)
+        return super().read(json.dumps(value) if is_value else value, place, faults)
+
+
+class Step(Section):
     """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    kind: StepKind = setting(Choice(*STEP_KINDS))
+    target: str = setting(IDENTIFIER)
+    name: str = setting(Text(), default="")
+    value: str = setting(_YamlText(), default="")
 
-    kind: StepKind
-    target: Identifier
-    name: str = ""
-    value: str = ""  # YAML text
-
-    @field_validator("value", mode="before")
-    @classmethod
-    def _text_of_a_value(cls, value: object) -> object:
-        return json.dumps(value) if isinstance(value, bool | int | float | dict) else value
-
-    @model_validator(mode="after")
-    def _has_what_it_needs(self) -> "Step":
-        if not self.name and self.kind in _NEED_NAME:
-            raise ValueError(f"a step of kind '{self.kind}' needs a name")
-        if not self.value and self.kind in _NEED_VALUE:
-            raise ValueError(f"a step of kind '{self.kind}' needs a value")
-        return self
+    def misfit(self) -> Fault | None:
+        """Some kinds need a name, some a value."""
+        for key, kinds in (("name", _NEED_NAME), ("value", _NEED_VALUE)):
+            if not getattr(self, key) and self.kind in kinds:
+                return Fault((), "rule", limit=f"a step of kind '{self.kind}' needs a {key}")
+        return None
 
 
-_STEPS = TypeAdapter(Annotated[list[Step], Field(min_length=1)])
+STEPS = ListOf(Part(Step), few=1)
+_SHOULD: Mapping[str, str] = {
+    "rule": "{limit}",
+    "list": "input should be a valid list",
+    "few": "list should have at least {limit} item",
+    "more": "input should be greater than {limit}",
+    "least": "input should be greater than or equal to {limit}",
+}
 
 
 def load_steps(path: str | Path, *, text: str | None = None) -> list[Step]:
@@ -78,29 +79,33 @@ def load_steps(path: str | Path, *, text: str | None = None) -> list[Step]:
         ArchitectureFileError: it cannot be read, is no YAML or no list of steps.
     """
     file = YamlFile(path, text=text)
-    try:
-        return _STEPS.validate_python(file.data)
-    except ValidationError as error:
-        problems = [form_problem(file, item) for item in error.errors(include_url=False)]
-        raise ArchitectureFileError(file.path, problems) from None
+    faults: Faults = []
+    steps: list[Step] = STEPS.read(file.data, (), faults)
+    if faults:
+        raise form_error(file, faults)
+    return steps
 
 
-def form_problem(file: YamlFile, item: Any) -> Problem:
-    """What pydantic found wrong, in words for who wrote the file."""
-    kind, location = item["type"], tuple(item["loc"])
+def form_error(file: YamlFile, faults: Faults) -> ArchitectureFileError:
+    """What is wrong with a file of steps, in words for who wrote it."""
+    return ArchitectureFileError(file.path, [_problem(file, fault) for fault in faults])
+
+
+def _problem(file: YamlFile, fault: Fault) -> Problem:
+    location = fault.place
     element = dotted(location)
-    if kind == "missing" and location[-1] == "silence":
-        return file.problem(location, f"{element[:-8]} has no known condition", expected="silence")
-    if kind == "missing":
-        return file.problem(location, f"{element} is missing")
-    if kind == "extra_forbidden":
-        return file.key_problem(location, f"{element} is no known key")
-    if kind == "expected":
-        text, found = item["ctx"]["text"], shown(item["input"])
-        return file.problem(location, f"bad {element}", expected=text, found=found)
-    message = item["msg"].removeprefix("Value error, ")
-    text = message[:1].lower() + message[1:]
-    return file.problem(location, f"{element or 'the file'}: {text}", found=shown(item["input"]))
+    if fault.what == "missing" and fault.limit == "silence":
+        return file.problem(location, f"{element} has no known condition", expected="silence")
+    if fault.what == "missing":
+        return file.problem(location, f"{dotted((*location, fault.limit))} is missing")
+    if fault.what == "unknown":
+        remedy = did_you_mean(str(location[-1]), fault.known)
+        return file.key_problem(location, f"{element} is no known key", remedy=remedy)
+    found = shown(fault.found)
+    if fault.what == "form":
+        return file.problem(location, f"bad {element}", expected=expected(fault), found=found)
+    text = _SHOULD.get(fault.what, f"input should be {expected(fault)}").format(limit=fault.limit)
+    return file.problem(location, f"{element or 'the file'}: {text}", found=found)
 
 
 def dotted(location: Location) -> str:

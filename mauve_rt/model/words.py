@@ -1,6 +1,5 @@
 """Small helpers for messages that people read."""
 
-import difflib
 from collections.abc import Iterable
 
 _SHORT = 60
@@ -8,6 +7,8 @@ _SHORT = 60
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """The remedy for an unknown word: the nearest known one, else all that are known."""
+    import difflib  # noqa: PLC0415 - only when something is wrong
+
     names = sorted(set(known))
     by_lower = {name.lower(): name for name in names}
     close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)

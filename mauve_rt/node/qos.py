@@ -19,7 +19,7 @@ _PROFILES = {
 
 def qos_profile(asked: str | QosModel, *, capacity: int = 0) -> QoSProfile:
     """The profile that an architecture file asks for; `capacity` is that of the ring_buffer behind it."""
-    fields = QosModel.model_validate({"profile": asked}) if isinstance(asked, str) else asked
+    fields = QosModel(profile=asked) if isinstance(asked, str) else asked  # type: ignore[arg-type] # checked
     profile = _PROFILES[fields.profile]
     reliability = ReliabilityPolicy[(fields.reliability or profile.reliability.name).upper()]
     durability = DurabilityPolicy[(fields.durability or profile.durability.name).upper()]

@@ -24,8 +24,6 @@ MODULES = {
     "numpy": ("python3-numpy", "numpy"),
     "pandas": ("python3-pandas", "pandas"),
     "perfetto": ("", "perfetto"),  # rosdep has no key, and says so: its use is optional
-    "pydantic": ("python3-pydantic", "pydantic"),
-    "pydantic_core": ("python3-pydantic", "pydantic"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
     "rosbags": ("", "rosbags"),  # no distribution packages it: the tests' only

@@ -25,7 +25,7 @@ def rule(
     }
     if undo:
         content["undo"] = {"for_s": 3.0, "do": [{"kind": "replace_core", "target": target, "name": USUAL}]}
-    return Rule.model_validate(content | changes)
+    return Rule(**content | changes)
 
 
 @dataclass

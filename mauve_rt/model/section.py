@@ -1,0 +1,134 @@
+"""Sections of a file as classes: a table of settings, each one value with its bounds.
+
+    class SenderModel(Section):
+        priority: int = setting(Whole(1, 98), default=1, hint="1 is the lowest")
+        cpus: list[int] | None = setting(ListOf(Whole(0, 65535), few=1), default=None)
+
+Objects are immutable and compare by value. A setting whose default is None takes `null` in a file as well.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self, dataclass_transform
+
+from mauve_rt.model.kinds import Fault, Faults, Kind
+from mauve_rt.model.yaml_file import Location
+
+_REQUIRED = object()
+
+
+class Setting:
+    """What a key may be set to, what it is otherwise, and a hint for who sets it wrongly."""
+
+    def __init__(self, kind: Kind, default: Any, hint: str) -> None:
+        self.kind, self.default, self.hint = kind, default, hint
+
+    @property
+    def is_required(self) -> bool:
+        """Whether there is no default."""
+        return self.default is _REQUIRED
+
+    def initial(self) -> Any:
+        """The default, of its own for everybody."""
+        return self.default.copy() if isinstance(self.default, list | dict) else self.default
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        """The value of the key; what is wrong is added to `faults`."""
+        if value is None and self.default is None:
+            return None
+        before = len(faults)
+        read = self.kind.read(value, place, faults)
+        for fault in faults[before:]:
+            if len(fault.place) <= len(place) + 1:  # of the value or of an element of it
+                fault.hint = fault.hint or self.hint
+        return read
+
+
+def setting(kind: Kind, *, default: Any = _REQUIRED, hint: str = "") -> Any:
+    """A setting of a Section."""
+    return Setting(kind, default, hint)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(setting,))
+class Section:
+    """A mapping of known keys."""
+
+    settings: ClassVar[Mapping[str, Setting]] = {}
+    given: frozenset[str]  # the settings that do not have their value by default
+
+    def __init_subclass__(cls) -> None:
+        own = {name: each for name, each in vars(cls).items() if isinstance(each, Setting)}
+        cls.settings = {**cls.settings, **own}
+        for name in own:
+            delattr(cls, name)
+
+    def __init__(self, **values: Any) -> None:
+        """From values as a file has them, or as the program does.
+
+        Raises:
+            ValueError: one of them is not what its setting takes.
+        """
+        faults: Faults = []
+        self._take(values, (), faults)
+        if faults:
+            wrong = ", ".join(".".join(map(str, fault.place)) or fault.what for fault in faults)
+            raise ValueError(f"bad {type(self).__name__}: {wrong}")
+
+    @classmethod
+    def read(cls, value: Any, place: Location, faults: Faults) -> Self:
+        """From a part of a file; what is wrong is added to `faults`, and makes the result useless."""
+        section = cls.__new__(cls)
+        if isinstance(value, dict):
+            section._take(value, place, faults)  # noqa: SLF001 - of this class
+        else:
+            faults.append(Fault(place, "mapping", found=value))
+        return section
+
+    def misfit(self) -> Fault | None:
+        """What is wrong where settings, each good by itself, do not fit each other; mostly nothing."""
+        return None
+
+    def changed(self, **values: Any) -> Self:
+        """The same, but with these settings."""
+        return type(self)(**{**{key: getattr(self, key) for key in self.given}, **values})
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a {type(self).__name__} does not change: {name}")
+
+    def __eq__(self, other: object) -> bool:
+        same = type(other) is type(self)
+        return same and all(getattr(self, key) == getattr(other, key) for key in self.settings)
+
+    __hash__ = None  # type: ignore[assignment] # there are lists in it
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{key}={getattr(self, key)!r}" for key in self.settings if key in self.given)
+        return f"{type(self).__name__}({values})"
+
+    def _take(self, values: Mapping[str, Any], place: Location, faults: Faults) -> None:
+        before = len(faults)
+        known = self.settings
+        mine = vars(self)
+        mine["given"] = frozenset(key for key in known if key in values)
+        for key, each in known.items():
+            if key in values:
+                mine[key] = each.read(values[key], (*place, key), faults)
+            elif each.is_required:
+                faults.append(Fault(place, "missing", limit=key))
+            else:
+                mine[key] = each.initial()
+        for key in values:
+            if key not in known:
+                faults.append(Fault((*place, key), "unknown", known=tuple(known)))
+        if len(faults) == before and (misfit := self.misfit()):
+            faults.append(Fault(place, misfit.what, limit=misfit.limit, found=values))
+
+
+class Part(Kind):
+    """A section within a section."""
+
+    def __init__(self, section: type[Section]) -> None:
+        self.section = section
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        """As Kind."""
+        return value if isinstance(value, self.section) else self.section.read(value, place, faults)
