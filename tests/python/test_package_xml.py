@@ -23,13 +23,14 @@ MODULES = {
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
     "pandas": ("python3-pandas", "pandas"),
-    "perfetto": ("", "perfetto"),  # rosdep has no key, and says so: its use is optional
+    "perfetto": ("", "perfetto"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
     "rosbags": ("", "rosbags"),  # no distribution packages it: the tests' only
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
+OPTIONAL = {"perfetto"}  # rosdep has no key; where it is used it says how to get it
 # Of CMake's packages that rosdep calls otherwise: its keys (rosdep/base.yaml); none if nothing is installed.
 CMAKE_PACKAGES: dict[str, set[str]] = {
     "GTest": {"gtest", "google-mock"},
@@ -119,6 +120,17 @@ def test_what_runs_is_listed_exactly() -> None:
     listed = _depends(ROOT, "depend", "exec_depend")
     assert needed - listed == set(), "add to package.xml"
     assert listed - needed - libraries == set(), "nothing needs these of package.xml"
+
+
+def test_the_door_opens_with_rosdep_and_apt_alone() -> None:
+    """Ubuntu 24.04 refuses pip outside of an environment (PEP 668): rosdep brings no such key there."""
+    kinds = ("depend", "build_depend", "build_export_depend", "buildtool_depend", "exec_depend")
+    packages = (ROOT, ROOT / "mauve_msgs")
+    keys = {key for package in packages for key in _depends(package, *kinds)}
+    assert {key for key in keys if key.endswith("-pip")} == set()
+    modules = _modules(PRODUCT) & MODULES.keys()
+    others = {module for module in modules if not MODULES[module][0].startswith("python3-")}
+    assert others - OPTIONAL == set(), "no package of Debian's and Ubuntu's"
 
 
 def test_what_builds_is_listed_exactly() -> None:
