@@ -6,7 +6,6 @@
 Exit status: 0 success, 1 failure, 2 bad input (one line on stderr, nothing started), 130 interrupted.
 """
 
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -37,11 +36,11 @@ class Interrupts:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo; returns its exit status."""
     interrupts = Interrupts()
-    # Robots that are nobody else's business: this machine only, unless the user says otherwise.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     # Imported here so that Ctrl-C while modules load is handled already.
     from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
+    from mauve_rt.node.discovery import limit_discovery  # noqa: PLC0415
 
+    limit_discovery()  # its children's too
     try:
         return _run(list(sys.argv[1:] if arguments is None else arguments), interrupts)
     except BadInputError as error:

@@ -8,11 +8,13 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr
 import sys
 import threading
 
+from mauve_rt.node.discovery import limit_discovery
 from mauve_rt.node.process import run_until_signalled
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
+    limit_discovery()
     return run_until_signalled(lambda stop: _work(arguments, stop))
 
 

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from mauve_rt.errors import ParameterError
+from mauve_rt.node.discovery import limit_discovery
 
 DISCOVERY_TIMEOUT_S = 10.0  # seen here: 0.1 to 2.8 s
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
@@ -116,7 +117,7 @@ def _interrupts_between_spins() -> Iterator[None]:
 @contextmanager
 def connected() -> Iterator[Client]:
     """A client on a ROS context of its own; this machine only, unless the environment says otherwise."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    limit_discovery()
     context = Context()
     with _interrupts_between_spins():
         rclpy.init(context=context, args=[])

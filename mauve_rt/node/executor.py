@@ -8,12 +8,12 @@
 Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.
 """
 
-import os
 import sys
 import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from mauve_rt.node.discovery import limit_discovery
 from mauve_rt.node.process import BAD_INPUT, FAILED, complain, leave_now, run_until_signalled
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
@@ -28,14 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     seen to hang.
     """
     words = list(sys.argv if arguments is None else arguments)
-    # Without DDS Security anyone who hears us may reconfigure us: this machine only, unless the user says
-    # otherwise.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    discovery = limit_discovery()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    leave_now(run_until_signalled(lambda stop: _work(words, stop)))
+    leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
 
 
-def _work(words: list[str], stop: threading.Event) -> int:
+def _work(words: list[str], stop: threading.Event, discovery: str) -> int:
     # Imported here so that a signal while modules load is handled already.
     from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
     from mauve_rt.node.executor_settings import Settings  # noqa: PLC0415
@@ -48,10 +46,12 @@ def _work(words: list[str], stop: threading.Event) -> int:
     except MauveError as error:
         complain(f"executor: {error}")
         return FAILED if error_code(error) == "realtime_denied" else BAD_INPUT
-    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop)
+    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop, discovery)
 
 
-def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event) -> int:
+def _with_ros(
+    words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str
+) -> int:
     import rclpy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
@@ -65,6 +65,8 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         complain(f"executor: {error}")
         try_shutdown()
         return BAD_INPUT
+    if discovery:
+        node.get_logger().info(discovery)
     status = FAILED
     try:
         status = _autostart(node, stop) if settings.autostart else 0

@@ -5,18 +5,17 @@
 Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr).
 """
 
-import os
 import sys
 import threading
 from collections.abc import Sequence
 
+from mauve_rt.node.discovery import limit_discovery
 from mauve_rt.node.process import run_until_signalled
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
-    # As the executor: this machine only, unless the user says otherwise.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    limit_discovery()
     return run_until_signalled(lambda stop: _work(arguments, stop))
 
 

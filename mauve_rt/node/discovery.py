@@ -1,0 +1,25 @@
+"""How far ROS discovery reaches: this machine, unless the environment says otherwise."""
+
+import os
+
+_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_BEYOND = ("SUBNET", "SYSTEM_DEFAULT")
+
+
+def limit_discovery() -> str:
+    """Stay on this machine unless the environment says how far to reach; returns what to tell, or nothing.
+
+    For each of our programs, at its start: `rclpy.init` reads what this sets, and no thread may be there that reads
+    the environment meanwhile. rcl takes an empty value for none, and lets ROS_LOCALHOST_ONLY=1 override all else.
+    """
+    if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
+        return ""
+    chosen = not os.environ.get(_RANGE)
+    if chosen:
+        os.environ[_RANGE] = "LOCALHOST"
+    reach = os.environ[_RANGE]
+    peers = os.environ.get("ROS_STATIC_PEERS") if reach != "OFF" else None
+    if reach in _BEYOND or peers:
+        where = f"{_RANGE}={reach}" + (f", ROS_STATIC_PEERS={peers}" if peers else "")
+        return f"discovery beyond this machine ({where}): without DDS Security anyone there can reconfigure"
+    return f"discovery on this machine only; {_RANGE} can widen it" if chosen else ""

@@ -1,0 +1,42 @@
+"""How far discovery reaches, as the environment says it."""
+
+import os
+
+import pytest
+
+from mauve_rt.node.discovery import limit_discovery
+
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+
+
+@pytest.mark.parametrize(
+    ("said", "reach", "told"),
+    [
+        ({}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
+        ({RANGE: ""}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
+        ({"ROS_LOCALHOST_ONLY": "0"}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
+        ({RANGE: "LOCALHOST"}, "LOCALHOST", ""),
+        ({RANGE: "OFF", "ROS_STATIC_PEERS": "10.0.0.7"}, "OFF", ""),
+        ({RANGE: "SUBNET"}, "SUBNET", f"discovery beyond this machine ({RANGE}=SUBNET): without DDS Security"),
+        ({RANGE: "SYSTEM_DEFAULT"}, "SYSTEM_DEFAULT", f"({RANGE}=SYSTEM_DEFAULT): without DDS Security"),
+        (
+            {"ROS_STATIC_PEERS": "10.0.0.7"},
+            "LOCALHOST",
+            f"discovery beyond this machine ({RANGE}=LOCALHOST, ROS_STATIC_PEERS=10.0.0.7)",
+        ),
+        ({"ROS_LOCALHOST_ONLY": "1", RANGE: "SUBNET"}, "SUBNET", ""),  # rcl lets the former override the latter
+        ({"ROS_LOCALHOST_ONLY": "1"}, None, ""),
+    ],
+)
+def test_what_the_environment_says_holds(
+    said: dict[str, str], reach: str | None, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in (RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(RANGE, "")  # so that what the call sets is undone
+    monkeypatch.delenv(RANGE)
+    for name, value in said.items():
+        monkeypatch.setenv(name, value)
+    answer = limit_discovery()
+    assert (told in answer) if told else answer == ""
+    assert os.environ.get(RANGE) == reach
