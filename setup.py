@@ -30,7 +30,6 @@ PYTHON_PACKAGES = ("mauve_rt", "mauve_examples", "mauve_msgs")
 LEFT_OUT = (
     "bin/mauve",  # an entry point instead, which knows its interpreter
     "share/*/environment/*",
-    "share/*/hook/*",
     "share/*/local_setup.*",
     "share/*/package.dsv",
     "share/ament_index/resource_index/parent_prefix_path/*",

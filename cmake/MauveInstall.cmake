@@ -4,8 +4,15 @@ mauve_install_python_package(mauve_rt)
 mauve_register_package(mauve_rt)
 install(FILES package.xml DESTINATION share/mauve_rt)
 install(DIRECTORY mauve_rt/launch DESTINATION share/mauve_rt PATTERN "__pycache__" EXCLUDE)
-# Named in colcon.pkg: a workspace's setup files then put this prefix on AMENT_PREFIX_PATH, as for any ament package.
-install(FILES cmake/ament_prefix_path.dsv cmake/ament_prefix_path.sh DESTINATION share/mauve_rt/hook)
+mauve_link_installed("${PROJECT_SOURCE_DIR}/mauve_rt/launch" share/mauve_rt/launch)
+# A workspace's setup files source these of every ament package, for each kind of shell: the prefix is put on
+# AMENT_PREFIX_PATH.
+foreach(shell dsv sh)
+  install(FILES cmake/local_setup.${shell} DESTINATION share/mauve_rt)
+endforeach()
+foreach(shell bash zsh)
+  install(FILES cmake/local_setup.sh DESTINATION share/mauve_rt RENAME local_setup.${shell})
+endforeach()
 
 mauve_install_program(executor mauve_rt.node.executor lib/mauve_rt)
 mauve_install_program(supervisor mauve_rt.node.supervisor lib/mauve_rt)

@@ -41,6 +41,7 @@ function(mauve_install_python_package package)
     PATTERN "__pycache__" EXCLUDE
     PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE
     PATTERN "maps" EXCLUDE PATTERN "architecture" EXCLUDE PATTERN "launch" EXCLUDE)
+  mauve_link_installed("${PROJECT_SOURCE_DIR}/${package}" "${PYTHON_INSTALL_DIR}/${package}")
 endfunction()
 
 # mauve_register_package(<name>): lets `ros2 run`, `ros2 pkg` and our own plug-in search find the package.
