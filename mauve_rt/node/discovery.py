@@ -9,8 +9,9 @@ _BEYOND = ("SUBNET", "SYSTEM_DEFAULT")
 def limit_discovery() -> str:
     """Stay on this machine unless the environment says how far to reach; returns what to tell, or nothing.
 
-    For each of our programs, at its start: `rclpy.init` reads what this sets, and no thread may be there that reads
-    the environment meanwhile. rcl takes an empty value for none, and lets ROS_LOCALHOST_ONLY=1 override all else.
+    For each of our programs, at its start: `rclpy.init` reads what this sets, and no thread may be there that
+    reads the environment meanwhile. rcl takes an empty value for none, and ROS_LOCALHOST_ONLY=1 is above all
+    others to it.
     """
     if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
         return ""

@@ -49,9 +49,7 @@ def _work(words: list[str], stop: threading.Event, discovery: str) -> int:
     return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop, discovery)
 
 
-def _with_ros(
-    words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str
-) -> int:
+def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str) -> int:
     import rclpy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415

@@ -7,24 +7,27 @@ import pytest
 from mauve_rt.node.discovery import limit_discovery
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+HERE = f"discovery on this machine only; {RANGE} can widen it"
+BEYOND = "discovery beyond this machine"
 
 
 @pytest.mark.parametrize(
     ("said", "reach", "told"),
     [
-        ({}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
-        ({RANGE: ""}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
-        ({"ROS_LOCALHOST_ONLY": "0"}, "LOCALHOST", f"discovery on this machine only; {RANGE} can widen it"),
+        ({}, "LOCALHOST", HERE),
+        ({RANGE: ""}, "LOCALHOST", HERE),
+        ({"ROS_LOCALHOST_ONLY": "0"}, "LOCALHOST", HERE),
         ({RANGE: "LOCALHOST"}, "LOCALHOST", ""),
         ({RANGE: "OFF", "ROS_STATIC_PEERS": "10.0.0.7"}, "OFF", ""),
-        ({RANGE: "SUBNET"}, "SUBNET", f"discovery beyond this machine ({RANGE}=SUBNET): without DDS Security"),
-        ({RANGE: "SYSTEM_DEFAULT"}, "SYSTEM_DEFAULT", f"({RANGE}=SYSTEM_DEFAULT): without DDS Security"),
+        ({RANGE: "SUBNET"}, "SUBNET", f"{BEYOND} ({RANGE}=SUBNET)"),
+        ({RANGE: "SYSTEM_DEFAULT"}, "SYSTEM_DEFAULT", f"{BEYOND} ({RANGE}=SYSTEM_DEFAULT)"),
         (
             {"ROS_STATIC_PEERS": "10.0.0.7"},
             "LOCALHOST",
-            f"discovery beyond this machine ({RANGE}=LOCALHOST, ROS_STATIC_PEERS=10.0.0.7)",
+            f"{BEYOND} ({RANGE}=LOCALHOST, ROS_STATIC_PEERS=10.0.0.7)",
         ),
-        ({"ROS_LOCALHOST_ONLY": "1", RANGE: "SUBNET"}, "SUBNET", ""),  # rcl lets the former override the latter
+        # To rcl this one is above all others.
+        ({"ROS_LOCALHOST_ONLY": "1", RANGE: "SUBNET"}, "SUBNET", ""),
         ({"ROS_LOCALHOST_ONLY": "1"}, None, ""),
     ],
 )

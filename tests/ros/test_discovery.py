@@ -44,7 +44,8 @@ rclpy.init(args=[])
 node = rclpy.create_node("observer", enable_rosout=False, start_parameter_services=False)
 while True:
     rclpy.spin_once(node, timeout_sec=0.1)
-    print(*(space.rstrip("/") + "/" + name for name, space in node.get_node_names_and_namespaces()), flush=True)
+    nodes = node.get_node_names_and_namespaces()
+    print(*(space.rstrip("/") + "/" + name for name, space in nodes), flush=True)
 """
 
 
@@ -53,7 +54,8 @@ def _running(
     folder: Path, words: Sequence[str], said: dict[str, str], *, wrapper: Sequence[str] = ()
 ) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     """A program in an environment that says of discovery only what is `said`, and what it prints."""
-    environment = {name: value for name, value in os.environ.items() if name not in {RANGE, "ROS_LOCALHOST_ONLY"}}
+    unsaid = {RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"}
+    environment = {name: value for name, value in os.environ.items() if name not in unsaid}
     log = folder / f"{time.monotonic_ns()}.log"
     with log.open("wb") as output:
         process = subprocess.Popen(
