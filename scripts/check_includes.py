@@ -12,6 +12,7 @@ Prints one line per offending line and exits 1 when there is one.
 
 from __future__ import annotations
 
+import argparse
 import ast
 import re
 import sys
@@ -122,8 +123,11 @@ def violations(root: Path) -> list[str]:
 
 def main() -> int:
     """Check the tree and return the exit status."""
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent.parent
-    found = violations(root)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("root", nargs="?", type=Path, default=Path(__file__).resolve().parent.parent)
+    found = violations(parser.parse_args().root)
     for line in found:
         sys.stdout.write(line + "\n")
     sys.stdout.write(f"{len(found)} forbidden includes and imports\n")

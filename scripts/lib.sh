@@ -7,11 +7,30 @@ MAUVE_BUILD="$MAUVE_ROOT/build"
 MAUVE_INSTALL="$MAUVE_ROOT/install"
 
 # Print the comment at the top of the running script.
-usage() { awk 'NR > 1 { if (!/^#/) exit; sub(/^# ?/, ""); print }' "$0"; }
+usage() {
+  local line
+  while IFS= read -r line && [[ $line == '#'* ]]; do
+    [[ $line == '#!'* ]] && continue
+    line=${line#'#'}
+    echo "${line# }"
+  done <"$0"
+}
 
-# Build what is not built yet (silent when all is up to date) and load the environment. Ends the script on failure.
+# Where --help is among the arguments, it is answered: before anything is built, and by the shell alone.
+help_if_asked() {
+  local argument
+  for argument; do
+    case $argument in
+      --help | -h) usage; exit 0 ;;
+      --) return 0 ;;
+    esac
+  done
+}
+
+# mauve_ready [SETUP OPTION...]: build what is not built yet (silent when all is up to date) and load the environment.
+# Ends the script on failure.
 mauve_ready() {
-  "$MAUVE_ROOT/scripts/setup" --quiet || exit $?
+  "$MAUVE_ROOT/scripts/setup" --quiet "$@" || exit $?
   mauve_environment
 }
 

@@ -11,6 +11,7 @@ setup.py, which may not change the environment it builds in, patches a copy: `pr
 
 from __future__ import annotations
 
+import argparse
 import re
 import shutil
 import sys
@@ -36,7 +37,10 @@ def patch(prefix: Path) -> int:
             before = path.read_text(encoding="utf-8")
             after = patched(before, prefix=str(prefix), include=include)
             if after != before:
-                path.write_text(after, encoding="utf-8")
+                # A new file in its place: the old one may be linked to the installer's cache.
+                new = path.with_name(f"{path.name}.new")
+                new.write_text(after, encoding="utf-8")
+                new.replace(path)
                 changed += 1
     return changed
 
@@ -62,6 +66,9 @@ def private_prefix(wheels: Path, prefix: Path) -> None:
 
 def main() -> int:
     """Patch the environment of the running interpreter and say how many files changed."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     prefix = Path(sys.prefix)
     if not (prefix / "pyvenv.cfg").is_file():
         sys.stderr.write(f"patch_wheels: {prefix} is no virtual environment; use its own python\n")
