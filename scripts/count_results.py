@@ -45,7 +45,9 @@ def print_skipped(path: Path) -> None:
 
 def main() -> int:
     """Count, print, and return the exit status."""
-    parser = argparse.ArgumentParser(description="Add up the JUnit files of a test run.")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--failed-stages", type=int, default=0)
     parser.add_argument("--skipped", action="store_true")
     parser.add_argument("path", type=Path)

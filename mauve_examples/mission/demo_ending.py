@@ -1,5 +1,6 @@
 """The last words of a demo: what happened, what it cost, where to read more."""
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from mauve_examples.mission.evidence import read_robot, replay_coverage
 from mauve_examples.mission.facts import MissionArea, MissionFacts
 from mauve_examples.mission.summary import SUMMARY, build_summary, write_summary
+from mauve_rt.model.ament_index import share_folder
 from mauve_rt.trace import TraceError
 
 
@@ -50,6 +52,21 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
     report = out / "report.html"
     yield f"Report: {report if report.exists() else 'none, the mission was interrupted'}"
     yield f"Figures: {out / 'summary.json'}   traces: {out / 'bag'}"
+    yield from _closer_look(out / "bag")
+
+
+def _closer_look(bags: Path) -> Iterator[str]:
+    """Commands that work in the shell the demo was started from, which knows nothing of this installation."""
+    robots = sorted(folder for folder in bags.iterdir() if folder.is_dir()) if bags.is_dir() else []
+    if not robots:
+        return
+    yield "To look closer:"
+    share = share_folder("mauve_examples")
+    setup = share.parents[1] / "setup.bash" if share else None
+    if setup and setup.is_file():
+        yield f"  source {shlex.quote(str(setup))}"
+    yield f"  mauve report {shlex.quote(str(bags))}"
+    yield f"  mauve trace stats {shlex.quote(str(robots[0]))}"
 
 
 def _swap(swap: dict[str, Any]) -> str:

@@ -4,17 +4,20 @@ import argparse
 import sys
 from pathlib import Path
 
+from mauve_rt.cli.bag_arguments import all_bags
 from mauve_rt.cli.verb import BAD_USAGE, OK
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("bag", nargs="+", type=Path, help="bags of one run: rosbag2 folders or MCAP files")
+    parser.add_argument(
+        "bag", nargs="+", type=Path, help="bags of one run: rosbag2 folders, folders of such, or MCAP files"
+    )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE.html",
-        help="the page (default: report.html inside the first bag's folder, or beside its file)",
+        help="the page (default: report.html inside the first folder named, or beside its file)",
     )
     parser.add_argument("--title", default="", help="of the page (default: the bags' names)")
 
@@ -26,8 +29,9 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.trace.report import write_report  # noqa: PLC0415
     from mauve_rt.trace.report.bags import bag_names, open_bags  # noqa: PLC0415
 
-    bags: list[Path] = args.bag
-    out = args.out or (bags[0] if bags[0].is_dir() else bags[0].parent) / "report.html"
+    first: Path = args.bag[0]
+    out = args.out or (first if first.is_dir() else first.parent) / "report.html"
+    bags = all_bags(args.bag)
     title = args.title or f"Trace of {', '.join(bag_names(bags))}"
     try:
         with shown() as progress:

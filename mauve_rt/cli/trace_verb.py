@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mauve_rt.trace
+from mauve_rt.cli.bag_arguments import all_bags, one_bag
 from mauve_rt.cli.verb import OK, REFUSED, Verb
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part
@@ -30,7 +31,7 @@ def main(args: argparse.Namespace) -> int:
 
 def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "bags", nargs="+", type=Path, metavar="BAG", help="folder of a bag; several are merged"
+        "bags", nargs="+", type=Path, metavar="BAG", help="folder of a bag or of several; several are merged"
     )
     parser.add_argument(
         "--format",
@@ -47,9 +48,10 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
 def _export(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415 - only this verb draws, and pandas is slow to load
 
-    name = args.bags[0].resolve().name if len(args.bags) == 1 else "traces"
+    bags = all_bags(args.bags)
+    name = bags[0].resolve().name if len(bags) == 1 else "traces"
     with shown() as progress:
-        traces = _open(args.bags, part(progress, 0.0, 0.5))
+        traces = _open(bags, part(progress, 0.0, 0.5))
         writing = part(progress, 0.5, 1.0)
         if args.format == "csv":
             from mauve_rt.trace.export_csv import export_csv  # noqa: PLC0415
@@ -97,7 +99,7 @@ def _info(args: argparse.Namespace) -> int:
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
 
     with shown() as progress:
-        trace = mauve_rt.trace.open(args.bag, progress=progress)
+        trace = mauve_rt.trace.open(one_bag(args.bag), progress=progress)
     values = info_values(trace)
     if args.json:
         print_json(values)
@@ -110,15 +112,16 @@ def _check(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
     from mauve_rt.trace.check import check_bag  # noqa: PLC0415
 
+    bag = one_bag(args.bag)
     with shown() as progress:
-        findings = check_bag(args.bag, progress=progress)
+        findings = check_bag(bag, progress=progress)
     for finding in findings:
         print(f"{'damage' if finding.is_damage else 'loss' if finding.is_loss else 'note'}: {finding.text}")
     bad = [finding for finding in findings if finding.is_damage or finding.is_loss]
     if not bad:
-        print(f"{args.bag}: whole, nothing is missing")
+        print(f"{bag}: whole, nothing is missing")
     elif any(finding.is_damage for finding in bad):
-        print(f"`mauve trace repair {args.bag}` makes a bag of it that every reader opens")
+        print(f"`mauve trace repair {bag}` makes a bag of it that every reader opens")
     return REFUSED if bad else OK
 
 
@@ -126,11 +129,12 @@ def _repair(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
     from mauve_rt.trace.bag_repair import examine_bag, repair_bag  # noqa: PLC0415
 
+    bag = one_bag(args.bag)
     with shown() as progress:
-        state = examine_bag(args.bag, progress=progress)
+        state = examine_bag(bag, progress=progress)
         repair_bag(state)
     if state.is_finished:
-        print(f"{args.bag}: nothing to repair")
+        print(f"{bag}: nothing to repair")
     for damage in state.damages():
         print(f"repaired: {damage}")
     return OK
@@ -145,7 +149,7 @@ def _stats(args: argparse.Namespace) -> int:
     from mauve_rt.trace.statistics import all_statistics  # noqa: PLC0415
 
     with shown() as progress:
-        trace = mauve_rt.trace.open(args.bag, progress=part(progress, 0.0, 0.5))
+        trace = mauve_rt.trace.open(one_bag(args.bag), progress=part(progress, 0.0, 0.5))
         statistics = all_statistics(trace, progress=part(progress, 0.5, 1.0))
     if args.json:
         print_json({name: statistics_values(one) for name, one in statistics.items()})

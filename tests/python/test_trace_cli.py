@@ -137,3 +137,42 @@ def test_what_is_no_bag(verb: str, tmp_path: Path, capsys: pytest.CaptureFixture
     (tmp_path / "x.mcap").write_bytes(b"something else")
     assert main(["trace", verb, str(tmp_path / "x.mcap")]) == 2
     assert "x.mcap: not an MCAP file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["info", "check", "repair", "stats"])
+def test_of_a_folder_of_bags_one_is_to_be_named(
+    verb: str, source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    first = record(source, tmp_path / "bag" / "robot_1")
+    assert main(["trace", verb, str(tmp_path / "bag")]) == 0
+    alone = capsys.readouterr().out
+    assert main(["trace", verb, first]) == 0
+    assert capsys.readouterr().out == alone
+    second = record(source, tmp_path / "bag" / "robot_2")
+    assert main(["trace", verb, str(tmp_path / "bag")]) == 2
+    error = capsys.readouterr().err
+    assert f"expected one bag, found a folder of 2; name one of {first}, {second}" in error
+
+
+def test_export_takes_a_folder_of_bags(source: SyntheticSource, tmp_path: Path):
+    for robot in ("robot_1", "robot_2"):
+        record(source, tmp_path / "bag" / robot)
+    out = tmp_path / "all.pftrace"
+    assert main(["trace", "export", str(tmp_path / "bag"), "--out", str(out)]) == 0
+    one = tmp_path / "one.pftrace"
+    assert main(["trace", "export", str(tmp_path / "bag" / "robot_1"), "--out", str(one)]) == 0
+    assert all(name in out.read_bytes() for name in (b"robot_1", b"robot_2"))
+    assert b"robot_2" not in one.read_bytes()
+
+
+def test_report_takes_a_folder_of_bags(
+    source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    for robot in ("robot_1", "robot_2"):
+        record(source, tmp_path / "bag" / robot)
+    assert main(["report", str(tmp_path / "bag")]) == 0
+    page = tmp_path / "bag" / "report.html"
+    assert capsys.readouterr().out.startswith(str(page))
+    text = page.read_text(encoding="utf-8")
+    assert "Trace of robot_1, robot_2" in text
+    assert "robot_2/control" in text

@@ -1,6 +1,8 @@
 """The demo in simulated time: the results of the real one, faster, and the same bits for equal seeds."""
 
 import json
+import os
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +66,20 @@ def test_it_succeeds_without_any_process_of_its_own(mission: Demo):
     assert "SUCCESS." in text
     assert "   4.0 s  the radio link is LOST" in text
     assert "   8.0 s  the radio link is back" in text
+
+
+def test_its_last_words_work_in_the_shell_it_was_started_from(mission: Demo):
+    """One that nothing was sourced in, as after scripts/demo."""
+    first = mission.lines.index("To look closer:")
+    commands = "\n".join(["set -e", *mission.lines[first + 1 :]])
+    bare = {"PATH": os.defpath, "HOME": str(mission.out.parent)}
+    done = subprocess.run(
+        ["bash", "-c", commands], env=bare, capture_output=True, text=True, check=False, cwd="/"
+    )
+    assert done.returncode == 0, commands + done.stderr
+    page = (mission.out / "bag" / "report.html").read_text(encoding="utf-8")
+    assert all(f"{robot}/exploration" in page for robot in ROBOTS)
+    assert "exploration" in done.stdout
 
 
 def test_both_robots_swap_there_and_back_and_miss_nothing(mission: Demo):

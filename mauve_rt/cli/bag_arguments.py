@@ -1,0 +1,32 @@
+"""Bags as they are named on a command line: also by the folder that holds those of a run, one per robot."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from mauve_rt.trace.errors import TraceError
+
+
+def bags_in(path: Path) -> list[Path]:
+    """Return the bags right below a folder that is none itself, by name; where there are none, the path."""
+    if not path.is_dir() or any(path.glob("*.mcap")):
+        return [path]
+    return sorted({file.parent for file in path.glob("*/*.mcap")}) or [path]
+
+
+def all_bags(paths: Iterable[Path]) -> list[Path]:
+    """Return every bag that is meant, for a verb that takes several."""
+    return [bag for path in paths for bag in bags_in(path)]
+
+
+def one_bag(path: Path) -> Path:
+    """Return the bag that is meant, for a verb that takes one.
+
+    Raises:
+        TraceError: the folder holds several.
+
+    """
+    bags = bags_in(path)
+    if len(bags) > 1:
+        found = ", ".join(map(str, bags))
+        raise TraceError(f"bag {path}: expected one bag, found a folder of {len(bags)}; name one of {found}")
+    return bags[0]
