@@ -18,24 +18,30 @@ stop_progress() {
   clear_line
 }
 
+# say_in_line TEXT: on a terminal in its last line, as much as fits, to be replaced by the next; elsewhere as a line.
+say_in_line() {
+  if [[ ! -t 2 ]]; then
+    echo "$1" >&2
+    return
+  fi
+  local columns
+  columns=$(stty size <&2 2>/dev/null | cut -d' ' -f2)
+  ((columns > 1)) || columns=80
+  printf '\r\e[K%.*s' "$((columns - 1))" "$1" >&2
+}
+
 # What stands in the terminal's last line is not needed any more.
 clear_line() { if [[ -t 2 ]]; then printf '\r\e[K' >&2; fi; }
 
 # Ends with the script that started it, even when that is killed.
 tell_progress() {
-  local label=$1 log=$2 after=${3:-0} start=$SECONDS due elapsed columns
-  due=$((after > PROGRESS_EVERY_S ? after : PROGRESS_EVERY_S))
+  local label=$1 log=$2 due=${3:-1} every=1 start=$SECONDS elapsed
+  if [[ ! -t 2 ]]; then every=$PROGRESS_EVERY_S due=$((due > every ? due : every)); fi
   while sleep 1 2>/dev/null && kill -0 "$$" 2>/dev/null; do
     elapsed=$((SECONDS - start))
-    if [[ -t 2 ]]; then
-      ((elapsed >= after)) || continue
-      columns=$(stty size <&2 2>/dev/null | cut -d' ' -f2)
-      ((columns > 1)) || columns=80
-      printf '\r\e[K%.*s' "$((columns - 1))" "$label ... $elapsed s  $(doing "$log")" >&2
-    elif ((elapsed >= due)); then
-      due=$((due + PROGRESS_EVERY_S))
-      echo "$label ... $elapsed s  $(doing "$log")" >&2
-    fi
+    ((elapsed >= due)) || continue
+    due=$((due + every))
+    say_in_line "$label ... $elapsed s  $(doing "$log")"
   done
 }
 

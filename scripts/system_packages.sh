@@ -29,8 +29,9 @@ ensure_system_packages() {
   mapfile -t missing < <(missing_system_packages)
   ((${#missing[@]})) || return 0
   command -v apt-get >/dev/null || cannot_install "there is no apt-get here" "${missing[@]}"
+  echo "setup: system packages that are missing: ${missing[*]}" >&2
   get_root "${missing[@]}"
-  step "system packages: ${missing[*]}" apt_install "${missing[@]}"
+  step "system packages" apt_install "${missing[@]}"
 }
 
 # Set `as_root` to what runs a command as root. Where sudo wants a password, it asks for it on the terminal.
@@ -41,7 +42,7 @@ get_root() {
   command -v sudo >/dev/null || cannot_install "you are not root, and there is no sudo" "$@"
   sudo -n true 2>/dev/null && return 0
   [[ -t 0 ]] || cannot_install "sudo wants a password, and there is no terminal to ask for it" "$@"
-  echo "setup: sudo asks for your password, to install these system packages: $*" >&2
+  echo "setup: sudo asks for your password, to install them" >&2
   sudo -v || cannot_install "sudo did not let you" "$@"
 }
 
