@@ -7,8 +7,8 @@ from typing import Any
 
 from mauve_examples.mission.evidence import read_robot, replay_coverage
 from mauve_examples.mission.facts import MissionArea, MissionFacts
+from mauve_examples.mission.hints import sourcing
 from mauve_examples.mission.summary import SUMMARY, build_summary, write_summary
-from mauve_rt.model.ament_index import share_folder
 from mauve_rt.trace import TraceError
 
 
@@ -56,17 +56,12 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
 
 
 def _closer_look(bags: Path) -> Iterator[str]:
-    """Commands that work in the shell the demo was started from, which knows nothing of this installation."""
     robots = sorted(folder for folder in bags.iterdir() if folder.is_dir()) if bags.is_dir() else []
     if not robots:
         return
     yield "To look closer:"
-    share = share_folder("mauve_examples")
-    setup = share.parents[1] / "setup.bash" if share else None
-    if setup and setup.is_file():
-        yield f"  source {shlex.quote(str(setup))}"
-    yield f"  mauve report {shlex.quote(str(bags))}"
-    yield f"  mauve trace stats {shlex.quote(str(robots[0]))}"
+    verbs = (f"mauve report {shlex.quote(str(bags))}", f"mauve trace stats {shlex.quote(str(robots[0]))}")
+    yield from (f"  {command}" for command in (*sourcing(), *verbs))
 
 
 def _swap(swap: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ from mauve_examples.mission.demo_lock import MissionLock, busy
 from mauve_examples.mission.demo_mission import Mission
 from mauve_examples.mission.demo_monitor import Hooks, MissionMonitor
 from mauve_examples.mission.demo_options import Options
+from mauve_examples.mission.hints import sourcing
 from mauve_examples.mission.processes import Processes
 from mauve_examples.mission.progress import Progress
 
@@ -20,7 +21,8 @@ LAST_WORDS_S = 0.2
 PATIENCE_S = 10.0
 HURRIED_PATIENCE_S = 2.5
 RECORDED = ("supervisor/decisions:mauve_msgs/msg/SupervisorDecision", "/radio/link:std_msgs/msg/Bool")
-LOOK_IN = "To look into a robot from another terminal: mauve list /robot_1/executor"
+LOOK_IN = "All have met. To look into a robot from another terminal:"
+LIST = "mauve list /robot_1/executor"
 NO_REALTIME = "Real-time rights are missing: what the robots do may come late. More about it at the end."
 
 
@@ -61,7 +63,7 @@ class MissionRun(Mission):
             nodes = self._start_processes(self._processes)
             self._wait_until_ready(monitor, self._processes, nodes)
             if not self._interrupted():
-                self._progress.say("All have met. " + LOOK_IN)
+                self._progress.say(f"{LOOK_IN} {' && '.join([*sourcing(), LIST])}")
                 if not all(robot.realtime_granted for robot in self.story.robots.values()):
                     self._progress.say(NO_REALTIME)
                 self._started_ns = time.monotonic_ns()

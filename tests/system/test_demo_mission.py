@@ -1,14 +1,16 @@
 """The demo, shortened: what it says, what it writes, and that both agree with the bags."""
 
 import json
+import os
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 from bag_reading import messages, topics
 from bag_rules import assert_rosbag2_reads
-from demo_harness import Demo, Starter
+from demo_harness import DOMAIN, Demo, Starter
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
 ROBOTS = ("robot_1", "robot_2")
@@ -143,6 +145,17 @@ def test_one_robot_needs_no_radio(start: Starter):
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     assert set(summary["coverage"]) == {"robot_1", "union"}
     assert summary["robots"]["robot_1"]["reconfigurations"] == []
+
+
+def test_the_command_it_offers_works_in_another_terminal(start: Starter):
+    """One that nothing was sourced in."""
+    demo = start("--robots", "1", "--duration", "60", "--map", "room")
+    command = demo.wait_for("from another terminal: ").partition("terminal: ")[2]
+    bare = {"PATH": os.defpath, "HOME": str(demo.out.parent), "ROS_DOMAIN_ID": str(DOMAIN)}
+    done = subprocess.run(["bash", "-c", command], env=bare, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, command + done.stderr
+    assert "mauve_examples/Exploration" in done.stdout
+    assert demo.interrupt() == 130
 
 
 def shared_map(name: str) -> Path:
