@@ -1,5 +1,5 @@
 # The Python packages in .venv, ROS 2's wheels among them: sourced by scripts/setup, never run.
-# shellcheck shell=bash disable=SC2154 # with_tests, with_lint: what scripts/setup was asked for
+# shellcheck shell=bash disable=SC2154 # with_...: what scripts/setup was asked for
 
 readonly MIN_PYTHON="3.11"
 
@@ -58,7 +58,7 @@ has_python_packages() {
 
 ensure_python_packages() {
   ensure_python_set base
-  if $with_tests; then ensure_python_set tests; fi
+  if $with_tests || $with_benchmarks; then ensure_python_set tests; fi # benchmarks read bags as others do
   if $with_lint; then ensure_python_set lint; fi
 }
 

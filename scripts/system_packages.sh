@@ -1,5 +1,5 @@
 # The system's packages that building needs, and how they are installed: sourced by scripts/setup, never run.
-# shellcheck shell=bash disable=SC2154 # with_tests, with_lint: what scripts/setup was asked for
+# shellcheck shell=bash disable=SC2154 # with_lint: what scripts/setup was asked for
 
 readonly APT_PATIENCE_S=600
 
