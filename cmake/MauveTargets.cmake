@@ -41,7 +41,7 @@ function(mauve_add_programs)
       if(NOT MAUVE_SANITIZE)
         target_compile_options(${name} PRIVATE -O1 -g1) # compiled in little more than half the time of -O2 -g
       endif()
-      gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES TIMEOUT 120)
+      gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES TIMEOUT 600)
     endif()
   endforeach()
 endfunction()

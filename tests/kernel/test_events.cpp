@@ -190,7 +190,8 @@ TEST_F(EventsFixture, ListenersMayEndOnceTheyAreTakenAway) {
     for (int i = 0; i < 100; ++i) {
       auto mortal = std::make_unique<Mortal>();
       event.listen(*mortal);
-      while (mortal->calls == 0) std::this_thread::yield();
+      Backoff backoff;
+      while (mortal->calls == 0) backoff();
       event.unlisten(*mortal);
     }
   };

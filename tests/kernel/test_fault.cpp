@@ -111,7 +111,8 @@ struct BoundedFsm : TestFsm {
 
 TEST_F(Rule11Faults, AStateOverItsDeclaredTimeIsCaughtByTheWatchdog) {
   auto& out = architecture.add_resource<SharedData<Number>>("out");
-  Component& component = architecture.add_component<TestShell, TestCore, BoundedFsm>("c");
+  Component& component =
+      architecture.add_component<TestShell, TestCore, BoundedFsm>("c", {.cpus = {kComponentsCpu}});
   architecture.connect("c", "output", "out", "write");
   TestCore& runaway = core(component);
   std::atomic<bool> go_on{false};

@@ -75,18 +75,25 @@ TEST_F(RingFixture, NoElementIsLostOrGivenTwiceBetweenThreads) {
   std::atomic<bool> done{false};
   std::vector<double> taken[2];
   const auto take = [&](TestShell& shell, std::vector<double>& into) {
+    Backoff backoff;
     for (;;) {
       const bool last_round = done;
       const Sample<Number> sample = shell.input.read();
-      if (sample.is_new()) into.push_back(sample.value.value);
-      if (!sample.is_new() && last_round) return;
-      if (!sample.is_new()) std::this_thread::yield();
+      if (sample.is_new()) {
+        into.push_back(sample.value.value);
+        backoff = {};
+      } else if (last_round) {
+        return;
+      } else {
+        backoff();
+      }
     }
   };
   std::thread one([&] { take(first, taken[0]); });
   std::thread two([&] { take(second, taken[1]); });
   for (int i = 0; i < kElements; ++i) {
-    while (!writer.output.write({static_cast<double>(i)})) std::this_thread::yield();
+    Backoff backoff;
+    while (!writer.output.write({static_cast<double>(i)})) backoff();
   }
   done = true;
   one.join();

@@ -214,13 +214,15 @@ TEST_F(Rule11FallbackThreads, IsPutInByTheComponentsOwnThread) {
 
 TEST_F(Rule11FallbackThreads, ComesAfterTheWatchdogToo) {
   auto& out = architecture.add_resource<SharedData<Number>>("out");
-  Component& component = add_free(architecture, "c", [](FreeFsm& fsm) {
-    State& run = fsm.run("Run", ms_to_ns(20));
-    State& pause = fsm.wait("Pause", ms_to_ns(5));
-    fsm.set_initial(run);
-    fsm.next(run, pause);
-    fsm.next(pause, run);
-  });
+  Component& component = add_free(architecture, "c",
+                                  [](FreeFsm& fsm) {
+                                    State& run = fsm.run("Run", ms_to_ns(20));
+                                    State& pause = fsm.wait("Pause", ms_to_ns(5));
+                                    fsm.set_initial(run);
+                                    fsm.next(run, pause);
+                                    fsm.next(pause, run);
+                                  },
+                                  {.cpus = {kComponentsCpu}});
   architecture.connect("c", "output", "out", "write");
   std::atomic<bool> go_on{false};
   core(component).work = [&, &own = core(component)] {

@@ -120,7 +120,7 @@ using Rule7Threads = Deployed;
 
 TEST_F(Rule7Threads, WhoWaitsForALongExecutionOfAnotherMissesNoRelease) {
   Component& fast = add("fast", 2, {.priority = 60, .cpus = {0}, .trace_records = std::size_t{1} << 15U});
-  Component& slow = add("slow", 20, {.priority = 40, .cpus = {}});
+  Component& slow = add("slow", 20, {.priority = 40});
   std::atomic<bool> go_on{true};
   const ComponentsEndFirst guard(deployer);
   core(slow).work = [&] {

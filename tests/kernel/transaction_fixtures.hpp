@@ -107,7 +107,7 @@ class Transacted : public ::testing::Test {
 
   Component& add(const std::string& name, std::int64_t period_ms = 2, const TaskSettings& settings = {}) {
     TaskSettings pinned = settings;
-    pinned.cpus = {0};
+    pinned.cpus = {kComponentsCpu};
     pinned.trace_records = std::size_t{1} << 15U;
     Component& component = architecture.add_component(name, "t/Shell", "t/Core", "t/Fsm", pinned);
     component.allow({"t/Counting", "t/Refusing", "t/Throwing", "t/Unready"}, true);
@@ -116,7 +116,7 @@ class Transacted : public ::testing::Test {
   }
   static ComponentParts parts(std::int64_t period_ms = 2, const std::string& core = "t/Core") {
     ComponentParts parts{.shell = "t/Shell", .core = core, .fsm = "t/Fsm"};
-    parts.settings.cpus = {0};
+    parts.settings.cpus = {kComponentsCpu};
     parts.properties["period_ms"] = period_ms;
     parts.alternatives = {"t/Counting"};
     return parts;
@@ -165,6 +165,7 @@ class Transacted : public ::testing::Test {
     wait_until([&] { return runs(name) > before + 1; }, name.c_str());
   }
 
+  AwayFromComponents away;
   PluginRegistry registry;
   Architecture architecture{&registry};
   Deployer deployer{architecture};
