@@ -11,23 +11,32 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from mauve_rt.node.process import leave_now
+
 SUCCESS, FAILURE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 class Interrupts:
-    """Ctrl-C and its kin: the first asks the demo to end what it does, the next one breaks it off."""
+    """Ctrl-C and its kin: the first asks the demo to end what it has begun, the next one breaks it off."""
 
     def __init__(self) -> None:
         self._asked = False
+        self._begun = False
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # else: nohup
                 signal.signal(number, self._on_signal)
+
+    def begin(self) -> None:
+        """From here on there is something to end in order; one that comes before ends all at once."""
+        self._begun = True
 
     def asked(self) -> bool:
         """Whether the user wants it to end."""
         return self._asked
 
     def _on_signal(self, _number: int, _frame: Any) -> None:
+        if not self._begun:
+            leave_now(INTERRUPTED)
         if self._asked:
             raise KeyboardInterrupt
         self._asked = True
@@ -72,6 +81,7 @@ def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
 
+    interrupts.begin()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         with open_progress() as progress:
@@ -86,6 +96,7 @@ def _simulate(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from mauve_examples.mission.demo_simulated import SimulatedMission  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
 
+    interrupts.begin()
     with open_progress() as progress:
         mission = SimulatedMission(options, world, progress=progress, interrupted=interrupts.asked)
         mission.run()

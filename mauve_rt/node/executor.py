@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from mauve_rt.node.discovery import limit_discovery
-from mauve_rt.node.process import BAD_INPUT, FAILED, complain, leave_now, run_until_signalled
+from mauve_rt.node.process import BAD_INPUT, FAILED, Stop, complain, leave_now, run_until_signalled
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
 _SPIN_S = 0.2  # how long a stop may go unnoticed
@@ -33,11 +33,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
 
 
-def _work(words: list[str], stop: threading.Event, discovery: str) -> int:
-    # Imported here so that a signal while modules load is handled already.
+def _work(words: list[str], stop: Stop, discovery: str) -> int:
+    # Imported here so that a signal while modules load is handled; what takes long comes before begin().
+    import mauve_rt.node.executor_node  # noqa: F401, PLC0415
     from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
     from mauve_rt.node.executor_settings import Settings  # noqa: PLC0415
 
+    stop.begin()
     try:
         settings = Settings.of(words)
         runtime = settings.runtime()

@@ -14,16 +14,38 @@ FAILED = 1
 BAD_INPUT = 2
 
 
-def run_until_signalled(work: Callable[[threading.Event], int]) -> int:
+class Stop(threading.Event):
+    """Set by a signal. The work says when it begins what must be ended in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lock = threading.Lock()
+        self._begun = False
+
+    def begin(self) -> None:
+        """From here on a signal waits for the work to end itself; does not return where one came before."""
+        with self._lock:
+            self._begun = True
+
+    def ask(self) -> None:
+        """Set it, or end the process with status 0 where nothing has begun."""
+        with self._lock:  # kept to the end: nothing begins any more
+            if not self._begun:
+                leave_now(0)
+        self.set()
+
+
+def run_until_signalled(work: Callable[[Stop], int]) -> int:
     """Run `work(stop)` on a thread of its own and return its exit status; SIGINT and SIGTERM set `stop`.
 
     Every thread blocks both signals and the main one waits for them: none is lost, none is late, whatever the
-    work is doing. Work that has not returned 2.7 s after a signal ends with the process, with status 1 and
-    the stack of every thread on stderr. For the main thread.
+    work is doing. One before `stop.begin()`, while modules load, ends the process at once, with status 0.
+    Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of
+    every thread on stderr. For the main thread.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     main_thread = threading.get_ident()
-    stop = threading.Event()
+    stop = Stop()
     done = threading.Event()
     status = FAILED
 
@@ -39,7 +61,7 @@ def run_until_signalled(work: Callable[[threading.Event], int]) -> int:
     worker.start()
     signal.sigwait(_SIGNALS)
     if not done.is_set():
-        stop.set()
+        stop.ask()
         faulthandler.dump_traceback_later(_GRACE_S, exit=True)
     worker.join()
     return status

@@ -6,11 +6,10 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr).
 """
 
 import sys
-import threading
 from collections.abc import Sequence
 
 from mauve_rt.node.discovery import limit_discovery
-from mauve_rt.node.process import run_until_signalled
+from mauve_rt.node.process import Stop, run_until_signalled
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,11 +18,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_until_signalled(lambda stop: _work(arguments, stop))
 
 
-def _work(arguments: Sequence[str] | None, stop: threading.Event) -> int:
+def _work(arguments: Sequence[str] | None, stop: Stop) -> int:
     # Imported here: a signal while modules load is handled already, and threads they start block signals too.
     from mauve_rt.node.supervisor_node import run_node  # noqa: PLC0415
 
-    return 0 if stop.is_set() else run_node(arguments, stop)
+    stop.begin()
+    return run_node(arguments, stop)
 
 
 if __name__ == "__main__":

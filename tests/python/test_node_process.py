@@ -1,0 +1,52 @@
+"""How a node's process ends on a signal: at once while it loads, in order later, by force where it hangs."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+BODY = """\
+import threading
+from mauve_rt.node.process import leave_now, run_until_signalled
+
+def work(stop):
+    {work}
+
+leave_now(run_until_signalled(work))
+"""
+LOADS_FOR_GOOD = "print('ready', flush=True); threading.Event().wait()"
+ENDS_IN_ORDER = "stop.begin(); print('ready', flush=True); stop.wait(); print('sealed'); return 0"
+HANGS = "stop.begin(); print('ready', flush=True); threading.Event().wait()"
+
+
+def end(work: str, number: signal.Signals) -> tuple[int, str, str]:
+    """Status, later output and errors of a process that was signalled when it said that it was ready."""
+    with subprocess.Popen(
+        [sys.executable, "-c", BODY.format(work=work)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(number)
+        output, errors = process.communicate()
+        return process.returncode, output, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_while_it_loads_it_is_gone_at_once(number: signal.Signals):
+    assert end(LOADS_FOR_GOOD, number) == (0, "", "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_has_begun_is_ended_in_order(number: signal.Signals):
+    assert end(ENDS_IN_ORDER, number) == (0, "sealed\n", "")
+
+
+def test_what_hangs_is_ended_by_force_and_told():
+    status, output, errors = end(HANGS, signal.SIGINT)
+    assert (status, output) == (1, "")
+    assert errors.startswith("Timeout (0:00:02.7")
+    assert "in work" in errors
