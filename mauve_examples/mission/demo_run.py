@@ -14,7 +14,7 @@ from mauve_examples.mission.hints import sourcing
 from mauve_examples.mission.processes import Processes
 from mauve_examples.mission.progress import Progress
 
-READY_TIMEOUT_S = 15.0
+READY_TIMEOUT_S = 60.0  # five processes load; one that ends is noticed at once
 LOOK_AROUND_S = 0.5
 STEP_S = 0.05
 LAST_WORDS_S = 0.2
