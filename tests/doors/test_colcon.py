@@ -8,7 +8,17 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from doors import ALL_JOBS, CHEAP_BUILD, NINJA, ROOT, copy_sources, installed_executor, run, shell_without
+from doors import (
+    ALL_JOBS,
+    CHEAP_BUILD,
+    NINJA,
+    ROOT,
+    build,
+    copy_sources,
+    installed_executor,
+    run,
+    shell_without,
+)
 
 from mauve_rt import _kernel
 
@@ -58,7 +68,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (workspace / "src" / "a_listener" / name).write_text(text, encoding="utf-8")
     options = {"names": {"mauve_rt": {"cmake-args": CHEAP_BUILD}}}
     (workspace / "colcon.meta").write_text(json.dumps(options), encoding="utf-8")
-    run("colcon", "build", "--symlink-install", cwd=workspace, environment=SHELL)
+    build("colcon", "build", "--symlink-install", cwd=workspace, environment=SHELL)
     return workspace
 
 

