@@ -120,7 +120,7 @@ def deployed(text: str, folder: Path) -> Iterator[Deployer]:
 
 def wait_until(condition: Callable[[], bool]) -> None:
     """Wait until the condition holds; gives up after 10 s."""
-    until = time.monotonic() + 10
+    until = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < until, "it does not come to it"
         time.sleep(0.002)

@@ -14,7 +14,7 @@ from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.trace.records import Kind
 
-PATIENCE_S = 20.0
+PATIENCE_S = 100.0
 FILE = """\
 mauve: 1
 executor: {namespace: /robot_1}

@@ -40,7 +40,7 @@ def architecture(plugin_prefix: Path) -> Iterator[Architecture]:
     architecture.configure()
     deployer = Deployer(architecture)
     deployer.deploy()
-    until = time.monotonic() + 10
+    until = time.monotonic() + 60
     while min(part.releases for part in architecture.components()) < 10:
         assert time.monotonic() < until
         time.sleep(0.01)

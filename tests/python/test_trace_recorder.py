@@ -54,7 +54,7 @@ def recorder(tmp_path: Path, source: SyntheticSource, errors: list[str]) -> Iter
     made.stop()
 
 
-def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+def wait_until(condition: Callable[[], object], timeout_s: float = 60.0) -> None:
     end_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end_s, "waited in vain"

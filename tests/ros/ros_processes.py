@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-PATIENCE_S = 20.0
+PATIENCE_S = 100.0
 
 
 def wait_for_signals(process_id: int) -> None:

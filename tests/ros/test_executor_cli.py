@@ -5,11 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from ros_processes import PATIENCE_S
 
 Mauve = Callable[..., subprocess.CompletedProcess[str]]
 STEPS = """\
@@ -35,7 +37,7 @@ def mauve(environment: dict[str, str], executor: Any) -> Mauve:
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "mauve_rt.cli", *words]
         return subprocess.run(
-            command, env=environment, capture_output=True, text=True, check=False, timeout=40
+            command, env=environment, capture_output=True, text=True, check=False, timeout=200
         )
 
     return run
@@ -100,7 +102,9 @@ def test_events_are_followed(mauve: Mauve, environment: dict[str, str], tmp_path
 
 
 def test_executors_are_found(mauve: Mauve) -> None:
-    assert mauve("nodes").stdout == f"{NODE}\n"
+    deadline = time.monotonic() + PATIENCE_S
+    while (found := mauve("nodes").stdout) != f"{NODE}\n":  # it may still be loading
+        assert (found, time.monotonic() < deadline) == ("", True)
     missing = mauve("list", "/robot_9/executor")
     assert missing.returncode == 2
     assert (

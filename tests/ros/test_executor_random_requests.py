@@ -188,7 +188,7 @@ class Model:
                 del self.cores[target]
 
 
-@pytest.mark.timeout(120 + REQUESTS // 10)
+@pytest.mark.timeout(600 + REQUESTS // 10)
 def test_random_requests(
     tmp_path: Path,
     start_executor: Callable[..., Any],

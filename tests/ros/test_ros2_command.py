@@ -25,7 +25,7 @@ def environment(domain: int) -> dict[str, str]:
 
 def _run(command: list[str], *words: str, environment: dict[str, str]) -> tuple[int, str, str]:
     done = subprocess.run(
-        [*command, *words], env=environment, capture_output=True, text=True, check=False, timeout=40
+        [*command, *words], env=environment, capture_output=True, text=True, check=False, timeout=200
     )
     return done.returncode, done.stdout, done.stderr
 

@@ -22,7 +22,7 @@ def write_map(
 
 def refused(start: Starter, *arguments: str) -> str:
     demo = start(*arguments)
-    assert demo.finish(timeout_s=60) == 2, demo.lines
+    assert demo.finish() == 2, demo.lines
     assert demo.lines == []
     assert demo.errors.count("\n") == 1, demo.errors
     assert not demo.out.exists()
@@ -100,6 +100,6 @@ def test_a_folder_with_something_in_it_is_not_written_to(start: Starter):
     out.mkdir()
     (out / "mine.txt").write_text("keep", encoding="utf-8")
     demo = start(out=out)
-    assert demo.finish(timeout_s=60) == 2
+    assert demo.finish() == 2
     assert "taken" in demo.errors
     assert [path.name for path in out.iterdir()] == ["mine.txt"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from bag_reading import topics
-from demo_harness import DOMAIN, Demo, Starter
+from demo_harness import DOMAIN, PATIENCE_S, Demo, Starter
 
 SHORT = ("--duration", "25", "--link-loss-at", "4", "--link-back-at", "12")
 
@@ -61,7 +61,7 @@ def test_other_ways_to_be_told_to_end(start: Starter, number: signal.Signals):
     demo = start(*SHORT)
     demo.wait_for("link up")
     demo.process.send_signal(number)
-    assert demo.finish(timeout_s=20) == 130
+    assert demo.finish() == 130
     assert demo.processes() == {}
 
 
@@ -70,7 +70,7 @@ def test_a_killed_executor_leaves_a_bag_that_opens(start: Starter):
     demo.wait_for("4.")
     architecture = demo.out / "architecture" / "robot_1.yaml"
     os.kill(demo.pid_of(f"node.executor --ros-args -p architecture:={architecture}"), signal.SIGKILL)
-    assert demo.finish(timeout_s=60) == 1
+    assert demo.finish() == 1
     text = "\n".join(demo.lines)
     assert "robot_1_executor ended (SIGKILL)" in text
     assert demo.processes() == {}
@@ -86,7 +86,7 @@ def test_a_killed_demo_takes_its_processes_along(start: Starter):
     demo.wait_for("link up")
     demo.process.kill()
     demo.process.wait()
-    deadline_s = time.monotonic() + 10.0
+    deadline_s = time.monotonic() + PATIENCE_S
     while demo.processes() and time.monotonic() < deadline_s:
         time.sleep(0.1)
     assert demo.processes() == {}
@@ -97,7 +97,7 @@ def test_a_second_mission_on_the_same_domain_is_refused(start: Starter):
     first = start(*SHORT)
     first.wait_for("link up")
     second = start(*SHORT, out=start.folder / "second")
-    assert second.finish(timeout_s=60) == 2
+    assert second.finish() == 2
     assert "another mission is running" in second.errors
     assert f"domain {DOMAIN}" in second.errors
     assert second.errors.count("\n") == 1
@@ -112,7 +112,7 @@ def test_without_privileges_it_runs_and_says_what_is_missing(start: Starter):
             pytest.skip("setpriv (util-linux) is not installed: root cannot give its privileges away")
         prefix = ("setpriv", "--bounding-set=-all", "--inh-caps=-all")
     demo = start(*SHORT, prefix=prefix)
-    status = demo.finish(timeout_s=120)
+    status = demo.finish()
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     if summary["realtime"]["granted"]:
         pytest.skip("this user has real-time rights (rtprio and memlock limits)")

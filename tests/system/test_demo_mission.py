@@ -20,7 +20,7 @@ SHORT = ("--duration", "25", "--link-loss-at", "6", "--link-back-at", "14")
 @pytest.fixture(scope="module")
 def mission(start_once: Starter) -> Demo:
     demo = start_once(*SHORT)
-    demo.finish(timeout_s=120)
+    demo.finish()
     return demo
 
 
@@ -127,7 +127,7 @@ def test_the_logs_have_no_traceback(mission: Demo):
 def test_without_supervisors_the_robots_stall(start: Starter):
     long = ("--duration", "36", "--link-loss-at", "6", "--link-back-at", "30")
     demo = start(*long, "--no-supervisor")
-    assert demo.finish(timeout_s=120) == 1
+    assert demo.finish() == 1
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     assert summary["success"] is False
     assert all(robot["reconfigurations"] == [] for robot in summary["robots"].values())
@@ -141,7 +141,7 @@ def test_without_supervisors_the_robots_stall(start: Starter):
 
 def test_one_robot_needs_no_radio(start: Starter):
     demo = start("--robots", "1", "--duration", "6", "--map", "room")
-    assert demo.finish(timeout_s=120) == 0
+    assert demo.finish() == 0
     summary = json.loads((demo.out / "summary.json").read_text(encoding="utf-8"))
     assert set(summary["coverage"]) == {"robot_1", "union"}
     assert summary["robots"]["robot_1"]["reconfigurations"] == []
@@ -169,4 +169,4 @@ def shared_map(name: str) -> Path:
 @pytest.mark.parametrize("name", ["depot.yaml", "tb3_sandbox.yaml"])
 def test_maps_of_others_work_as_they_are(start: Starter, name: str):
     demo = start("--map", str(shared_map(name)), *SHORT)
-    assert demo.finish(timeout_s=120) == 0, demo.lines[-8:]
+    assert demo.finish() == 0, demo.lines[-8:]

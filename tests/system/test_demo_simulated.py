@@ -22,7 +22,7 @@ SHORT = ("--simulated-time", *TIMES, "--drop-share", "0.1")
 
 def simulate(start: Starter, name: str, *arguments: str) -> Demo:
     demo = start(*SHORT, *arguments, out=start.folder / name)
-    demo.finish(timeout_s=120)
+    demo.finish()
     return demo
 
 
@@ -149,6 +149,6 @@ def test_without_supervisors_it_fails(start: Starter):
 def test_it_refuses_what_makes_no_sense(start: Starter, tmp_path: Path):
     for arguments in (("--simulated-time=yes",), ("--simulated-time", "--link-back-at", "1")):
         demo = start(*arguments, out=tmp_path / "refused")
-        assert demo.finish(timeout_s=60) == 2
+        assert demo.finish() == 2
         assert demo.errors.count("\n") == 1
         assert not demo.out.exists()

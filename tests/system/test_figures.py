@@ -19,7 +19,7 @@ DEPLOYMENT_LEAD_NS = 20_000_000
 
 def run(*, out: Path, bags: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-P", "-m", "mauve_examples.figures", "--out", out, "--bags", bags]
-    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=100)
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
 
 
 @pytest.fixture(scope="module")
