@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -67,7 +67,6 @@ def test_names_are_what_rosbags_makes_of_them(components: list[str], names: list
     assert encode_names(components, names) == expected
 
 
-@settings(deadline=None)  # the first one loads rclpy
 @given(batches())
 def test_rclpy_and_we_read_each_others_batches(batch: Batch):
     serialization = pytest.importorskip("rclpy.serialization")

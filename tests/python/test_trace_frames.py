@@ -3,7 +3,7 @@
 from typing import Any
 
 import pandas as pd
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_traces import trace_of
 
@@ -148,7 +148,6 @@ def test_a_trace_of_nothing_has_columns() -> None:
         assert all(len(frame) == 0 and len(frame.columns) >= 5 for frame in found)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.integers(0, 400), st.integers(0, 300), st.integers(0, 3)), max_size=20),
     st.integers(0, 50),

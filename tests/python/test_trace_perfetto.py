@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 from perfetto_decoding import Decoded, Event
@@ -203,7 +203,6 @@ KINDS = [int(kind) for kind in Kind] + [99]
 INT64 = st.integers(-(2**63), 2**63 - 1)
 
 
-@settings(deadline=None)
 @given(
     st.lists(
         st.tuples(st.sampled_from(KINDS), st.integers(-5, 50), st.sampled_from("pq"), st.booleans()),

@@ -224,7 +224,7 @@ def test_random_requests(
     def send(asks: list[Ask]) -> None:
         nonlocal answered, accepted
         futures = [graph.ask_later(ask.service, f"{NODE}/{ask.name}", **ask.fields) for ask in asks]
-        graph.spin_until(lambda: all(future.done() for future in futures), f"replies to {asks}", 40.0)
+        graph.spin_until(lambda: all(future.done() for future in futures), f"replies to {asks}")
         changes = []
         for ask, future in zip(asks, futures, strict=True):
             reply = future.result()
