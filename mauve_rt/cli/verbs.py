@@ -56,7 +56,8 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
 def _list(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import ListComponents  # noqa: PLC0415 - ROS takes its time to load
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_components, print_json  # noqa: PLC0415
+    from mauve_rt.cli.list_view import print_components  # noqa: PLC0415
+    from mauve_rt.cli.views import print_json  # noqa: PLC0415
 
     with connected() as client:
         reply = client.call(ListComponents, f"{args.executor}/list_components", ListComponents.Request())

@@ -1,4 +1,4 @@
-"""What the verbs print: tables for people, JSON for programs."""
+"""What the verbs print: lines for people, JSON for programs."""
 
 import array
 import json
@@ -6,22 +6,9 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from rich import box
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
-STATES = (
-    "UNCONFIGURED",
-    "STOPPED",
-    "RUNNING",
-    "HELD",
-    "STOPPING",
-    "FAULTED",
-)  # as mauve_msgs/msg/ComponentInfo
-_STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _WIDE = 160
-
 _WORTH_TELLING_NS = 1_000  # some steps prepare nothing
 
 
@@ -43,43 +30,9 @@ def print_json(value: Any) -> None:
     print(json.dumps(as_plain(value), indent=2, ensure_ascii=False))
 
 
-def component_table(reply: Any) -> Table:
-    """The components of a ListComponents reply."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("component", "state", "period", "priority", "cpus", "releases", "overruns"):
-        table.add_column(column, no_wrap=True)
-    table.add_column("core, others it takes", overflow="fold")
-    for component in reply.components:
-        state = STATES[component.state]
-        others = component.alternatives if component.reconfigurable else ["(protected)"]
-        table.add_row(
-            component.name,
-            f"[{_STYLES.get(state, 'default')}]{state}[/]",
-            duration(component.period_ns),
-            str(component.priority) if component.policy == "SCHED_FIFO" else "-",
-            ",".join(str(cpu) for cpu in component.cpus) or "any",
-            str(component.releases),
-            str(component.overruns),
-            "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)]),
-        )
-    return table
-
-
 def console() -> Console:
     """Standard output; wide enough for every table where it is no terminal."""
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
-
-
-def print_components(reply: Any) -> None:
-    """Table, faults, and what is missing for real time."""
-    out = console()
-    out.print(component_table(reply))
-    for component in reply.components:
-        if component.fault:
-            out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
-    for line in reply.realtime.missing:
-        out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
-    out.print(f"revision {reply.revision}", style="dim")
 
 
 def report_lines(report: Sequence[Any]) -> list[str]:

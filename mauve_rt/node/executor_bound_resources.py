@@ -22,6 +22,8 @@ from mauve_rt.trace.trace_bag import SentMessage
 
 @dataclass(frozen=True)
 class _BoundTopic:
+    resource: str
+    direction: str
     topic: str
     type_name: str
     qos: TopicQos
@@ -102,7 +104,9 @@ class BoundResources:
         qos = qos_profile(topic.qos, capacity=resource.capacity or 0)
         bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
         number = bind(name, topic.name, resource.topic_type, native_qos(qos))
-        self._topics[number] = _BoundTopic(full_name, resource.topic_type, recorded_qos(qos))
+        self._topics[number] = _BoundTopic(
+            name, topic.direction, full_name, resource.topic_type, recorded_qos(qos)
+        )
         return number
 
     def attach(self, opened: Mapping[str, list[int]]) -> None:
@@ -153,7 +157,20 @@ class BoundResources:
             raise MauveError("the executor is not configured: nothing can be bound to ROS")
         return self._bridge
 
-    # ---- for diagnostics
+    # ---- for those who ask
+
+    def bindings(self) -> dict[str, dict[str, str]]:
+        """The ROS names of each bound resource, expanded and remapped, as ResourceInfo's fields."""
+        # `_topics` keeps those closed too: of a resource that was added again the last one counts.
+        directions = {bound.resource: bound.direction for bound in list(self._topics.values())}
+        found: dict[str, dict[str, str]] = {}
+        for topic in self.topics():
+            side = "publishes" if directions.get(topic.resource) == "publish" else "subscribes"
+            found.setdefault(topic.resource, {})[side] = topic.topic
+        for call in self.calls():
+            side = "offers" if call.is_offered else "calls"
+            found.setdefault(call.resource, {})[side] = call.service
+        return found
 
     def topics(self) -> list[TopicReport]:
         """How each bound topic fares."""

@@ -1,5 +1,6 @@
 """The executor's values as messages of mauve_msgs."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from mauve_msgs.msg import (
@@ -9,6 +10,7 @@ from mauve_msgs.msg import (
     PortInfo,
     RealtimeStatus,
     ReconfigurationEvent,
+    ResourceInfo,
     StepReport,
     TraceArchitecture,
 )
@@ -50,6 +52,16 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
 def component_infos(runtime: Runtime) -> list[Any]:
     """ComponentInfo of every component."""
     return [component_info(part, alternatives=runtime.cores_of(part)) for part in runtime.components()]
+
+
+def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, str]]) -> list[Any]:
+    """ResourceInfo of every resource; `bindings`: ROS names by resource and field."""
+    return [
+        ResourceInfo(
+            name=resource.name, kind=resource.kind, type=resource.type, **bindings.get(resource.name, {})
+        )
+        for resource in runtime.described_resources()
+    ]
 
 
 def trace_architecture(runtime: Runtime, observed: Observed) -> Any:

@@ -79,6 +79,7 @@ class ExecutorNode(LifecycleNode):
             self,
             runtime,
             control=control,
+            bound=self._bound,
             state=self._state,
             parameters=self._properties,
             control_group=control_group,

@@ -14,6 +14,7 @@ from mauve_rt._kernel import (
     PluginRegistry,
     RealtimeStatus,
     RecentMaxima,
+    ResourceDescription,
 )
 from mauve_rt.errors import MauveError
 from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
@@ -210,8 +211,12 @@ class Runtime:
 
     def resources(self) -> list[str]:
         """Names of the resources there are now; none while unconfigured. From any thread."""
+        return [resource.name for resource in self.described_resources()]
+
+    def described_resources(self) -> list[ResourceDescription]:
+        """Every resource as it is now; none while unconfigured. From any thread."""
         architecture = self._architecture
-        return [resource.name for resource in architecture.resources()] if architecture is not None else []
+        return architecture.resources() if architecture is not None else []
 
     def kernel_revision(self) -> int:
         """The kernel's own count of changes, by which a commit tells whether there was one meanwhile."""

@@ -16,8 +16,9 @@ from mauve_msgs.srv import (
     Stop,
     StopRecording,
 )
+from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_control import Control
-from mauve_rt.node.executor_messages import component_infos, realtime_status, step_reports
+from mauve_rt.node.executor_messages import component_infos, realtime_status, resource_infos, step_reports
 from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_requests import Outcome, RecordingOrder, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
@@ -38,6 +39,7 @@ class Services:
         runtime: Runtime,
         *,
         control: Control,
+        bound: BoundResources,
         state: StatePublisher,
         parameters: Parameters,
         control_group: CallbackGroup,
@@ -45,6 +47,7 @@ class Services:
     ) -> None:
         self._runtime = runtime
         self._control = control
+        self._bound = bound
         self._state = state
         self._parameters = parameters
         self._untold: deque[tuple[Request, Outcome]] = deque()  # of `control_group` only
@@ -97,6 +100,7 @@ class Services:
         response.revision = self._runtime.revision
         response.components = component_infos(self._runtime)
         response.realtime = realtime_status(self._runtime)
+        response.resources = resource_infos(self._runtime, self._bound.bindings())
         return response
 
     def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:

@@ -1,6 +1,5 @@
 """The `mauve` command without an executor: arguments, files, plug-ins, what it prints."""
 
-import io
 import json
 import subprocess
 import sys
@@ -8,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationEvent, StepReport
-from mauve_msgs.srv import ListComponents
 from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
 from mauve_rt.model.steps import load_steps
@@ -102,27 +99,6 @@ def test_plugins(plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "executor_tests/PyCounter" in capsys.readouterr().out
 
 
-def test_component_table() -> None:
-    running = ComponentInfo(
-        name="guidance",
-        state=ComponentInfo.RUNNING,
-        core="p/Core",
-        policy="SCHED_FIFO",
-        priority=60,
-        cpus=[0, 1],
-        period_ns=100_000_000,
-        alternatives=["p/Other"],
-        reconfigurable=True,
-    )
-    protected = ComponentInfo(name="robot", state=ComponentInfo.FAULTED, core="p/Robot", policy="SCHED_OTHER")
-    out = io.StringIO()
-    reply = ListComponents.Response(components=[running, protected])
-    Console(file=out, width=120).print(views.component_table(reply))
-    text = out.getvalue()
-    for word in ("guidance", "RUNNING", "100 ms", "60", "0,1", "p/Core", "p/Other", "FAULTED", "(protected)"):
-        assert word in text
-
-
 def test_reports_and_events_in_words() -> None:
     none = StepReport.NOT_MEASURED
     measured = StepReport(
@@ -152,11 +128,6 @@ def test_messages_as_json() -> None:
     plain: dict[str, Any] = views.as_plain(ComponentInfo(name="a", cpus=[1, 2]))
     assert (plain["name"], plain["cpus"], plain["ports"]) == ("a", [1, 2], [])
     assert json.loads(json.dumps(plain)) == plain
-
-
-def test_states_are_those_of_the_message() -> None:
-    for number, name in enumerate(views.STATES):
-        assert getattr(ComponentInfo, name) == number
 
 
 def test_module_runs_as_a_program() -> None:

@@ -1,0 +1,94 @@
+"""What `mauve list` prints: what runs, which cores, what is connected; three tables that 80 columns hold."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from mauve_rt.cli.views import console, duration
+
+STATES = (
+    "UNCONFIGURED",
+    "STOPPED",
+    "RUNNING",
+    "HELD",
+    "STOPPING",
+    "FAULTED",
+)  # as mauve_msgs/msg/ComponentInfo
+_STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
+_ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
+
+
+def print_components(reply: Any, out: Console | None = None) -> None:
+    """A ListComponents reply: its tables, faults, and what is missing for real time."""
+    out = out or console()
+    for table in (_components(reply), _cores(reply), _connections(reply)):
+        if table.row_count:
+            out.print(table)
+    for component in reply.components:
+        if component.fault:
+            out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
+    for line in reply.realtime.missing:
+        out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
+    out.print(f"revision {reply.revision}", style="dim")
+
+
+def _components(reply: Any) -> Table:
+    table = _table("component")
+    for column in ("state", "period", "priority", "cpus", "releases", "overruns"):
+        table.add_column(column, no_wrap=True)
+    for component in reply.components:
+        state = STATES[component.state]
+        table.add_row(
+            component.name,
+            f"[{_STYLES.get(state, 'default')}]{state}[/]",
+            duration(component.period_ns),
+            str(component.priority) if component.policy == "SCHED_FIFO" else "-",
+            ",".join(str(cpu) for cpu in component.cpus) or "any",
+            str(component.releases),
+            str(component.overruns),
+        )
+    return table
+
+
+def _cores(reply: Any) -> Table:
+    table = _table("component", "core, others it takes")
+    for component in reply.components:
+        others = component.alternatives if component.reconfigurable else ["(protected)"]
+        table.add_row(component.name, "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)]))
+    return table
+
+
+def _connections(reply: Any) -> Table:
+    """A line for each port; then the resources that none has but ROS."""
+    table = _table("port", "connected to", "on ROS")
+    on_ros = {resource.name: _ros_names(resource) for resource in reply.resources}
+    connected = set()
+    for component in reply.components:
+        for port in component.ports:
+            service = f"{port.resource}.{port.service}" if port.resource else "[yellow]nothing[/]"
+            table.add_row(f"{component.name}.{port.name}", service, on_ros.get(port.resource, ""))
+            connected.add(port.resource)
+    for name, names in _lonely(on_ros, connected).items():
+        table.add_row("[dim]-[/]", name, names)
+    return table
+
+
+def _lonely(on_ros: Mapping[str, str], connected: set[str]) -> dict[str, str]:
+    return {name: names for name, names in on_ros.items() if name not in connected}
+
+
+def _ros_names(resource: Any) -> str:
+    names = {side: getattr(resource, side) for side in _ROS_SIDES}
+    return "\n".join(f"[dim]{side}[/] {name}" for side, name in names.items() if name)
+
+
+def _table(*folding: str) -> Table:
+    """These columns keep all they say, on several lines if need be."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in folding:
+        table.add_column(column, overflow="fold")
+    return table

@@ -1,0 +1,108 @@
+"""`mauve list` for people: everything a reply says, on a terminal of 80 columns."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from mauve_msgs.msg import ComponentInfo, PortInfo, ResourceInfo
+from mauve_msgs.srv import ListComponents
+from mauve_rt.cli.list_view import STATES, print_components
+
+
+def _printed(reply: ListComponents.Response, *, width: int = 80) -> list[str]:
+    out = io.StringIO()
+    print_components(reply, Console(file=out, width=width, highlight=False))
+    return [line.rstrip() for line in out.getvalue().splitlines() if line.strip()]
+
+
+def _line(lines: list[str], word: str) -> list[str]:
+    return next(line for line in lines if word in line.split()).split()
+
+
+def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
+    running = ComponentInfo(
+        name="guidance",
+        state=ComponentInfo.RUNNING,
+        core="p/Core",
+        policy="SCHED_FIFO",
+        priority=60,
+        cpus=[0, 1],
+        period_ns=100_000_000,
+        releases=7,
+        overruns=2,
+        alternatives=["p/Other"],
+        reconfigurable=True,
+    )
+    protected = ComponentInfo(
+        name="robot",
+        state=ComponentInfo.FAULTED,
+        core="p/Robot",
+        policy="SCHED_OTHER",
+        fault="range_error: [off] the map",
+    )
+    lines = _printed(ListComponents.Response(components=[running, protected], revision=5))
+    assert _line(lines, "guidance") == ["guidance", "RUNNING", "100", "ms", "60", "0,1", "7", "2"]
+    assert _line(lines, "robot") == ["robot", "FAULTED", "-", "-", "any", "0", "0"]
+    cores = [line.split() for line in lines if "p/" in line]
+    assert cores == [["guidance", "p/Core"], ["p/Other"], ["robot", "p/Robot"]]
+    assert "(protected)" in "".join(lines)
+    assert lines[-2:] == ["robot: range_error: [off] the map", "revision 5"]
+
+
+def test_each_port_says_what_it_is_connected_to_and_where_that_goes() -> None:
+    ports = [
+        PortInfo(name="goal", kind=PortInfo.READ, resource="goal", service="read"),
+        PortInfo(name="map", kind=PortInfo.CALL, resource="map", service="update"),
+        PortInfo(name="scan", kind=PortInfo.READ),
+    ]
+    resources = [
+        ResourceInfo(name="goal", subscribes="/robot_1/goal"),
+        ResourceInfo(name="map", publishes="/robot_1/map", offers="/robot_1/map/clear"),
+        ResourceInfo(name="alarm", publishes="/alarm"),
+        ResourceInfo(name="idle"),
+    ]
+    reply = ListComponents.Response(
+        components=[ComponentInfo(name="guidance", ports=ports)], resources=resources
+    )
+    lines = _printed(reply)
+    assert _line(lines, "guidance.goal") == ["guidance.goal", "goal.read", "subscribes", "/robot_1/goal"]
+    at = lines.index(next(line for line in lines if "guidance.map" in line))
+    assert lines[at].split() == ["guidance.map", "map.update", "publishes", "/robot_1/map"]
+    assert lines[at + 1].split() == ["offers", "/robot_1/map/clear"]
+    assert _line(lines, "guidance.scan") == ["guidance.scan", "nothing"]
+    # Of what no port has: the resources that are on ROS, the other ones, too.
+    assert _line(lines, "alarm") == ["-", "alarm", "publishes", "/alarm"]
+    assert _line(lines, "idle") == ["-", "idle"]
+
+
+@pytest.mark.parametrize("width", [80, 160])
+def test_forty_components_of_long_names_lose_no_word_on_a_narrow_terminal(width: int) -> None:
+    name = "localisation_of_the_left_arm_{}"
+    parts = [
+        ComponentInfo(
+            name=name.format(index),
+            core=f"my_robot_components/ParticleFilterOfManyParticles{index}",
+            ports=[PortInfo(name="wheel_odometry_input", resource=f"wheel_odometry_{index}", service="read")],
+        )
+        for index in range(40)
+    ]
+    resources = [
+        ResourceInfo(
+            name=f"wheel_odometry_{index}", subscribes=f"/fleet/robot_{index}/drivers/wheel_odometry"
+        )
+        for index in range(40)
+    ]
+    lines = _printed(ListComponents.Response(components=parts, resources=resources), width=width)
+    assert max(len(line) for line in lines) <= width
+    letters = "".join("".join(line.split()) for line in lines)
+    if width == 160:  # nothing is folded there
+        for index in range(40):
+            assert f"{name.format(index)}.wheel_odometry_input" in letters
+            assert f"/fleet/robot_{index}/drivers/wheel_odometry" in letters
+    assert "…" not in letters
+
+
+def test_states_are_those_of_the_message() -> None:
+    for number, name in enumerate(STATES):
+        assert getattr(ComponentInfo, name) == number
