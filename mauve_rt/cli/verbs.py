@@ -2,10 +2,9 @@
 
 import argparse
 import sys
-from pathlib import Path
 from typing import Any
 
-from mauve_rt.cli import report_verb, trace_verb
+from mauve_rt.cli import check_verb, report_verb, trace_verb
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -182,25 +181,6 @@ def _events(args: argparse.Namespace) -> int:
     return OK
 
 
-def _check(args: argparse.Namespace) -> int:
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
-    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
-
-    try:
-        model = load_architecture(args.file)
-        architecture = build(model, PluginRegistry())
-        configure(model, architecture)
-        architecture.cleanup()
-    except ArchitectureFileError as error:
-        print("\n".join(error.lines()), file=sys.stderr)
-        return BAD_USAGE
-    counts = (len(model.components), len(model.resources), len(model.connections))
-    print(
-        f"{args.file}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found"
-    )
-    return OK
-
-
 def _plugins(args: argparse.Namespace) -> int:
     from rich import box  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
@@ -273,10 +253,6 @@ def _recording(args: argparse.Namespace) -> int:
     )
 
 
-def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="architecture file")
-
-
 def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -295,7 +271,12 @@ VERBS = (
     Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
     Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
     Verb("nodes", "show the executors", _add_json, _nodes),
-    Verb("check", "check an architecture file without starting anything", _add_file, _check),
+    Verb(
+        "check",
+        "check architecture, rules and steps files without starting anything",
+        check_verb.add_arguments,
+        check_verb.main,
+    ),
     Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
     Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),
     Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),

@@ -12,7 +12,7 @@
       lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp, timeout_ms: 20}}
       map: {kind: mauve_examples/Map, service: {name: map/clear, offers: clear}}
       wanted: {kind: shared_data, type: geometry_msgs/msg/Twist,
-               topic: {name: cmd_vel, direction: subscribe, qos: {profile: sensor_data, deadline_ms: 200}}}
+               topic: {name: cmd_vel, direction: subscribe, qos: {profile: sensor_data, depth: 1}}}
     connections:
       - [exploration.goal, goal.write]
 

@@ -14,6 +14,7 @@ from mauve_rt._bridge import Bridge, CallReport, TopicReport
 from mauve_rt._kernel import Architecture, ResourceDescription
 from mauve_rt.errors import MauveError, TopicError
 from mauve_rt.model import ArchitectureModel
+from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
 from mauve_rt.node.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.trace.bag import TopicQos
@@ -101,6 +102,8 @@ class BoundResources:
         known = dict(self._node.get_topic_names_and_types()).get(full_name, ())
         if others := _others(known, resource.topic_type):
             raise TopicError(full_name, name, expected=resource.topic_type, found=" and ".join(others))
+        for remark in qos_remarks(topic):
+            self._node.get_logger().warning(remark_text(name, topic, remark))
         qos = qos_profile(topic.qos, capacity=resource.capacity or 0)
         bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
         number = bind(name, topic.name, resource.topic_type, native_qos(qos))

@@ -20,7 +20,7 @@ from rclpy.utilities import try_shutdown
 from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
 from mauve_msgs.srv import Reconfigure
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.message_types import message_class
+from mauve_rt.model.rule_types import heard_type
 from mauve_rt.model.rules import Rule, RulesFile
 from mauve_rt.node.process import BAD_INPUT, complain
 from mauve_rt.node.supervisor_conditions import Condition, SilenceCondition
@@ -67,13 +67,7 @@ class Supervisor:
     def _condition(self, rules_file: RulesFile, index: int) -> Condition:
         rule: Rule = rules_file.rules.rules[index]
         silence = rule.when.silence
-        message = message_class(silence.type)
-        if message is None:
-            raise rules_file.error(
-                ("rules", index, "when", "silence", "type"),
-                f"message type {silence.type} is not installed",
-                remedy="source the workspace that has it, or correct the name",
-            )
+        message = heard_type(rules_file, index)
         topic = self._node.resolve_topic_name(
             silence.topic
         )  # to be told; resolved twice, it might be another

@@ -13,12 +13,6 @@ from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
 from mauve_rt.model.steps import load_steps
 
-GOOD = """\
-mauve: 1
-components:
-  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm}
-"""
-
 
 def test_arguments_of_the_verbs() -> None:
     parser = build_parser()
@@ -77,17 +71,6 @@ def test_bad_usage_ends_with_status_2(words: list[str], capsys: pytest.CaptureFi
         main(words)
     assert caught.value.code == 2
     assert "usage: mauve" in capsys.readouterr().err
-
-
-def test_check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "robot.yaml"
-    file.write_text(GOOD, encoding="utf-8")
-    assert main(["check", str(file)]) == 0
-    assert "1 components, 0 resources, 0 connections: no error found" in capsys.readouterr().out
-    file.write_text(GOOD.replace("CounterFsm", "CounterFms").replace("core:", "kore:"), encoding="utf-8")
-    assert main(["check", str(file)]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.startswith(f"{file}:3:") for line in lines] == [True, True]
 
 
 def test_plugins(plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,98 @@
+"""`mauve check FILE...`: what is wrong with architecture, rules and steps files, without starting anything.
+
+What a file is its contents say. Beside an architecture file, steps and rules are tried on it as well.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from mauve_rt.cli.verb import BAD_USAGE, OK
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model import ArchitectureModel
+from mauve_rt.model.file_kinds import FileKind, file_kind
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The files."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="an architecture file, rules of a supervisor, steps of a transaction; beside an architecture "
+        "file the others are tried on it",
+    )
+
+
+def main(args: argparse.Namespace) -> int:
+    """Check every file; returns the exit status."""
+    kinds: dict[Path, FileKind] = {}
+    for path in args.files:
+        try:
+            kinds[path] = file_kind(path)
+        except ArchitectureFileError as error:
+            return _tell(error)
+    architectures = [path for path, kind in kinds.items() if kind is FileKind.ARCHITECTURE]
+    if len(architectures) > 1 and len(kinds) > len(architectures):
+        print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
+        return BAD_USAGE
+    status, model = OK, None
+    for path in (*architectures, *(path for path in kinds if path not in architectures)):
+        try:
+            if kinds[path] is FileKind.ARCHITECTURE:
+                model = _check_architecture(path)
+            else:
+                (_check_rules if kinds[path] is FileKind.RULES else _check_steps)(path, model)
+        except ArchitectureFileError as error:
+            status = _tell(error)
+    return status
+
+
+def _tell(error: ArchitectureFileError) -> int:
+    print("\n".join(error.lines()), file=sys.stderr)
+    return BAD_USAGE
+
+
+def _check_architecture(path: Path) -> ArchitectureModel:
+    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415 - takes its time to load
+    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
+    from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
+
+    model = load_architecture(path)
+    architecture = build(model, PluginRegistry())
+    configure(model, architecture)
+    architecture.cleanup()
+    for warning in file_warnings(model):
+        print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
+    counts = (len(model.components), len(model.resources), len(model.connections))
+    print(f"{path}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found")
+    return model
+
+
+def _check_steps(path: Path, model: ArchitectureModel | None) -> None:
+    from mauve_rt.model.steps import load_steps  # noqa: PLC0415
+    from mauve_rt.node.rehearsal import try_steps  # noqa: PLC0415
+
+    steps = load_steps(path)
+    if model is not None:
+        try_steps(path, steps, model)
+    print(f"{path}: {len(steps)} steps{_tried_on(model)}: no error found")
+
+
+def _check_rules(path: Path, model: ArchitectureModel | None) -> None:
+    from mauve_rt.model.rule_types import heard_type  # noqa: PLC0415
+    from mauve_rt.model.rules import RulesFile  # noqa: PLC0415
+    from mauve_rt.node.rehearsal import try_rule  # noqa: PLC0415
+
+    file = RulesFile(path)
+    rules = file.rules.rules
+    for index in range(len(rules)):
+        heard_type(file, index)
+        if model is not None:
+            try_rule(file, index, model)
+    print(f"{path}: {len(rules)} rules{_tried_on(model)}: no error found")
+
+
+def _tried_on(model: ArchitectureModel | None) -> str:
+    return f", tried on {model.path}" if model is not None else ""

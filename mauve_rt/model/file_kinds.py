@@ -1,0 +1,28 @@
+"""Which kind of file of ours a YAML file is: its contents say so, not its name."""
+
+from enum import Enum
+from pathlib import Path
+
+from mauve_rt.model.yaml_file import YamlFile
+
+
+class FileKind(Enum):
+    """The files that MAUVE RT reads."""
+
+    ARCHITECTURE = "architecture"
+    RULES = "rules"
+    STEPS = "steps"
+
+
+def file_kind(path: str | Path) -> FileKind:
+    """The kind of a file: steps are a list, rules have the key `rules`, all else is to be an architecture.
+
+    Raises:
+        ArchitectureFileError: it cannot be read or is no YAML.
+    """
+    data = YamlFile(path).data
+    if isinstance(data, list):
+        return FileKind.STEPS
+    if isinstance(data, dict) and "rules" in data and "components" not in data:
+        return FileKind.RULES
+    return FileKind.ARCHITECTURE

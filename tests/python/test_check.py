@@ -1,0 +1,165 @@
+"""`mauve check` on files of every kind: what they are, what is wrong and where, the exit status."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mauve_rt.cli.main import main
+
+Check = Callable[..., tuple[int, list[str], list[str]]]
+
+ROBOT = """\
+mauve: 1
+components:
+  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+        alternatives: [executor_tests/Backwards]}
+  guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+          reconfigurable: false}
+resources:
+  set: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: set, direction: subscribe}}
+connections:
+  - [one.set, set.read]
+"""
+RULES = """\
+mauve: 1
+rules:
+  - name: quiet
+    when: {silence: {topic: word, type: std_msgs/msg/String, longer_than_s: 1.0}}
+    do:
+      - {kind: add_resource, target: spare, value: {kind: shared_data, type: std_msgs/msg/Float64}}
+      - {kind: replace_core, target: one, name: executor_tests/Backwards}
+    undo:
+      do:
+        - {kind: replace_core, target: one, name: executor_tests/Counter}
+        - {kind: remove_resource, target: spare}
+"""
+STEPS = """\
+- {kind: add_resource, target: sum, value: {kind: shared_data, type: std_msgs/msg/Float64,
+                                            topic: {name: sum, direction: publish}}}
+- {kind: connect, target: one, name: count, value: sum.write}
+- {kind: set_property, target: one, name: step, value: 2.0}
+"""
+
+
+@pytest.fixture
+def check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Check:
+    """check(NAME=TEXT, ...): status, lines of stdout and of stderr, the folder's name taken out of them."""
+
+    def run(**texts: str) -> tuple[int, list[str], list[str]]:
+        for name, text in texts.items():
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        status = main(["check", *(str(tmp_path / name) for name in texts)])
+        said = capsys.readouterr()
+        out, err = (text.replace(f"{tmp_path}/", "").splitlines() for text in (said.out, said.err))
+        return status, out, err
+
+    return run
+
+
+def test_an_architecture_file(check: Check) -> None:
+    good = "robot: 2 components, 1 resources, 1 connections: no error found"
+    assert check(robot=ROBOT) == (0, [good], [])
+    status, out, errors = check(
+        robot=ROBOT.replace("CounterFsm", "CounterFms", 1).replace("core:", "kore:", 1)
+    )
+    assert (status, out) == (2, [])
+    assert [line.partition(": ")[0] for line in errors] == ["robot:3:3", "robot:3:45"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "words"),
+    [
+        ("longer_than_s: 1.0", "longer_than: 1.0", "4:62", "longer_than is no known key"),
+        ("name: quiet", "name: so quiet", "3:11", "a name of letters"),
+        ("std_msgs/msg/String", "std_msgs/msg/Strong", "4:41", "std_msgs/msg/Strong is not installed"),
+        ("kind: replace_core, target: one", "kind: replace, target: one", "7:16", "found 'replace'"),
+        ("mauve: 1", "mauve: 3", "1:8", "mauve"),
+    ],
+)
+def test_a_rules_file_by_itself(check: Check, old: str, new: str, place: str, words: str) -> None:
+    assert check(rules=RULES) == (0, ["rules: 1 rules: no error found"], [])
+    status, out, errors = check(rules=RULES.replace(old, new, 1))
+    assert (status, out) == (2, [])
+    assert any(line.startswith(f"rules:{place}: ") and words in line for line in errors), errors
+
+
+def test_a_steps_file_by_itself(check: Check) -> None:
+    assert check(steps=STEPS) == (0, ["steps: 3 steps: no error found"], [])
+    status, out, errors = check(steps=STEPS.replace("kind: connect", "kind: conect"))
+    assert (status, out) == (2, [])
+    assert [line.partition(" ")[0] for line in errors] == ["steps:3:10:"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("target: one, name: count", "target: two, name: count", 3, "component 'two' is unknown"),
+        ("sum.write", "sum.wriet", 3, "wriet"),
+        ("name: step", "name: stop", 4, "has no property 'stop'; did you mean step?"),
+        ("value: 2.0", "value: fast", 4, "expected a number"),
+        ("target: one, name: step", "target: guard, name: step", 4, "is protected"),
+        ("std_msgs/msg/Float64", "std_msgs/msg/Flaot64", 1, "did you mean std_msgs/msg/Float64?"),
+    ],
+)
+def test_steps_beside_an_architecture_are_tried_on_it(
+    check: Check, old: str, new: str, line: int, words: str
+) -> None:
+    good = "steps: 3 steps, tried on robot: no error found"
+    status, out, errors = check(steps=STEPS, robot=ROBOT)  # in any order
+    assert (status, out[1:], errors) == (0, [good], [])
+    status, out, errors = check(robot=ROBOT, steps=STEPS.replace(old, new, 1))
+    assert (status, len(out)) == (2, 1)
+    (error,) = errors
+    assert error.startswith(f"steps:{line}:3: step ")
+    assert words in error
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("name: executor_tests/Backwards", "name: executor_tests/Unready", 7, "not declared"),
+        ("target: one, name: executor_tests/Counter", "target: two, name: p/C", 10, "'two' is unknown"),
+        ("remove_resource, target: spare", "remove_resource, target: spar", 11, "spar"),
+    ],
+)
+def test_rules_beside_an_architecture_do_and_undo(
+    check: Check, old: str, new: str, line: int, words: str
+) -> None:
+    status, out, errors = check(robot=ROBOT, rules=RULES)
+    assert (status, out[1:], errors) == (0, ["rules: 1 rules, tried on robot: no error found"], [])
+    status, out, errors = check(robot=ROBOT, rules=RULES.replace(old, new, 1))
+    assert (status, len(out)) == (2, 1)
+    (error,) = errors
+    assert error.startswith(f"rules:{line}:")
+    assert words in error
+
+
+def test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning(check: Check) -> None:
+    status, out, errors = check(
+        robot=ROBOT.replace("direction: subscribe", "direction: subscribe, qos: {deadline_ms: 200}")
+    )
+    assert (status, len(out)) == (0, 1)
+    (warning,) = errors
+    assert warning.startswith(
+        "robot:8:103: warning: topic 'set' of resource 'set' will not hear, by its deadline_ms"
+    )
+    assert "leave it out" in warning
+
+
+def test_what_is_none_of_them_and_what_does_not_go_together(check: Check, tmp_path: Path) -> None:
+    (error,) = check(words="just words")[2]
+    assert error.startswith("words:1:1: not an architecture file: expected the keys mauve, ")
+    assert check(broken="- {")[0] == 2
+    assert main(["check", str(tmp_path / "none.yaml")]) == 2
+    status, out, errors = check(robot=ROBOT, other=ROBOT, steps=STEPS)
+    assert (status, out) == (2, [])
+    assert errors[-1] == "mauve: check steps and rules with one architecture file, not with several"
+    assert check(robot=ROBOT, other=ROBOT)[0] == 0
+
+
+def test_of_several_files_each_is_told(check: Check) -> None:
+    status, out, errors = check(robot=ROBOT.replace("core:", "kore:", 1), steps=STEPS, rules="rules: []")
+    assert status == 2
+    assert out == ["steps: 3 steps: no error found"]  # by itself, as there is nothing to try it on
+    assert {line.split(":")[0] for line in errors} == {"robot", "rules"}
