@@ -19,23 +19,13 @@ from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_recording import Recording, RecordingOrders
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
+from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.recorder import Split
 
 NODE_NAME = "executor"
 MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
-_PARAMETERS: dict[str, tuple[Any, str]] = {
-    "architecture": ("", "architecture file"),
-    "bag": ("", "folder of the bag to record from the start, which must not exist yet; empty: none"),
-    "bags": ("", "folder below which ~/start_recording makes bags; empty: the working directory"),
-    "bag_split_s": (60.0, "a recording goes on in a new file after so long; 0: never"),
-    "bag_split_bytes": (0, "a recording goes on in a new file when one is so large; 0: never"),
-    "autostart": (True, "configure and activate at the start"),
-    "require_realtime": (False, "refuse to start without real-time rights"),
-    "trace": (True, "component threads write traces"),
-    "report_phase_timeout_s": (1.0, "how long a reply may wait to measure the next release after a commit"),
-}
 
 
 class ExecutorNode(LifecycleNode):
@@ -229,7 +219,7 @@ class ExecutorNode(LifecycleNode):
                 name: self.declare_parameter(
                     name, default, ParameterDescriptor(description=description)
                 ).value
-                for name, (default, description) in _PARAMETERS.items()
+                for name, (default, description) in PARAMETERS.items()
             }
             strings = ParameterDescriptor(
                 description="topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos",

@@ -7,9 +7,23 @@ from typing import Any, Self
 
 from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
-from mauve_rt.model.words import shown
+from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
+
+PARAMETERS: dict[str, tuple[Any, str]] = {
+    "architecture": ("", "architecture file"),
+    "bag": ("", "folder of the bag to record from the start, which must not exist yet; empty: none"),
+    "bags": ("", "folder below which ~/start_recording makes bags; empty: the working directory"),
+    "bag_split_s": (60.0, "a recording goes on in a new file after so long; 0: never"),
+    "bag_split_bytes": (0, "a recording goes on in a new file when one is so large; 0: never"),
+    "autostart": (True, "configure and activate at the start"),
+    "require_realtime": (False, "refuse to start without real-time rights"),
+    "trace": (True, "component threads write traces"),
+    "report_phase_timeout_s": (1.0, "how long a reply may wait to measure the next release after a commit"),
+}
+# A list without a default, what overrides the file's peers, and those that rclpy gives every node.
+_OTHERS = ("record_topics", "peers", "use_sim_time", "start_type_description_service")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +41,15 @@ class Settings:
         """The settings of a command line.
 
         Raises:
-            ParameterError: a value of the wrong type, or `use_sim_time`.
+            ParameterError: a value of the wrong type, `use_sim_time`, or a name that no parameter has.
         """
         arguments = parse_ros_arguments(words, node="executor")
-        given = arguments.within(_namespace(arguments))
+        namespace = _namespace(arguments)
+        given = arguments.within(namespace)
+        for name in arguments.meant_for_it(namespace):
+            if "." not in name and name not in (*PARAMETERS, *_OTHERS):
+                remedy = did_you_mean(name, (*PARAMETERS, *_OTHERS))
+                raise ParameterError(f"parameter {name}: an executor has none of that name; {remedy}")
         if given.get("use_sim_time"):
             raise ParameterError(
                 "use_sim_time: expected false: components run by the monotonic clock; leave it out"

@@ -12,6 +12,7 @@ from mauve_rt.yaml_text import YamlError, read_yaml
 _REMAP, _PARAMETER = ("-r", "--remap"), ("-p", "--param")
 _NAME = r"[A-Za-z_]\w*"
 _ALL_NODES = "/**"
+_ANYWHERE = "/**/"  # before a node's name: in whichever namespace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +26,8 @@ class RosArguments:
     @property
     def names_namespaces(self) -> bool:
         """Whether some parameters are for nodes of certain namespaces only."""
-        return any(nodes != _ALL_NODES for nodes, _ in self.given)
+        everywhere = (_ALL_NODES, _ANYWHERE + self.node)
+        return any(nodes not in everywhere for nodes, _ in self.given)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -34,8 +36,14 @@ class RosArguments:
 
     def within(self, namespace: str) -> dict[str, Any]:
         """The parameters of the node of that namespace."""
-        full_name = f"{namespace.rstrip('/')}/{self.node}"
-        return self._of(lambda nodes: _pattern(nodes).fullmatch(full_name) is not None)
+        return self._of(lambda nodes: self._is_of(nodes, namespace))
+
+    def meant_for_it(self, namespace: str) -> dict[str, Any]:
+        """As within(), without what a file says to nodes of any name: that may be for others."""
+        return self._of(lambda nodes: not nodes.endswith("*") and self._is_of(nodes, namespace))
+
+    def _is_of(self, nodes: str, namespace: str) -> bool:
+        return _pattern(nodes).fullmatch(f"{namespace.rstrip('/')}/{self.node}") is not None
 
     def _of(self, applies: Callable[[str], bool]) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -67,7 +75,7 @@ def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
             source, separator, text = value.partition(":=")
             scope, _, name = source.rpartition(":")
             if separator and scope in ("", node):
-                given.append((_ALL_NODES, {name: _parse(text)}))
+                given.append((_ANYWHERE + node, {name: _parse(text)}))
         elif option not in _REMAP:
             given += _of_file(value)
     return RosArguments(given=tuple(given), node=node, namespace=namespace)

@@ -146,3 +146,26 @@ def test_bad_properties(parameter: str, message: str, tmp_path: Path, plugin_pre
 def test_bad_settings(parameter: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         Settings.of(["--ros-args", "-p", parameter])
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("bagg", "parameter bagg: an executor has none of that name; did you mean bag?"),
+        ("architectur", "did you mean architecture?"),
+        ("colour", "known: architecture, autostart, bag, "),
+    ],
+)
+def test_an_unknown_parameter_is_refused(name: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"executor: {{ros__parameters: {{{name}: x}}}}\n", encoding="utf-8")
+    for words in (["-p", f"{name}:=x"], ["-p", f"executor:{name}:=x"], ["--params-file", str(file)]):
+        with pytest.raises(ParameterError) as caught:
+            Settings.of(["executor", "--ros-args", *words])
+        assert message in str(caught.value)
+
+
+def test_parameters_for_nodes_of_any_name_may_be_for_others(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("/**: {ros__parameters: {colour: red, bags: here}}\n", encoding="utf-8")
+    Settings.of(["executor", "--ros-args", "--params-file", str(file), "-p", "other:colour:=red"])
