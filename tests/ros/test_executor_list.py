@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure
 
 NODE = "/robot_1/executor"
+README = Path(__file__).parents[2] / "README.md"
 LAMP = """\
   lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp}}
   spare: {kind: shared_data, type: std_msgs/msg/Float64}
@@ -87,3 +89,26 @@ def test_mauve_list_shows_what_is_connected(executor: Any, domain: int) -> None:
     assert ["guard.count", "nothing"] in lines
     told = {found["name"]: found for found in json.loads(run("--json"))["resources"]}
     assert told["set"]["subscribes"] == "/robot_1/set"
+
+
+def test_the_interface_is_the_one_that_readme_lists(executor: Any, graph: Any) -> None:
+    told = re.search(r"Its interface is in `mauve_msgs`\s+\((.*?)\)", README.read_text("utf-8"), re.DOTALL)
+    assert told is not None
+    names = {name.replace("~", NODE) for name in re.findall(r"`(\S+)`", told[1])}
+    assert len(names) >= 10
+
+    def offered() -> set[str]:
+        node = graph.node
+        known = node.get_service_names_and_types_by_node("executor", "/robot_1")
+        known += node.get_publisher_names_and_types_by_node("executor", "/robot_1")
+        return {name for name, _ in known}
+
+    assert executor.process.poll() is None
+    graph.ask(ListComponents, f"{NODE}/list_components")
+    graph.spin_until(lambda: names <= offered(), f"{names}")
+    ours = {
+        name
+        for name, types in graph.node.get_service_names_and_types_by_node("executor", "/robot_1")
+        if any(kind.startswith("mauve_msgs/") for kind in types)
+    }
+    assert ours <= names  # and no service of ours that README does not name

@@ -1,0 +1,609 @@
+"""What README claims, and what fails when a claim is false.
+
+A claim is quoted in README's own words. Its proofs are tests, `stage/test_file.py::test_name` below tests/ or
+`Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows of scripts/bench, `bench: WORDS`.
+test_readme_claims.py holds this table to README and to what there is, and README to this table.
+"""
+
+_REPORT = "python/test_trace_report"
+_KERNEL_ALONE = "python/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
+
+CLAIMS: dict[str, tuple[str, ...]] = {
+    # ---- the beginning
+    "the control loops keep their rhythm": (
+        "Rule7Simulated.ThousandsOfCommitsAtRandomInstantsChangeNothingOfTheRhythm",
+        "bench: , nominal phase error",
+    ),
+    "a replaced core keeps its component waiting for some microseconds, and no component misses a release": (
+        "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
+        "bench: replace core of a running 1 kHz component with 100 us of work",
+        "bench: , releases missed",
+    ),
+    "hosts components in pinned `SCHED_FIFO` threads that share one epoch": (
+        "Rule5Deployment.ThreadsAreWhatWasAskedFor",
+        "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
+    ),
+    "replaces a component's algorithm in flight": (
+        "ros/test_executor_services.py::test_replace_core_in_flight_takes_over_the_count",
+    ),
+    "supervisor that degrades gracefully": (
+        "ros/test_supervisor_executor.py::test_a_core_is_replaced_in_flight_and_back",
+    ),
+    "rosbags from which timing is proved": (
+        "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
+    ),
+    # ---- two commands
+    "system packages through apt": (
+        "python/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
+    ),
+    "The first run takes a few minutes": (
+        "python/test_scripts.py::test_progress_says_how_far_what_and_how_long",
+    ),
+    "A sourced ROS 2 Jazzy is used when there is one": (
+        "python/test_readme_scripts.py::test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one",
+    ),
+    "otherwise they say which": (
+        "python/test_scripts.py::test_without_a_terminal_the_command_to_type_is_told",
+    ),
+    "sets everything up, builds, runs the mission, prints the story, writes the report": (
+        "system/test_demo_mission.py::test_it_succeeds_and_says_so",
+        "system/test_demo_mission.py::test_it_writes_what_it_promises",
+    ),
+    "scripts/test # sets everything up, builds, runs every test": (
+        "python/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
+    ),
+    "two robots explore an office": ("system/test_demo_mission.py::test_coverage_is_a_share_and_grew",),
+    "after 20 s the link is cut": (
+        "system/test_demo_parts.py::test_options_have_the_defaults_of_the_mission",
+        "ros/test_radio.py::test_a_cut_link_carries_nothing_until_it_is_back",
+    ),
+    "replaces the core of its component `exploration` by one that decides alone": (
+        "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
+    ),
+    "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
+    "takes any map of the ROS map server": (
+        "system/test_demo_mission.py::test_maps_of_others_work_as_they_are",
+        "system/test_demo_bad_input.py::test_bad_maps",
+    ),
+    "in virtual time on one thread": (
+        "system/test_demo_simulated.py::test_it_succeeds_without_any_process_of_its_own",
+        "system/test_demo_simulated.py::test_it_says_how_fast_it_was",
+    ),
+    "Equal options give equal traces, bit for bit": (
+        "system/test_demo_simulated.py::test_equal_seeds_make_equal_traces_and_figures",
+    ),
+    "bags are those of the real demo": (
+        "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
+    ),
+    # ---- other ways in
+    "then `rosdep install --from-paths src -i` and `colcon build`": (
+        "doors/test_colcon.py::test_everything_is_where_ros_puts_it",
+        "python/test_package_xml.py::test_what_runs_is_listed_exactly",
+    ),
+    "With pip, in a fresh virtual environment": (
+        "doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",
+    ),
+    "no variable has to be set": ("doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",),
+    "passes CMake options": ("doors/test_pip.py::test_environment_is_an_ament_prefix",),
+    # ---- from another terminal
+    "what runs, on which CPU, at which priority, connected to what": (
+        "python/test_list_view.py::test_what_runs_on_which_cpu_at_which_priority_and_its_cores",
+        "ros/test_executor_list.py::test_mauve_list_shows_what_is_connected",
+    ),
+    "mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration": (
+        "ros/test_executor_cli.py::test_verbs_do_what_they_say",
+        "python/test_readme_examples.py::test_every_command_is_one_that_mauve_takes",
+    ),
+    "mauve reconfigure /robot_1/executor steps.yaml": (
+        "ros/test_executor_cli.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
+        "python/test_readme_examples.py::test_the_steps_fit_the_mission",
+    ),
+    "mauve stop /robot_1/executor guidance": ("ros/test_executor_cli.py::test_verbs_do_what_they_say",),
+    "mauve start /robot_1/executor guidance": ("ros/test_executor_cli.py::test_verbs_do_what_they_say",),
+    "mauve events /robot_1/executor": ("ros/test_executor_cli.py::test_events_are_followed",),
+    "every verb is one of `ros2 mauve` too": (
+        "ros/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
+        "python/test_ros2_entry_points.py::test_the_verbs_are_those_of_mauve",
+    ),
+    "with completion, the same output and the same exit status": (
+        "ros/test_ros2_command.py::test_verbs_are_completed",
+        "ros/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
+    ),
+    "ros2 service call /robot_1/executor/replace_core mauve_msgs/srv/ReplaceCore": (
+        "python/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
+    ),
+    "are a YAML list of steps": ("python/test_readme_examples.py::test_the_steps_fit_the_mission",),
+    "a report per step, or the step that failed and why": (
+        "ros/test_executor_cli.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
+    ),
+    "`ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-p bag:=DIR]`": (
+        "ros/test_ros2_command.py::test_ros2_run_starts_an_executor",
+    ),
+    "Its interface is in `mauve_msgs`": (
+        "ros/test_executor_list.py::test_the_interface_is_the_one_that_readme_lists",
+    ),
+    "with its supervisor and everything remapped as you like": (
+        "ros/test_launch.py::test_an_executor_with_its_supervisor",
+    ),
+    "ros2 launch mauve_rt executor.launch.py": ("ros/test_launch.py::test_an_executor_with_its_supervisor",),
+    "ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office": (
+        "ros/test_launch.py::test_the_mission_loses_its_link_and_gets_it_back",
+        "python/test_readme_examples.py::test_launch_arguments_are_declared",
+    ),
+    "`--show-args` lists all arguments": (
+        "python/test_launch_files.py::test_every_argument_is_declared_once_and_used",
+    ),
+    "Both files are checked before anything starts": (
+        "ros/test_launch.py::test_bad_arguments_start_nothing",
+    ),
+    "are relative to the node's namespace and remapped as those of any ROS node": (
+        "ros/test_names.py::test_an_executor_s_names_are_remapped",
+    ),
+    "a supervisor finds a renamed executor by `-r executor:=boss`": (
+        "ros/test_names.py::test_a_supervisor_s_names_are_remapped",
+    ),
+    "is a parameter `<component>.<property>` of its executor, with type, unit, range and description": (
+        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+    ),
+    "a change is checked and carried out by the kernel, all or none, and told on `~/events`": (
+        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+    ),
+    "ros2 param set /robot_1/executor control.max_speed 0.5": (
+        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+    ),
+    "--params-file robots.yaml": (
+        "python/test_executor_arguments.py::test_parameters_of_one_file_for_several_robots",
+    ),
+    "A parameter file may have a section for each robot": (
+        "python/test_executor_arguments.py::test_parameters_of_one_file_for_several_robots",
+    ),
+    "an unknown name or a bad value starts nothing and says why": (
+        "ros/test_executor_process.py::test_bad_parameters",
+        "python/test_executor_arguments.py::test_an_unknown_parameter_is_refused",
+        "python/test_executor_arguments.py::test_bad_properties",
+    ),
+    "The executor is a managed node": ("ros/test_executor_process.py::test_lifecycle_step_by_step",),
+    "A transition that fails for a reason you can correct leaves everything as it was": (
+        "ros/test_executor_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
+    ),
+    "`~/state` has the reason in `error`": (
+        "ros/test_executor_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
+    ),
+    "`/diagnostics` warns from the figures on that the file names": (
+        "ros/test_executor_diagnostics.py::test_figures_are_held_against_the_thresholds_of_the_file",
+        "python/test_readme_examples.py::test_the_pieces_of_architecture_files_are_accepted",
+    ),
+    "Discovery is limited to this machine by default": (
+        "ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",
+        "ros/test_discovery.py::test_another_machine_sees_an_executor_only_where_it_was_opened",
+    ),
+    # ---- record a run
+    "From the start with `-p bag:=DIR`": ("ros/test_executor_process.py::test_signal_seals_the_bag",),
+    "mauve record start": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
+    "mauve record stop": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
+    "ros2 service call /robot_1/executor/start_recording mauve_msgs/srv/StartRecording": (
+        "python/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
+    ),
+    "every record of every component's thread, the messages of bound topics": (
+        "python/test_trace_recorder.py::test_records_and_words_are_in_the_bag",
+        "ros/test_executor_process.py::test_further_topics_are_recorded",
+    ),
+    "all on one time base": (
+        "python/test_trace_recorder.py::test_messages_lie_on_the_time_base_of_the_records",
+    ),
+    "with the definitions of all types": (
+        "python/test_trace_definitions.py::test_the_text_is_enough_to_read_the_message",
+        "python/test_trace_reader.py::test_a_bag_moved_elsewhere_needs_nothing_installed",
+    ),
+    "each of which can be read alone": (
+        "python/test_trace_repair.py::test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone",
+    ),
+    "Ten times a second it becomes a finished bag": (
+        "python/test_trace_bag.py::test_every_flush_leaves_a_finished_bag",
+    ),
+    "after `kill -9`, whenever that comes": (
+        "python/test_trace_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
+        "ros/test_executor_process.py::test_killed_executor_leaves_a_bag_that_opens",
+    ),
+    "what is missing is less than the last 200 ms": (
+        "bench: lost by kill -9 while recording 100,000 records a second, worst",
+    ),
+    "A full disk ends the recording, with an error on `/diagnostics`, never the executor": (
+        "ros/test_recording.py::test_a_full_disk_ends_the_recording_with_a_diagnostic",
+    ),
+    "Losses are counted in the bag, never silent": (
+        "TraceRing.CountsWhatItCannotKeep",
+        "python/test_trace_recorder.py::test_what_exceeds_the_queue_is_dropped_and_counted",
+        "python/test_trace_reader.py::test_loss_is_known_from_sequences_and_counters",
+    ),
+    "mauve trace info": ("python/test_trace_cli.py::test_info",),
+    "mauve trace check": ("python/test_trace_cli.py::test_check_tells_losses",),
+    "mauve trace repair": ("python/test_trace_cli.py::test_check_and_repair",),
+    "mauve trace stats": ("python/test_trace_cli.py::test_stats",),
+    "mauve trace export": (
+        "python/test_trace_export.py::test_perfetto_is_the_default",
+        "python/test_trace_export.py::test_csv",
+    ),
+    "From Python, also of a bag that is being written, and of one that needs repair": (
+        "python/test_readme_examples.py::test_the_python_example_reads_a_bag",
+        "python/test_trace_reader.py::test_a_bag_cut_off_anywhere_gives_what_is_whole",
+    ),
+    # ---- look at a run
+    "mauve report DIR": (
+        "python/test_trace_report_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
+    ),
+    "mauve report bag": ("python/test_trace_report_page.py::test_bags_are_named_by_what_tells_them_apart",),
+    "One page that needs no network and no server": (
+        "python/test_trace_report_page.py::test_a_page_needs_nothing_but_itself",
+    ),
+    "It begins with a yes or a no": (
+        "python/test_trace_report_page.py::test_the_verdict_comes_first_then_the_tiles_then_the_rest",
+        f"{_REPORT}_verdict.py::test_overruns_that_a_stall_brought_about_are_told_apart_from_those_of_a_component",
+    ),
+    "a timeline to zoom from minutes to microseconds": (
+        f"{_REPORT}_browser.py::test_a_view_goes_down_to_single_microseconds_and_no_further_than_the_trace",
+        "python/test_trace_report_browser.py::test_the_page_works_and_nobody_complains",
+    ),
+    "it keeps every detail around what is interesting and merges the rest, and says so": (
+        "python/test_trace_report_data.py::test_the_neighbourhood_of_what_is_interesting_stays_whole",
+        "python/test_trace_report_browser.py::test_what_is_merged_says_so",
+    ),
+    "mauve_rt.trace.report.write_report(": (
+        "python/test_readme_examples.py::test_the_report_is_written_from_python",
+    ),
+    # ---- concepts: components and time
+    "All three are replaceable parts (`package/Class`)": (
+        "Rule9Parts.AllThreePartsAndAnotherTwoBack",
+        "python/test_executor_control.py::test_all_parts_are_replaced_as_one",
+    ),
+    "which take no logical time": ("Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",),
+    "`wait(d)` adds d to the clock and sleeps until it": ("Rule1Clock.EachWaitAdvancesItByItsLength",),
+    "so nothing drifts, however long execution takes": (
+        "Rule2Instants.DoNotDriftOverTenThousandPeriodsWhateverExecutionTakes",
+    ),
+    "is the greatest common divisor of its fsm's cycles": (
+        "Rule3Period.IsTheGcdOfAllCyclesOfAnyMachine",
+        "Rule3Grid.InitialStatesInstantsAreEpochAndOffsetAndMultiplesOfThePeriod",
+    ),
+    "A loop without a wait is refused": ("Rule1Loops.ALoopWithoutAWaitIsRefusedByName",),
+    "a write to the resource that one of its ports reads": ("Rule12Events.EveryKindOfResourceRaisesThem",),
+    "`wait_event(port, timeout, min_interarrival)`": ("Rule12Events.AreKeptApartByTheMinimalInterarrival",),
+    "Its clock goes on to the event's time": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
+    "is *sporadic*: it has no period": ("Rule12Events.AreNoPeriodNorPhase",),
+    # ---- concepts: resources
+    "under a priority-inheritance mutex": (
+        "PriorityInheritance.TheHighestIsServedBeforeTheMiddle",
+        "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
+    ),
+    "each element goes to one reader": ("RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",),
+    "any number of readers that neither block nor fail": (
+        "LatestValueStress.ReadersSeeWholeValuesInOrder",
+        "LatestValue.AWriterNeverWaitsForReadersThatKeepOldValues",
+        "bench: : reads that failed or found halves of two values",
+    ),
+    "which take a callable": ("UserResource.IsReachedByCallablesAndTellsListeners",),
+    "whether it is old or new to this port, and the time of its writer": (
+        "KeepingResources.StatusIsPerPort",
+        "PortsFixture.WritersTimeIsTheLogicalClockOrTheRealOne",
+    ),
+    "Kind and type have to be equal": ("PortsFixture.UnequalKindsAndTypesAreRefused",),
+    "of any installed message type": (
+        "ros/test_bound_topics.py::test_a_type_nobody_registered_is_received_and_written",
+    ),
+    "the messages travel in C++, the interpreter has no part in them": (
+        "bench: CPU of an executor that sends ",
+        "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
+    ),
+    "Names are relative to the executor's namespace": (
+        "ros/test_executor_list.py::test_resources_have_the_names_that_ros_sees",
+    ),
+    "Quality of service is a profile's name or fields of your own": (
+        "ros/test_bound_topics.py::test_qualities_of_service_by_field_are_those_of_the_topic",
+        "ros/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
+        "python/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
+    ),
+    "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
+        "ros/test_bound_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
+    ),
+    "counts what passed, what was refused": (
+        "ros/test_bound_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
+        "ros/test_bound_topics.py::test_missed_deadlines_are_counted",
+    ),
+    "says when another node's type or quality of service does not fit": (
+        "ros/test_bound_topics.py::test_another_type_that_comes_to_the_topic_is_told",
+        "ros/test_bound_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
+    ),
+    "A thread of its own sends them: real-time, at the lowest priority": (
+        "ros/test_bound_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
+    ),
+    "Where a message must not wait for other components' work": (
+        "ros/test_bound_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
+        "bench: the same, sent on the component's CPU, p",
+    ),
+    "the calls of a `client` are answered by one": (
+        "ros/test_bound_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
+        "ros/test_bound_calls.py::test_a_resources_call_is_a_ros_service",
+    ),
+    "never blocks longer than `timeout_ms`": ("ClientCall.TimesOutAndIsNotAnsweredByALateReply",),
+    "a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
+    "bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
+    "What a transaction adds may be bound as well": (
+        "ros/test_bound_calls.py::test_topics_and_services_come_and_go_while_all_runs",
+    ),
+    # ---- concepts: deployment and change
+    "meets all of them at a barrier and only then publishes one epoch": (
+        "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
+        "HygieneOfTheKernel.NoPageFaultAfterTheStart",
+        "system/test_figures.py::test_with_it_both_are_on_one_grid",
+    ),
+    "`stop` interrupts a wait at once": ("Rule6Threads.AStopNeverWaitsOutAPeriod",),
+    "`start` enters at the next instant of the grid": (
+        "Rule6Simulated.StartsAtTheFirstInstantLaterThanTheMargin",
+        "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
+    ),
+    "Fig. 3, 5 and 6 drawn from traces": ("system/test_figures.py::test_the_drawings_are_whole",),
+    "is prepare, commit, retire": (
+        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+        "python/test_python_components.py::test_replaced_cores_are_let_go",
+    ),
+    "is built, bound and configured on an ordinary thread while the old one runs": (
+        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+    ),
+    "The commit happens on the component's own thread, inside a wait": (
+        "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
+    ),
+    "`adopt` may refuse, then everything goes on as before": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "So a replaced core misses no release": (
+        "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
+        "Rule9Parts.ACoreKeepsThePositionAndThePendingInstant",
+        "bench: , releases missed",
+    ),
+    "and nobody else is touched": ("bench: , releases missed by ",),
+    "A new fsm or shell begins in its initial state, at the next instant of its own grid": (
+        "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
+        "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
+    ),
+    "The time between the thread's `parked` and `armed` records is the **blackout**": (
+        "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
+    ),
+    "that come into force together or not at all": (
+        "Rule10Random.TransactionsDoWhatTheModelSaysOrNothing",
+        "Rule10Transaction.CoresAndPropertiesOfTwoComponentsChangeAtOnce",
+        "bench: : architectures other than described",
+    ),
+    "then the components it touches meet, each in its wait": (
+        "Rule10Transaction.WiresAreSwappedBetweenTwoRunningComponents",
+    ),
+    "leaves for its own instant and comes back, so it misses no release": (
+        "Rule7Threads.WhoWaitsForALongExecutionOfAnotherMissesNoRelease",
+    ),
+    "until all have met or the transaction is refused": (
+        "Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",
+    ),
+    "leaves the architecture as it was, and the error names the step": (
+        "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
+        "python/test_executor_control.py::test_a_refusal_names_the_step_and_changes_nothing",
+    ),
+    "parks it `FAULTED`, its outputs safe; all others run on": (
+        "Rule11Faults.AnExceptionParksItsComponentAndWritesItsOutputs",
+        "ros/test_executor_process.py::test_fault_is_told_at_once_and_the_others_run_on",
+    ),
+    "caught by a watchdog, which takes its thread's priority away": (
+        "Rule11Faults.AStateOverItsDeclaredTimeIsCaughtByTheWatchdog",
+    ),
+    "the component's own thread puts that one in": (
+        "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
+        "Rule11Fallback.StartsInTheInitialStateAtTheNextInstantOfTheGrid",
+    ),
+    "equal seeds give equal traces, bit for bit": (
+        "Rule13SimulationSeeds.EqualSeedsGiveEqualTracesBitForBit",
+        "python/test_simulation.py::test_two_runs_leave_the_same_trace_byte_by_byte",
+    ),
+    "save writing the usual": (
+        "Elements.AFilterIsOneMethod",
+        "ElementsHygiene.NoAllocationOnAComponentThread",
+    ),
+    "with which a component is one method `update()`": (
+        "Elements.AFilterIsOneMethod",
+        "python/test_elements.py::test_a_core_in_python_needs_but_one_method",
+    ),
+    "a multiplexer switched by a property in flight": (
+        "Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",
+    ),
+    "passes the first input that is fresh": (
+        "Elements.APriorityMultiplexerPassesTheFirstThatIsFresh",
+        "python/test_elements.py::test_a_person_s_command_goes_before_the_robot_s",
+    ),
+    "`mauve_rt/TwistPriorityMultiplexer`": (
+        "python/test_elements.py::test_what_is_listed_is_what_is_registered",
+    ),
+    "*when* nothing was heard for so long, *do* this transaction, and *undo* it": (
+        "ros/test_supervisor_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
+        "python/test_rules_engine.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
+    ),
+    "fixed-size records that component threads put into wait-free rings": (
+        "TraceRing.LosesNothingBetweenTwoThreads",
+        "bench: trace record, on",
+    ),
+    "neither the disk nor the interpreter is in the way of a component": (
+        "TraceCollectorTest.NothingIsLostWhileNobodyTakes",
+        "HygieneOfTheKernel.NoAllocationAfterTheStart",
+    ),
+    "a track per component, with states as slices and reconfigurations as flows": (
+        "python/test_trace_perfetto.py::test_one_process_and_its_components",
+        "python/test_trace_perfetto.py::test_a_reconfiguration_flows_from_the_request_to_the_next_release",
+    ),
+    "`mauve check FILE...` says what is wrong with architecture, rules and steps files": (
+        "python/test_check.py::test_an_architecture_file",
+        "python/test_check.py::test_a_rules_file_by_itself",
+        "python/test_check.py::test_a_steps_file_by_itself",
+    ),
+    "Beside an architecture file, rules and steps are tried on it": (
+        "python/test_check.py::test_steps_beside_an_architecture_are_tried_on_it",
+        "python/test_check.py::test_rules_beside_an_architecture_do_and_undo",
+    ),
+    "It warns of a subscription that ordinary publishers will not match": (
+        "python/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",
+    ),
+    # ---- write a core
+    "a shell, a core, an fsm": ("python/test_readme_examples.py::test_listings_stand_in_the_sources",),
+    "a method for each action and guard of the fsm, whichever language that was written in": (
+        "python/test_python_core.py::test_it_takes_the_place_of_a_core_in_cpp_and_gives_it_back",
+    ),
+    "It runs in the component's own thread too": (
+        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+    ),
+    "accepts what its architecture file names among its `alternatives`": (
+        "python/test_model_plugins.py::test_lines_of_an_index",
+        "Rule9Replace.OnlyDeclaredCoresByName",
+    ),
+    "install/lib/mauve_rt/executor --ros-args -p architecture:=": (
+        "python/test_python_core.py::test_the_tutorial_s_architecture_file_takes_it",
+    ),
+    "mauve replace-core /executor metronome": (
+        "python/test_python_core.py::test_the_tutorial_s_architecture_file_takes_it",
+    ),
+    "that need neither ROS nor a file": (
+        "python/test_readme_examples.py::test_architecture_and_deployer_need_no_ros",
+        _KERNEL_ALONE,
+    ),
+    "has the paper's Listings 1 to 3 as a program": ("ctest: listings",),
+    "Whole components can be written in Python": (
+        "python/test_python_components.py::test_python_and_cpp_exchange_data_both_ways",
+    ),
+    "`mauve_examples/tutorials/python_component.py` has a shell, a core and an fsm": (
+        "python/test_python_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",
+    ),
+    "a laser's driver faults and the robot stands still": ("ctest: sensor_breaks",),
+    "removes the old chain, and the robot drives again": ("ctest: sensor_breaks",),
+    "its pose does not jump": ("ctest: gps_lost",),
+    "and fail if there was a gap": ("ctest: sensor_breaks", "ctest: gps_lost"),
+    "A package of your own (`tests/downstream/` is a complete one)": (
+        "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
+    ),
+    # ---- real time
+    "Without the rights to it everything runs all the same": (
+        "ros/test_executor_process.py::test_without_real_time_rights_it_runs_and_says_so",
+    ),
+    "`require_realtime: true` in the architecture file refuses instead": (
+        "ros/test_executor_process.py::test_require_realtime_refuses_to_run_without",
+    ),
+    "Every figure stands beside a reference measured in turn with it in the same run": (
+        "python/test_bench_statistics.py::test_every_round_begins_with_another_side",
+        "python/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
+    ),
+    "| wake-up of a 1 kHz component, machine idle": (
+        "bench: wake-up latency of a 1 kHz component, machine idle",
+    ),
+    "| the same under stress-ng": ("bench: wake-up latency of a 1 kHz component, stress-ng",),
+    "| the same in an executor whose rclpy side is kept busy": (
+        "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
+    ),
+    "| spread of the first releases of 8 x 1 kHz components": (
+        "bench: spread of the first releases of 8 x 1 kHz components on ",
+    ),
+    "| nominal phase error after 1,000 random stops and starts": (
+        "bench:  random stop/start, nominal, worst",
+    ),
+    "| stop while asleep in a 5 s wait": ("bench: stop while asleep, ",),
+    "| stop in mid-execution, beyond what was left of it": (
+        "bench: stop in mid-execution, 20 ms left, 5 s period, over the 20 ms, p",
+    ),
+    "| core replaced at 1 kHz with 100 us of work, blackout": (
+        "bench: , blackout p50",
+        "bench: , blackout p99",
+    ),
+    "| releases missed in 1,000 such replacements": ("bench: , releases missed",),
+    "| transaction over 5 running 1 kHz components, rewiring two": (
+        "bench: transaction over 5 running 1 kHz components, rewiring two",
+    ),
+    "| releases missed for it, components touched or not": ("bench: , releases missed by ",),
+    "| `shared_data` read, 16 B / 4 KiB": ("bench: SharedData ",),
+    "| `latest_value` read, 16 B": ("bench: LatestValue read, 16 B", "bench: , against a hammering writer"),
+    "| one activation of a two-state fsm": ("bench: one activation of a two-state FSM, kernel work only, ",),
+    "| trace record, on / off": ("bench: trace record, on", "bench: trace record, off"),
+    "| FIFO 90 blocked by a 2 ms holder": (
+        "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
+    ),
+    "| 500 components at 10 Hz": ("bench: : time until all threads are ready", "bench: : locked memory each"),
+    "random transactions (7,620 of them refused as they should)": (
+        "bench: : architectures other than described",
+        "bench: : growth of the heap",
+    ),
+    "| a Point from a 1 kHz component's write to another process's subscription": (
+        "bench: a Point from a 1 kHz component's write to another process's subscription",
+    ),
+    "| CPU of an executor that sends 20 topics at 1 kHz": ("bench: CPU of an executor that sends ",),
+    "| the same beside rclpy": ("bench: rclpy node with a timer each", "bench:  topics, lost: "),
+    "| wake-up of the 1 kHz component that writes these 20 topics": (
+        "bench: wake-up latency of the 1 kHz component that writes these ",
+    ),
+    "| `replace_core` of a 1 kHz component over its service": (
+        "bench: replace_core of a 1 kHz component over its service, p",
+    ),
+    "| the same without waiting for the next release to report its phase": (
+        "bench: the same with report_phase_timeout_s 0, p",
+    ),
+    "| executor with 5 components, from its process to the first release": (
+        "bench:  components, from its process to the first release",
+        "bench: of it, until the components are being configured",
+    ),
+    "| recording 100,000 trace records a second": (
+        "bench: the executor's threads but the components', recording",
+        "bench: records lost at that rate, in any round",
+        "bench: bytes of a record in the bag",
+    ),
+    "| lost by `kill -9` meanwhile, 50 times at random": (
+        "bench: lost by kill -9 while recording 100,000 records a second, worst",
+    ),
+    "| reading a bag of 1 / 10 million records, and its statistics": ("bench: reading a bag of ",),
+    "| `mauve report` of 1 / 10 million records, whole process": ("bench: `mauve report` of ",),
+    "`exploration` is replaced with a blackout of 4 to 38 us": (
+        "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
+    ),
+    # ---- the house
+    "`scripts/lint` checks style, types, layers and includes": (
+        "python/test_readme_scripts.py::test_ci_runs_every_tool_and_every_test",
+    ),
+    "Knows neither ROS nor Python": (_KERNEL_ALONE,),
+    "| folder | what |": ("python/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
+    "LGPL-3.0-or-later": ("python/test_readme_examples.py::test_the_licence_is_the_one_named",),
+}
+
+# Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
+PROMISE_NOTHING = (
+    "MAUVE RT is a component framework on ROS 2 Jazzy",
+    "It implements and extends the design of D",
+    "Doose, C",
+    "Grand and C",
+    "Lesire, *MAUVE Runtime",
+    "On Debian 12 or Ubuntu 24.04 with git and python3",
+    "*The report of a run of 2026-11-22",
+    "Chosen because no stall of the machine is in it",
+    "*The same run: both robots",
+    "And the services are there for anyone:",
+    "An executor of your own:",
+    "A **component** is three things",
+    "The **shell** is what others see",
+    "The **core** is data and algorithms",
+    "The **fsm** says when",
+    "An fsm may also wait for an *event*",
+    "**Resources** hold data and offer services that ports connect to",
+    "[0]}}` says how urgently it runs",
+    "For the common ROS types architecture files name them directly",
+    "Architecture files are YAML",
+    "To grant the rights to a group `realtime`",
+    "`scripts/bench --quick` on 2026-11-22",
+    "Intel Xeon, 2 CPUs, a **virtual machine**",
+    "Your machine will show others",
+    "The soak is from `--full`",
+    "(*) From a later run",
+    "(**) Of the same day",
+    "| what | measured | reference",
+    "| --- |",
+    "| `mauve_",
+    "| `benchmarks/`",
+    "Licence:",
+    "From Python:",
+    "The **supervisor** watches topics and applies rules",
+)

@@ -1,0 +1,202 @@
+"""README's examples do what it says: its commands, files and programs are taken from it and tried."""
+
+import ast
+import importlib
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from synthetic_traces import deploy, run
+
+from mauve_rt import _kernel
+from mauve_rt.cli.main import build_parser, main
+from mauve_rt.model import load_architecture
+from mauve_rt.model.schema import GIVEN_RESOURCES
+from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.synthetic import SyntheticSource
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+INSTALLED = Path(_kernel.__file__).resolve().parents[4]
+ROBOT = ROOT / "mauve_examples" / "architecture" / "robot.yaml"
+COMPONENTS = "mauve: 1\ncomponents:\n  one: {shell: a/A, core: a/A, fsm: a/A}\n"
+
+
+def _commands(first: str) -> list[list[str]]:
+    """The command lines of README that begin with a word, as the shell would split them."""
+    joined = README.replace("\\\n", " ")
+    lines = (line.strip() for line in joined.splitlines() if line.startswith("    "))
+    return [shlex.split(line, comments=True) for line in lines if line.split()[:1] == [first]]
+
+
+def _indented(begin: str) -> str:
+    """The indented block that begins with a line, without its indent."""
+    lines = README[README.index(f"    {begin}") :].splitlines()
+    end = next(index for index, line in enumerate(lines) if line.strip() and not line.startswith("    "))
+    return "\n".join(line[4:] for line in lines[:end]) + "\n"
+
+
+def _fenced(language: str, word: str) -> str:
+    blocks = re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return next(str(block) for block in blocks if word in block)
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """A short run of a component named control."""
+    source = SyntheticSource(["control"])
+    deploy(source, "control")
+    run(source, "control", 20)
+    recorder = Recorder(source, tmp_path / "bag", node_name="/executor")
+    recorder.start()
+    recorder.stop()
+    return tmp_path / "bag"
+
+
+def test_every_command_is_one_that_mauve_takes() -> None:
+    commands = [words[:-1] if words[-1] == "&" else words for words in _commands("mauve")]
+    assert len(commands) > 15
+    for words in commands:
+        placed = [word.replace("DIR...", "DIR") for word in words[1:]]
+        assert build_parser().parse_args(placed).verb is not None, words
+
+
+def test_the_steps_fit_the_mission(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = re.search(r"cat > steps.yaml <<END\n(.*?)\n    END\n", README, re.DOTALL)
+    assert text is not None
+    steps = tmp_path / "steps.yaml"
+    steps.write_text("\n".join(line[4:] for line in text[1].splitlines()), encoding="utf-8")
+    assert main(["check", str(ROBOT), str(steps)]) == 0, capsys.readouterr().err
+    assert f"{steps}: 2 steps, tried on {ROBOT}: no error found" in capsys.readouterr().out
+
+
+def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    resources = _indented("resources:") + _indented("  lamp:")
+    thresholds = _indented("executor: {diagnostics").replace("...", "shell: a/A, core: a/A, fsm: a/A")
+    for text in (COMPONENTS + resources, f"mauve: 1\n{thresholds}"):
+        file.write_text(text, encoding="utf-8")
+        model = load_architecture(file)
+    assert model.components["control"].diagnostics.wakeup_max_us is not None
+    sender = re.search(r"`(executor: {sender: .*?}})`", README, re.DOTALL)
+    assert sender is not None
+    file.write_text(f"{COMPONENTS}{' '.join(sender[1].split())}\n", encoding="utf-8")
+    assert load_architecture(file).sender.priority == 70
+
+
+def test_every_kind_of_resource_is_told() -> None:
+    concepts = README[README.index("**Resources** hold data") :]
+    assert [kind for kind in GIVEN_RESOURCES if f"`{kind}`" not in concepts] == []
+
+
+def test_service_calls_have_fields_of_their_services() -> None:
+    calls = [words for words in _commands("ros2") if words[1:3] == ["service", "call"]]
+    assert len(calls) >= 2
+    for _, _, _, service, type_name, fields in calls:
+        package, kind, name = type_name.split("/")
+        known = getattr(importlib.import_module(f"{package}.{kind}"), name).Request
+        given = re.findall(r"(\w+):", fields)
+        assert set(given) <= set(known.get_fields_and_field_types()), service
+
+
+def test_launch_arguments_are_declared() -> None:
+    launched = [words for words in _commands("ros2") if words[1] == "launch"]
+    assert len(launched) == 2
+    for _, _, package, name, *arguments in launched:
+        source = (ROOT / package / "launch" / name).read_text(encoding="utf-8")
+        texts = {node.value for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Constant)}
+        assert {argument.partition(":=")[0] for argument in arguments} <= texts, name
+
+
+def test_the_python_example_reads_a_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program = _fenced("python", "all_statistics").replace('"DIR"', repr(str(bag)))
+    exec(compile(program, "README.md", "exec"), {})  # noqa: S102 - a reader would run it too
+    assert "control" in capsys.readouterr().out
+
+
+def test_the_report_is_written_from_python(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call = re.search(r"`(mauve_rt\.trace\.report\.write_report\(.*?\))`", README)
+    assert call is not None
+    monkeypatch.chdir(tmp_path)
+    program = f"import mauve_rt.trace.report\nfrom pathlib import Path\n{call[1]}".replace('"DIR"', '"bag"')
+    exec(compile(program, "README.md", "exec"), {})  # noqa: S102
+    assert (tmp_path / "report.html").stat().st_size > 10_000
+
+
+def _lines_not_in(listing: str, source: Path, *, but: Sequence[str]) -> list[str]:
+    present = {line.strip() for line in source.read_text(encoding="utf-8").splitlines()}
+    lines = [line.strip() for line in listing.splitlines() if not any(word in line for word in but)]
+    assert len(lines) > 10
+    return [line for line in lines if line and line not in present]
+
+
+def test_listings_stand_in_the_sources() -> None:
+    tutorials = ROOT / "mauve_examples" / "tutorials"
+    shortened = ("...", "property(", "};")
+    assert _lines_not_in(_fenced("cpp", "Metronome"), tutorials / "metronome.hpp", but=shortened) == []
+    python = _fenced("python", "class Metronome")
+    assert _lines_not_in(python, tutorials / "python_cores.py", but=("class Metronome",)) == []
+
+
+METRONOME = """
+import sys
+from mauve_rt.api import Architecture, Deployer, PluginRegistry
+from mauve_rt.model import PluginIndex, PluginLoader
+
+registry = PluginRegistry()
+loader = PluginLoader(registry, PluginIndex.installed())
+parts = {"shell": "MetronomeShell", "core": "Metronome", "fsm": "MetronomeFsm"}
+for kind, name in parts.items():
+    loader.require(kind, f"mauve_examples/{name}")
+architecture = Architecture(registry)
+architecture.add_component("metronome", *(f"mauve_examples/{name}" for name in parts.values()))
+architecture.configure()
+deployer = Deployer(architecture)
+deployer.deploy()
+assert architecture.components()[0].state == "RUNNING"
+deployer.shutdown()
+"""
+
+
+def test_architecture_and_deployer_need_no_ros(tmp_path: Path) -> None:
+    (tmp_path / "rclpy.py").write_text("raise ImportError('no ROS here')\n", encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, "-c", METRONOME]
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_kernel_knows_neither_ros_nor_python() -> None:
+    library = INSTALLED / "lib" / "libmauve_rt.so"
+    needed = subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout
+    libraries = re.findall(r"NEEDED.*\[(.*)\]", needed)
+    assert libraries
+    assert [
+        name for name in libraries if re.match(r"lib(rcl|rmw|ros|python|fastrtps|mauve_msgs)", name)
+    ] == []
+
+
+def test_the_folders_of_the_house_are_there() -> None:
+    folders = re.findall(r"^\| `([\w/]+/)` \|", README, re.MULTILINE)
+    assert len(folders) >= 10
+    assert [folder for folder in folders if not (ROOT / folder).is_dir()] == []
+
+
+def test_files_that_readme_names_are_there() -> None:
+    folders = "mauve_\\w+|tests|docs|benchmarks|scripts"
+    named = re.findall(rf"[`(]((?:{folders})/[\w./]*(?:\.\w+|/))[`)]", README)
+    assert len(named) > 15
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_licence_is_the_one_named() -> None:
+    assert "GNU LESSER GENERAL PUBLIC LICENSE" in (ROOT / "LICENSE").read_text(encoding="utf-8")[:200]
+    assert "<license>LGPL-3.0-or-later</license>" in (ROOT / "package.xml").read_text(encoding="utf-8")
