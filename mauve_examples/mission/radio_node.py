@@ -139,9 +139,11 @@ def run_node(arguments: list[str] | None, stop: threading.Event) -> int:
         return BAD_INPUT
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    while not stop.is_set():
-        executor.spin_once(timeout_sec=SPIN_S)
-    executor.shutdown()
-    node.destroy_node()
-    try_shutdown()
+    try:
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=SPIN_S)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        try_shutdown()
     return 0

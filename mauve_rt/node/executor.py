@@ -8,6 +8,7 @@
 Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.
 """
 
+import gc
 import sys
 import threading
 from collections.abc import Sequence
@@ -58,11 +59,14 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
 
     from mauve_rt.node.executor_node import ExecutorNode  # noqa: PLC0415
 
+    node = None
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
         node = ExecutorNode(runtime, namespace=settings.node_namespace())
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"executor: {error}")
+    if node is None:
+        gc.collect()  # what there is of the node holds itself alone, and the DDS participant with it
         try_shutdown()
         return BAD_INPUT
     if discovery:

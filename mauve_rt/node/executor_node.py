@@ -187,14 +187,25 @@ class ExecutorNode(LifecycleNode):
 
         A component whose state still executes keeps its memory until the process ends.
         """
-        self.quiesce()
         try:
-            self._release()
-        except MauveError as error:
-            self.get_logger().error(str(error))
-            self._recording.stop()
-            self._bound.close()
-        self.destroy_node()
+            self.quiesce()
+            try:
+                self._release()
+            except MauveError as error:
+                self.get_logger().error(str(error))
+                self._recording.stop()
+                self._bound.close()
+        finally:
+            self.destroy_node()
+
+    def destroy_node(self) -> None:
+        """As rclpy's, which forgets the state machine: that would keep the node, and so the DDS participant.
+
+        A participant that is not disposed of stays in others' graphs for its lease of 20 s, and its shared
+        memory in /dev/shm for ever.
+        """
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
 
     def _release(self) -> None:
         self._runtime.require_parked()
