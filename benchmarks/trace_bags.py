@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.trace.recorded import Split
 from mauve_rt.trace.records import RECORD, Kind, Records
-from mauve_rt.trace.trace_bag import Drained, Split, TraceBag
+from mauve_rt.trace.trace_bag import Drained, TraceBag
 
 COMPONENTS = ("control", "guidance", "mapping", "planner", "watch")
 _NAMES = ["", "Work", "Rest"]

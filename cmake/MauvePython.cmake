@@ -42,6 +42,9 @@ function(mauve_install_python_package package)
     PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE
     PATTERN "maps" EXCLUDE PATTERN "architecture" EXCLUDE PATTERN "launch" EXCLUDE)
   mauve_link_installed("${PROJECT_SOURCE_DIR}/${package}" "${PYTHON_INSTALL_DIR}/${package}")
+  # Compiled now: who runs it may have no right to write here, and would compile it at every start.
+  install(CODE "execute_process(COMMAND \"${Python3_EXECUTABLE}\" -m compileall -q
+    \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${PYTHON_INSTALL_DIR}/${package}\" COMMAND_ERROR_IS_FATAL ANY)")
 endfunction()
 
 # mauve_register_package(<name>): lets `ros2 run`, `ros2 pkg` and our own plug-in search find the package.

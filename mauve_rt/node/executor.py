@@ -31,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     words = list(sys.argv if arguments is None else arguments)
     discovery = limit_discovery()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work
     leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
 
 
@@ -62,7 +63,8 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     node = None
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
-        node = ExecutorNode(runtime, namespace=settings.node_namespace())
+        namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
+        node = ExecutorNode(runtime, namespace=namespace)
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"executor: {error}")
     if node is None:
@@ -73,6 +75,8 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         node.get_logger().info(discovery)
     status = FAILED
     try:
+        gc.freeze()  # nor need it be looked at while Python components run and wait for the interpreter
+        gc.enable()
         status = _autostart(node, stop) if settings.autostart else 0
         if status == 0:
             _spin(node, stop)

@@ -17,8 +17,7 @@ from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
 from mauve_rt.node.qos import native_qos, qos_profile, recorded_qos
-from mauve_rt.trace.bag import TopicQos
-from mauve_rt.trace.trace_bag import SentMessage
+from mauve_rt.trace.recorded import SentMessage, TopicQos
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
-from mauve_rt.trace import TraceError
-from mauve_rt.trace.recorder import Split
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.recorded import Split
 
 NODE_NAME = "executor"
 MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
@@ -21,8 +21,11 @@ from mauve_rt.node.executor_messages import trace_architecture
 from mauve_rt.node.executor_requests import Code, RecordingOrder, RefusalError
 from mauve_rt.node.executor_runtime import Observed, Runtime
 from mauve_rt.node.qos import qos_profile, recorded_qos
-from mauve_rt.trace import TraceError
-from mauve_rt.trace.recorder import Recorder, Split
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.recorded import Split
+
+if TYPE_CHECKING:
+    from mauve_rt.trace.recorder import Recorder
 
 _DEPTH = 100  # of the topics recorded beside the executor's own
 _BEST_EFFORT = "best_effort"
@@ -89,6 +92,8 @@ class Recording:
             TraceError: the folder exists already or cannot be written.
 
         """
+        from mauve_rt.trace.recorder import Recorder  # noqa: PLC0415 - a start without a bag needs none
+
         chosen = [self._chosen(topic) for topic in topics]
         with self._lock:
             self.stop()

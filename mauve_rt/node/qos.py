@@ -5,7 +5,7 @@ from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, Reliabilit
 
 from mauve_rt._bridge import Qos
 from mauve_rt.model.schema import QosModel
-from mauve_rt.trace.bag import TopicQos
+from mauve_rt.trace.recorded import TopicQos
 
 _PROFILES = {
     "reliable": QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),

@@ -21,7 +21,8 @@ from mauve_rt.node.qos import qos_profile, recorded_qos
 from mauve_rt.node.simulated_messages import serialize
 from mauve_rt.node.simulated_runtime import SimulatedRuntime
 from mauve_rt.node.simulated_topics import Sample, SimulatedTopics, resolved, stamp
-from mauve_rt.trace.trace_bag import SentMessage, TraceBag
+from mauve_rt.trace.recorded import SentMessage
+from mauve_rt.trace.trace_bag import TraceBag
 
 _STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _EVENT_QOS = QoSProfile(depth=100)

@@ -13,27 +13,7 @@ from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write
 from mauve_rt.trace.definitions import Definition, find_definition
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_file import McapFile
-
-_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # RMW_DURATION_INFINITE
-
-
-@dataclass(frozen=True, kw_only=True)
-class TopicQos:
-    """What `ros2 bag play` needs to offer a topic as it was offered."""
-
-    depth: int = 10
-    reliable: bool = True
-    transient_local: bool = False
-
-    def as_yaml(self) -> str:
-        """A list of one profile on one line, in the form of rosbag2 metadata version 9."""
-        reliability = "reliable" if self.reliable else "best_effort"
-        durability = "transient_local" if self.transient_local else "volatile"
-        return (
-            f"[{{history: keep_last, depth: {self.depth}, reliability: {reliability}, "
-            f"durability: {durability}, deadline: {_FOREVER}, lifespan: {_FOREVER}, liveliness: automatic, "
-            f"liveliness_lease_duration: {_FOREVER}, avoid_ros_namespace_conventions: false}}]"
-        )
+from mauve_rt.trace.recorded import TopicQos
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from mauve_rt.trace.bag import TopicQos
+from mauve_rt.trace.recorded import SentMessage, Split, TopicQos
 from mauve_rt.trace.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
     NAMES,
     Drain,
     MessageSource,
-    SentMessage,
-    Split,
     TraceBag,
     TraceSource,
 )
@@ -25,7 +23,6 @@ __all__ = [
     "Drain",
     "MessageSource",
     "Recorder",
-    "Split",
     "TraceSource",
 ]
 

@@ -1,13 +1,13 @@
 """The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from mauve_rt.trace.bag import BagWriter, TopicQos
+from mauve_rt.trace.bag import BagWriter
 from mauve_rt.trace.cdr import Batch, encode_batch, encode_names
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.recorded import SentMessage, Split, TopicQos
 
 BATCHES = "trace/batches"
 NAMES = "trace/names"
@@ -74,16 +74,6 @@ class TraceSource(TraceWords, Protocol):
         """Take everything out of the rings, and what was collected."""
 
 
-class SentMessage(NamedTuple):
-    """A serialized message: CDR with its header, ns of the clock that the trace is on."""
-
-    topic: str
-    type_name: str
-    data: bytes
-    monotonic_ns: int
-    qos: TopicQos | None
-
-
 class MessageSource(Protocol):
     """Messages kept elsewhere until the recorder takes them."""
 
@@ -95,14 +85,6 @@ class MessageSource(Protocol):
 
     def dropped_messages(self) -> int:
         """Messages that found no room to wait, ever."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Split:
-    """When a bag goes on in a new file: whichever comes first; 0: never for that reason."""
-
-    after_s: float = 60.0
-    after_bytes: int = 0
 
 
 class TraceBag:

@@ -20,7 +20,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag import BagWriter, TopicQos
+from mauve_rt.trace.bag import BagWriter
+from mauve_rt.trace.recorded import TopicQos
 
 T0 = 1_700_000_000_000_000_000
 TEXT = "mauve_test_msgs/msg/Text"

@@ -20,7 +20,8 @@ import mauve_rt.trace
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag_repair import examine_bag, repair_bag
 from mauve_rt.trace.mcap_file import McapFile
-from mauve_rt.trace.recorder import Recorder, Split
+from mauve_rt.trace.recorded import Split
+from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import Kind
 from mauve_rt.trace.synthetic import SyntheticSource
 

@@ -1,0 +1,43 @@
+"""What is recorded and how, as plain values: for who only names it, without what writes bags."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # RMW_DURATION_INFINITE
+
+
+@dataclass(frozen=True, kw_only=True)
+class TopicQos:
+    """What `ros2 bag play` needs to offer a topic as it was offered."""
+
+    depth: int = 10
+    reliable: bool = True
+    transient_local: bool = False
+
+    def as_yaml(self) -> str:
+        """A list of one profile on one line, in the form of rosbag2 metadata version 9."""
+        reliability = "reliable" if self.reliable else "best_effort"
+        durability = "transient_local" if self.transient_local else "volatile"
+        return (
+            f"[{{history: keep_last, depth: {self.depth}, reliability: {reliability}, "
+            f"durability: {durability}, deadline: {_FOREVER}, lifespan: {_FOREVER}, liveliness: automatic, "
+            f"liveliness_lease_duration: {_FOREVER}, avoid_ros_namespace_conventions: false}}]"
+        )
+
+
+class SentMessage(NamedTuple):
+    """A serialized message: CDR with its header, ns of the clock that the trace is on."""
+
+    topic: str
+    type_name: str
+    data: bytes
+    monotonic_ns: int
+    qos: TopicQos | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Split:
+    """When a bag goes on in a new file: whichever comes first; 0: never for that reason."""
+
+    after_s: float = 60.0
+    after_bytes: int = 0
