@@ -10,6 +10,8 @@ from mauve_msgs.srv import Start, Stop
 from mauve_rt.cli.client import Client
 from mauve_rt.errors import MauveError
 
+_START_S = 10.0  # it may have been spawned just now
+
 
 class ExecutorProcess:
     """Of an architecture file, in a namespace of its own; it ends with the processes."""
@@ -58,7 +60,9 @@ class ExecutorProcess:
 
     def _ask(self, client: Client, service_type: type, service: str, request: object) -> None:
         try:
-            reply = client.call(service_type, f"{self.namespace}/executor/{service}", request)
+            reply = client.call(
+                service_type, f"{self.namespace}/executor/{service}", request, wait_s=_START_S
+            )
         except MauveError as error:
             raise BenchmarkError(f"executor: {error}; {self._processes.output(self._name)}") from None
         if not reply.success:

@@ -6,25 +6,24 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from types import FrameType
 from typing import Any
 
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 
+from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.discovery import limit_discovery
 
-DISCOVERY_TIMEOUT_S = 10.0  # seen here: 0.1 to 2.8 s
+DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another machine
+STARTING_S = 3.0  # where there is no executor at all, one may be starting
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
 RESEND_S = 4.0
-LISTING_S = 3.5
 _LIST_SERVICE = "mauve_msgs/srv/ListComponents"
 _POLL_S = 0.05  # waiting in rclpy does not end at a Ctrl-C: short waits do
+_LOOK_S = 0.01  # between two looks at what is discovered
 _interrupted = threading.Event()
 
 
@@ -35,29 +34,25 @@ class NoExecutorError(ParameterError):
 class Client:
     """Asks executors. For one thread."""
 
-    def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
-        self._node = node
-        self._executor = executor
+    def __init__(self, discovery: Discovery) -> None:
+        self._discovery = discovery
 
-    def call(
-        self, service_type: Any, service: str, request: Any, *, wait_s: float = DISCOVERY_TIMEOUT_S
-    ) -> Any:
+    def call(self, service_type: Any, service: str, request: Any, *, wait_s: float = 0.0) -> Any:
         """The reply of a service, e.g. `/robot_1/executor/stop`.
 
         A reply can be lost while the service does not know its new client yet: the request is sent again. An
         executor knows it by its id, and gives the first outcome.
 
+        Args:
+            service_type: its class.
+            service: its full name.
+            request: a message.
+            wait_s: how long to wait for a service that may be about to be there, whatever else there is.
+
         Raises:
-            NoExecutorError: no such service within `wait_s`, or no reply within 15 s.
+            NoExecutorError: all that is there is known and has no such service, or there is no reply in 15 s.
         """
-        asked = service.rpartition("/")[0]
-        client = self._node.create_client(service_type, service)
-        deadline = time.monotonic() + wait_s
-        while not client.service_is_ready():
-            if time.monotonic() >= deadline:
-                seen = ", ".join(name for name in self.seen_executors() if name != asked) or "none"
-                raise NoExecutorError(f"no service {service} within {wait_s:g} s; executors seen: {seen}")
-            self._spin_once()
+        participant, client = self._found(service_type, service, wait_s)
         if getattr(request, "request_id", None) == "":
             request.request_id = str(uuid.uuid4())
         futures: list[Any] = []
@@ -65,35 +60,81 @@ class Client:
         while (now := time.monotonic()) < deadline:
             if now >= deadline - REPLY_TIMEOUT_S + len(futures) * RESEND_S:
                 futures.append(client.call_async(request))
-            self._spin_once()
+            _spin_once(participant)
             for future in futures:
                 if future.done():
                     return future.result()
         raise NoExecutorError(f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?")
 
+    def _found(self, service_type: Any, service: str, wait_s: float) -> tuple[Participant, Any]:
+        """The first participant of ours that knows the service, and a client of it."""
+        clients: list[Any] = []
+        begun_s = time.monotonic()
+        while True:
+            newer = self._discovery.participants[len(clients) :]
+            clients += [participant.node.create_client(service_type, service) for participant in newer]
+            for participant, client in zip(self._discovery.participants, clients, strict=True):
+                if client.service_is_ready():
+                    return participant, client
+            waited_s = time.monotonic() - begun_s
+            if waited_s >= DISCOVERY_TIMEOUT_S or (
+                waited_s >= wait_s and self._is_hopeless(service, waited_s)
+            ):
+                raise NoExecutorError(self._missing(service))
+            self._look_again()
+
+    def _is_hopeless(self, service: str, waited_s: float) -> bool:
+        """Whether all that is there is known, and has no such service."""
+        if not self._discovery.is_complete() or service in self._discovery.offered():
+            return False  # in the second case its endpoints are being matched
+        return bool(self.seen_executors()) or waited_s >= STARTING_S
+
+    def _missing(self, service: str) -> str:
+        from mauve_rt.model.words import did_you_mean  # noqa: PLC0415 - takes its time to load
+
+        asked, _, name = service.rpartition("/")
+        domain = f"ROS_DOMAIN_ID {self._discovery.domain}"
+        seen = self.seen_executors()
+        if not seen:
+            return f"no executor {asked}: none is seen at all in {domain}; is it started, in this domain?"
+        if asked in seen:
+            return f"executor {asked} has no service {name} in {domain}; is it another version of mauve_rt?"
+        return f"no executor {asked} in {domain}; {did_you_mean(asked, seen)}"
+
     def seen_executors(self) -> list[str]:
         """Executors discovered so far."""
         suffix = "/list_components"
-        found = self._node.get_service_names_and_types()
-        return sorted(name.removesuffix(suffix) for name, types in found if _LIST_SERVICE in types)
+        offered = self._discovery.offered()
+        return sorted(name.removesuffix(suffix) for name, types in offered.items() if _LIST_SERVICE in types)
 
-    def find_executors(self, *, wait_s: float = LISTING_S) -> list[str]:
-        """Executors, after discovery had the time it takes."""
+    def find_executors(self, *, wait_s: float = ANNOUNCED_S) -> list[str]:
+        """Executors, as soon as all that is there is known; after `wait_s` where that cannot be told."""
         deadline = time.monotonic() + wait_s
-        while time.monotonic() < deadline:
-            self._spin_once()
+        while not self._discovery.is_complete() and time.monotonic() < deadline:
+            self._look_again()
         return self.seen_executors()
 
     def listen(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
         """Call `heard` with every message, until KeyboardInterrupt."""
-        self._node.create_subscription(message_type, topic, heard, QoSProfile(depth=100))
+        participant = self._discovery.participants[0]
+        participant.node.create_subscription(message_type, topic, heard, QoSProfile(depth=100))
         while True:
-            self._spin_once()
+            _spin_once(participant)
 
-    def _spin_once(self) -> None:
-        self._executor.spin_once(timeout_sec=_POLL_S)
-        if _interrupted.is_set():
-            raise KeyboardInterrupt
+    def _look_again(self) -> None:
+        self._discovery.hurry()
+        time.sleep(_LOOK_S)
+        _raise_interrupts()
+
+
+def _spin_once(participant: Participant) -> None:
+    participant.executor.spin_once(timeout_sec=_POLL_S)
+    _raise_interrupts()
+
+
+def _raise_interrupts() -> None:
+    if _interrupted.is_set():
+        raise KeyboardInterrupt
 
 
 @contextmanager
@@ -118,19 +159,8 @@ def _interrupts_between_spins() -> Iterator[None]:
 def connected() -> Iterator[Client]:
     """A client on a ROS context of its own; this machine only, unless the environment says otherwise."""
     limit_discovery()
-    context = Context()
-    with _interrupts_between_spins():
-        rclpy.init(context=context, args=[])
+    with _interrupts_between_spins(), closing(Discovery()) as discovery:
         try:
-            node = Node(
-                f"mauve_{os.getpid()}", context=context, enable_rosout=False, start_parameter_services=False
-            )
-            executor = SingleThreadedExecutor(context=context)
-            executor.add_node(node)
-            try:
-                yield Client(node, executor)
-            finally:
-                executor.shutdown(timeout_sec=0)
-                node.destroy_node()
-        finally:
-            context.try_shutdown()
+            yield Client(discovery)
+        except UnsupportedTypeSupport as error:  # as of a package whose libraries are not found
+            raise ImportError(str(error)) from error

@@ -9,10 +9,10 @@ executor.
 """
 
 import argparse
+import gc
+import os
 import sys
 from collections.abc import Sequence
-
-import argcomplete
 
 from mauve_rt import __version__
 from mauve_rt.cli.verb import run
@@ -21,8 +21,12 @@ from mauve_rt.cli.verbs import VERBS
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status."""
+    gc.disable()  # short-lived: looking for garbage in what is loaded is a tenth of the work
     parser = build_parser()
-    argcomplete.autocomplete(parser)
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks for a completion
+        import argcomplete  # noqa: PLC0415
+
+        argcomplete.autocomplete(parser)
     args = parser.parse_args(arguments)
     return run(args.verb, args)
 

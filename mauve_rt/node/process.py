@@ -42,17 +42,23 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
     work is doing. One before `stop.begin()`, while modules load, ends the process at once, with status 0.
     Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of
     every thread on stderr. For the main thread.
+
+    Raises:
+        ImportError: the work could not load what it needs.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     main_thread = threading.get_ident()
     stop = Stop()
     done = threading.Event()
     status = FAILED
+    missing: ImportError | None = None
 
     def body() -> None:
-        nonlocal status
+        nonlocal status, missing
         try:
             status = work(stop)
+        except ImportError as error:
+            missing = error
         finally:
             done.set()
             signal.pthread_kill(main_thread, signal.SIGTERM)
@@ -64,6 +70,8 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
         stop.ask()
         faulthandler.dump_traceback_later(_GRACE_S, exit=True)
     worker.join()
+    if missing is not None:
+        raise missing
     return status
 
 

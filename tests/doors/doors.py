@@ -106,6 +106,14 @@ class InstalledExecutor:
         assert self.process.poll() is None, self.output
         return run(self._mauve, *words, environment=self._environment)
 
+    def wait_until_there(self) -> None:
+        """Until `mauve` sees it."""
+        deadline = time.monotonic() + PATIENCE_S
+        command = [self._mauve, "nodes"]
+        while subprocess.run(command, env=self._environment, capture_output=True, check=False).returncode:
+            assert self.process.poll() is None, self.output
+            assert time.monotonic() < deadline, "no executor is seen"
+
     def component(self) -> dict[str, Any]:
         """The only component, as `mauve list` tells."""
         [component] = json.loads(self.mauve("list", "/executor", "--json"))["components"]
@@ -137,6 +145,7 @@ def installed_executor(
     """One that is gone at the end, whatever happens."""
     executor = InstalledExecutor(command, architecture, mauve=mauve, environment=environment)
     try:
+        executor.wait_until_there()
         yield executor
     finally:
         executor.process.kill()

@@ -3,6 +3,7 @@
 import contextlib
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,8 +14,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-from mauve_msgs.srv import Stop
-from mauve_rt.cli.client import connected
+from mauve_msgs.srv import ListComponents, Stop
+from mauve_rt.cli import client as client_module
+from mauve_rt.cli.client import NoExecutorError, connected
 
 
 class Peer:
@@ -86,3 +88,57 @@ def test_an_interrupt_inside_of_rclpy_is_not_lost(peer: Peer) -> None:
     with connected() as client, pytest.raises(KeyboardInterrupt):
         client.listen(Float64, "/peer/number", swallow)
     assert signal.getsignal(signal.SIGINT) is before
+
+
+LONG_S = 1000.0  # far beyond this test's own time-out
+
+
+def _list(peer: Peer, name: str) -> None:
+    peer.node.create_service(ListComponents, f"{name}/list_components", lambda _request, response: response)
+
+
+def test_a_wrong_name_is_told_as_soon_as_all_that_is_there_is_known(
+    peer: Peer, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(client_module, "DISCOVERY_TIMEOUT_S", LONG_S)
+    for name in ("/robot_1/executor", "/arm/boss"):
+        _list(peer, name)
+    peer.start()
+    with connected() as client, pytest.raises(NoExecutorError) as error:
+        client.call(ListComponents, "/robot_2/executor/list_components", ListComponents.Request())
+    expected = f"no executor /robot_2/executor in ROS_DOMAIN_ID {domain}; did you mean /robot_1/executor?"
+    assert str(error.value) == expected
+
+
+def test_executors_are_told_as_soon_as_all_are_known(
+    peer: Peer, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    _list(peer, "/robot_1/executor")
+    peer.start()
+    other = Peer(domain)
+    _list(other, "/robot_2/executor")
+    other.start()
+    try:
+        with connected() as client:
+            assert client.find_executors(wait_s=LONG_S) == ["/robot_1/executor", "/robot_2/executor"]
+    finally:
+        other.end()
+
+
+def test_an_empty_domain_is_known_to_be_empty(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with connected() as client:
+        assert client.find_executors(wait_s=LONG_S) == []
+
+
+def test_beyond_this_machine_nobody_can_be_counted(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    monkeypatch.delenv("ROS_LOCALHOST_ONLY", raising=False)
+    began_s = time.monotonic()
+    with connected() as client:
+        assert client.find_executors(wait_s=1.0) == []
+    assert time.monotonic() - began_s >= 1.0

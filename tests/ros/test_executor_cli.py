@@ -31,7 +31,8 @@ def environment(domain: int) -> dict[str, str]:
 
 
 @pytest.fixture
-def mauve(environment: dict[str, str], executor: Any) -> Mauve:
+def mauve(environment: dict[str, str], executor: Any, graph: Any) -> Mauve:
+    graph.spin_until(lambda: graph.node.count_services(f"{NODE}/list_parameters") > 0, "all services")
     assert executor.process.poll() is None
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
@@ -101,12 +102,20 @@ def test_events_are_followed(mauve: Mauve, environment: dict[str, str], tmp_path
     )
 
 
-def test_executors_are_found(mauve: Mauve) -> None:
+def test_executors_are_found(mauve: Mauve, environment: dict[str, str]) -> None:
     deadline = time.monotonic() + PATIENCE_S
     while (found := mauve("nodes").stdout) != f"{NODE}\n":  # it may still be loading
         assert (found, time.monotonic() < deadline) == ("", True)
     missing = mauve("list", "/robot_9/executor")
     assert missing.returncode == 2
-    assert (
-        f"no service /robot_9/executor/list_components within 10 s; executors seen: {NODE}" in missing.stderr
-    )
+    expected = f"no executor /robot_9/executor in ROS_DOMAIN_ID {environment['ROS_DOMAIN_ID']}"
+    assert missing.stderr == f"mauve: {expected}; did you mean {NODE}?\n"
+
+
+def test_a_domain_without_an_executor_is_told(environment: dict[str, str]) -> None:
+    command = [sys.executable, "-m", "mauve_rt.cli", "list", "/executor"]
+    empty = environment | {"ROS_DOMAIN_ID": "101"}  # above those that tests choose from
+    done = subprocess.run(command, env=empty, capture_output=True, text=True, check=False, timeout=40)
+    assert done.returncode == 2
+    expected = "no executor /executor: none is seen at all in ROS_DOMAIN_ID 101"
+    assert done.stderr == f"mauve: {expected}; is it started, in this domain?\n"

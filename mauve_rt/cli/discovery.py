@@ -1,0 +1,121 @@
+"""Discovery as a node with little time sees it: who is there, and when all of them are known.
+
+Fast DDS answers a new participant once, at its first word. That answer is often lost: the new one listens
+only when it has spoken to every port it knows. Then it hears of the other by that one's announcement, every
+3 s. Who is in a hurry speaks anew, by one more participant. And who is on this machine can be counted, for
+every participant has a port of those that RTPS defines.
+"""
+
+import os
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import get_rmw_implementation_identifier
+
+ANNOUNCED_S = 3.5  # by then every participant has told of itself, to whomever missed it before
+_SPOKEN_S = 0.2  # after which one more participant speaks: an answer comes within 0.11 s
+_MAX_SPEAKERS = 8
+_SETTLED_S = 0.15  # endpoints come in a few packets at once
+_FIRST_PORT, _DOMAIN_PORTS, _MAX_PARTICIPANTS = 7410, 250, 120  # of discovery by unicast, in RTPS
+_UDP = Path("/proc/net/udp")
+_KEY_BYTES = 12  # of an endpoint's global id: its participant's part
+
+
+class Participant(NamedTuple):
+    """A DDS participant of ours: a context has one as soon as it has a node."""
+
+    context: Context
+    node: Node
+    executor: SingleThreadedExecutor
+
+
+class Discovery:
+    """Our participants, and what they know together. For one thread."""
+
+    def __init__(self) -> None:
+        self.participants: list[Participant] = []
+        self._spoken_s = 0.0
+        self._seen: object = None
+        self._seen_s = time.monotonic()
+        self._speak()
+        self._can_count = _stays_on_this_machine() and _UDP.exists()
+
+    @property
+    def domain(self) -> int:
+        """The ROS domain."""
+        return int(self.participants[0].context.get_domain_id())
+
+    def offered(self) -> dict[str, list[str]]:
+        """The services that are offered, and their types, as any of ours knows."""
+        return {
+            name: types
+            for participant in self.participants
+            for name, types in participant.node.get_service_names_and_types()
+            if participant.node.count_services(name)  # clients have such names too
+        }
+
+    def is_complete(self) -> bool:
+        """Whether every participant is known, with all it has; False where they cannot be counted."""
+        now = time.monotonic()
+        known = self._known()
+        services = [participant.node.get_service_names_and_types() for participant in self.participants]
+        seen = (known, services)
+        if seen != self._seen:
+            self._seen, self._seen_s = seen, now
+        return self._can_count and len(known) >= self._count() and now - self._seen_s >= _SETTLED_S
+
+    def hurry(self) -> None:
+        """Speak anew, when it is time and somebody is there whom we do not know."""
+        is_due = time.monotonic() >= self._spoken_s + _SPOKEN_S
+        if is_due and len(self.participants) < _MAX_SPEAKERS and len(self._known()) < self._count():
+            self._speak()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        while self.participants:
+            context, node, executor = self.participants.pop()
+            executor.shutdown(timeout_sec=0)
+            node.destroy_node()
+            context.try_shutdown()
+
+    def _speak(self) -> None:
+        context = Context()
+        rclpy.init(context=context, args=[])
+        name = f"mauve_{os.getpid()}" + (f"_{len(self.participants)}" if self.participants else "")
+        node = Node(name, context=context, enable_rosout=False, start_parameter_services=False)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        self.participants.append(Participant(context, node, executor))
+        self._spoken_s = time.monotonic()
+
+    def _known(self) -> frozenset[bytes]:
+        """The participants known to any of ours, ours among them: each ROS one writes this topic."""
+        topic = "ros_discovery_info"
+        writers = [
+            writer
+            for participant in self.participants
+            for writer in participant.node.get_publishers_info_by_topic(topic, no_mangle=True)
+        ]
+        return frozenset(bytes(writer.endpoint_gid[:_KEY_BYTES]) for writer in writers)
+
+    def _count(self) -> int:
+        """How many participants this machine has in our domain."""
+        first = _FIRST_PORT + _DOMAIN_PORTS * self.domain
+        ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
+        lines = _UDP.read_text("ascii").splitlines()[1:] if self._can_count else []
+        return len({port for line in lines if (port := int(line.split()[1].rpartition(":")[2], 16)) in ports})
+
+
+def _stays_on_this_machine() -> bool:
+    """Whether discovery is by the ports of this machine, and by nothing else."""
+    is_local = (
+        os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+        or os.environ.get("ROS_LOCALHOST_ONLY") == "1"
+    )
+    elsewhere = os.environ.get("ROS_STATIC_PEERS") or os.environ.get("ROS_DISCOVERY_SERVER")
+    return is_local and not elsewhere and get_rmw_implementation_identifier().startswith("rmw_fastrtps")

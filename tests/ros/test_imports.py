@@ -1,0 +1,76 @@
+"""What our programs load to do their work: nothing heavy that this work has no need of.
+
+numpy is none of these: rclpy loads it with the first service.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
+
+NODE = "/robot_1/executor"
+HEAVY = {"matplotlib", "mcap", "networkx", "pandas", "pydantic", "rich", "rosbags", "ruamel"}
+ROS = {"mauve_msgs", "numpy", "rclpy"}
+FORBIDDEN = {
+    ("--help",): HEAVY | ROS,
+    ("plugins", "--json"): HEAVY | ROS,
+    ("nodes",): HEAVY,
+    ("list", NODE, "--json"): HEAVY,
+    ("stop", NODE, "counter"): HEAVY,
+}
+
+
+def loaded(log: str) -> set[str]:
+    """The packages in what `python -X importtime` wrote."""
+    lines = [line for line in log.splitlines() if line.startswith("import time:")]
+    found = {line.rpartition("|")[2].strip().partition(".")[0] for line in lines}
+    assert "mauve_rt" in found, log
+    return found
+
+
+@pytest.fixture
+def traced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every Python started from here on tells what it loads."""
+    monkeypatch.setenv("PYTHONPROFILEIMPORTTIME", "1")
+
+
+def test_start_of_an_executor(traced: None, executor: Any, graph: Any) -> None:
+    def state() -> int:
+        return int(graph.ask(GetState, f"{NODE}/get_state").current_state.id)
+
+    graph.spin_until(lambda: state() == State.PRIMARY_STATE_ACTIVE, "active")
+    assert executor.end(signal.SIGINT)[0] == 0
+    assert loaded(executor.output) & HEAVY == set()
+
+
+@pytest.mark.parametrize(("words", "forbidden"), FORBIDDEN.items(), ids=[words[0] for words in FORBIDDEN])
+def test_verb(
+    words: tuple[str, ...], forbidden: Collection[str], executor: Any, graph: Any, domain: int
+) -> None:
+    graph.spin_until(lambda: graph.node.count_services(f"{NODE}/list_parameters") > 0, "all services")
+    done = _mauve(words, ROS_DOMAIN_ID=str(domain))
+    assert done.returncode == 0, done.stderr
+    assert loaded(done.stderr) & set(forbidden) == set()
+
+
+def test_completion(tmp_path: Path) -> None:
+    told = tmp_path / "told"
+    line = "mauve rep"
+    shell = {"COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE_STDOUT_FILENAME": str(told)}
+    done = _mauve((), _ARGCOMPLETE="1", **shell)
+    assert told.read_text("utf-8").split("\v") == ["replace-core", "report"]
+    assert loaded(done.stderr) & (HEAVY | ROS) == set()
+
+
+def _mauve(words: Collection[str], **environment: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-X", "importtime", "-m", "mauve_rt.cli", *words]
+    return subprocess.run(
+        command, env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=40
+    )
