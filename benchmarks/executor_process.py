@@ -6,8 +6,8 @@ from pathlib import Path
 from native import BenchmarkError
 from processes import Processes
 
-from mauve_msgs.srv import Start, Stop
-from mauve_rt.cli.client import Client
+from mauve_msgs.srv import ListComponents, Start, Stop
+from mauve_rt.cli.client import Client, connected
 from mauve_rt.errors import MauveError
 
 _START_S = 10.0  # it may have been spawned just now
@@ -37,6 +37,19 @@ class ExecutorProcess:
             *("-p", f"architecture:={architecture}", *words),
             AMENT_PREFIX_PATH=os.pathsep.join(prefixes),
         )
+
+    def wait(self) -> None:
+        """Until it answers.
+
+        Raises:
+            BenchmarkError: it does not.
+        """
+        service = f"{self.namespace}/executor/list_components"
+        try:
+            with connected() as client:
+                client.call(ListComponents, service, ListComponents.Request(), wait_s=_START_S)
+        except MauveError as error:
+            raise BenchmarkError(f"executor: {error}; {self._processes.output(self._name)}") from None
 
     def start(self, client: Client, component: str) -> None:
         """Start a component.

@@ -19,6 +19,7 @@ from mauve_rt.cli.client import Client, connected
 
 _TALKERS, _MARKS = 5, 16  # 1 kHz each, 4 records of the kernel's and these: 100,000 a second
 _SETTLE_S = 0.3
+_START_S = 10.0  # the executor may have been spawned just now
 
 
 class _Recorded(NamedTuple):
@@ -88,7 +89,7 @@ def _of_bag(bag: Path, cpu_percent: float) -> _Recorded:
 
 
 def _ask(client: Client, executor: ExecutorProcess, service_type: type, name: str, request: object) -> None:
-    reply = client.call(service_type, f"{executor.namespace}/executor/{name}", request)
+    reply = client.call(service_type, f"{executor.namespace}/executor/{name}", request, wait_s=_START_S)
     if not reply.success:
         raise BenchmarkError(f"{name} refused: {reply.message}")
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import machine
+from command import command_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from native import BenchmarkError
 from reading import reading_rows
@@ -48,6 +49,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "service": service_rows,
     "topics": topic_rows,
     "start": start_rows,
+    "command": command_rows,
     "recording": recording_rows,
     "recording-killed": kill_rows,
     "reading": reading_rows,

@@ -1,5 +1,6 @@
-"""From the start of an executor's process to the first release of its components, beside a node of rclpy."""
+"""The start of an executor, beside that of a managed node of rclpy: time, CPU time, memory."""
 
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,15 +19,21 @@ _START_S = 30.0
 _RELEASE_S = 0.3  # from the threads' creation on; the first release is due after 20 ms
 
 
+_RATIO, _MEMORY_MB = 1.3, 80.0
+_BESIDE = "managed node of rclpy, ready to spin"
+
+
 class Start(NamedTuple):
-    """Milliseconds from the process's start on."""
+    """Milliseconds from the process's start on; what it took by then."""
 
     configured_ms: float
     released_ms: float
+    cpu_ms: float
+    memory_mb: float
 
 
 def start_rows(settings: Settings) -> Iterator[Row]:
-    """Rounds of an executor with five components, and of rclpy's node with one publisher and timer."""
+    """Rounds of an executor with five components, and of rclpy's node."""
     with Processes() as processes:
         plugins = plugin_prefix(processes.folder)
 
@@ -43,7 +50,22 @@ def start_rows(settings: Settings) -> Iterator[Row]:
         f"start of an executor with {_COMPONENTS} components, from its process to the first release",
         [(found[0].released_ms, found[1].released_ms) for found in rounds],
         unit="ms",
-        beside="rclpy node with one timer, ready to spin",
+        beside=_BESIDE,
+        ratio_limit=_RATIO,
+    )
+    yield compared(
+        "CPU time of it, with some of the components' own",
+        [(found[0].cpu_ms, found[1].cpu_ms) for found in rounds],
+        unit="ms",
+        beside=_BESIDE,
+        ratio_limit=_RATIO,
+    )
+    yield compared(
+        "resident memory after it",
+        [(found[0].memory_mb, found[1].memory_mb) for found in rounds],
+        unit="MB",
+        beside=_BESIDE,
+        limit=_MEMORY_MB,
     )
     yield alone(
         "of it, until the components are being configured",
@@ -57,12 +79,13 @@ def _executor_start(processes: Processes, talkers: Talkers, plugins: Path) -> St
     begin_ns = time.monotonic_ns()
     executor = ExecutorProcess(processes, talkers.architecture, plugins=plugins)
     _await_thread(executor.pid, talkers.names[-1])
+    cpu_ms, memory_mb = _cpu_ms(executor.pid), _memory_mb(executor.pid)
     time.sleep(_RELEASE_S)
     executor.end()
     found = talkers.releases()
     configured_ns = min(int(rows[0, 0]) for rows in found)
     released_ns = min(int(rows[1, 1]) for rows in found)
-    return Start((configured_ns - begin_ns) / 1e6, (released_ns - begin_ns) / 1e6)
+    return Start((configured_ns - begin_ns) / 1e6, (released_ns - begin_ns) / 1e6, cpu_ms, memory_mb)
 
 
 def _await_thread(pid: int, name: str) -> None:
@@ -83,9 +106,21 @@ def _thread_name(task: Path) -> str:
 
 def _rclpy_start(processes: Processes) -> Start:
     begin_ns = time.monotonic_ns()
-    program = str(Path(__file__).with_name("rclpy_publisher.py"))
-    processes.spawn("rclpy", program, "/bench_start", "1")
+    pid = processes.spawn("rclpy", str(Path(__file__).with_name("rclpy_lifecycle.py")))
     processes.await_output("rclpy", "ready")
-    ready_ns = int(processes.output("rclpy").split()[-1])
+    _, ready_ns, cpu_ms = processes.output("rclpy").split()
+    memory_mb = _memory_mb(pid)
     processes.end("rclpy")
-    return Start(0.0, (ready_ns - begin_ns) / 1e6)
+    return Start(0.0, (int(ready_ns) - begin_ns) / 1e6, float(cpu_ms), memory_mb)
+
+
+def _cpu_ms(pid: int) -> float:
+    """CPU time of a process so far, all threads."""
+    fields = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()
+    return 1e3 * (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _memory_mb(pid: int) -> float:
+    """Resident memory of a process."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text("ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

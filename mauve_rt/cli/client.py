@@ -1,6 +1,5 @@
 """A short-lived ROS node that asks an executor."""
 
-import os
 import signal
 import threading
 import time

@@ -182,9 +182,6 @@ def _events(args: argparse.Namespace) -> int:
 
 
 def _plugins(args: argparse.Namespace) -> int:
-    from rich import box  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
     from mauve_rt.model import PluginIndex  # noqa: PLC0415
 
@@ -196,6 +193,9 @@ def _plugins(args: argparse.Namespace) -> int:
     if args.json:
         print_json([dict(zip(fields, row, strict=True)) for row in rows])
     else:
+        from rich import box  # noqa: PLC0415 - takes its time to load
+        from rich.table import Table  # noqa: PLC0415
+
         table = Table(*fields[:4], box=box.SIMPLE_HEAD, pad_edge=False)
         for row in rows:
             table.add_row(*row[:4])

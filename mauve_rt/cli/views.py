@@ -4,9 +4,10 @@ import array
 import json
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text have no use for it
+    from rich.console import Console
 
 _WIDE = 160
 _WORTH_TELLING_NS = 1_000  # some steps prepare nothing
@@ -30,8 +31,10 @@ def print_json(value: Any) -> None:
     print(json.dumps(as_plain(value), indent=2, ensure_ascii=False))
 
 
-def console() -> Console:
+def console() -> "Console":
     """Standard output; wide enough for every table where it is no terminal."""
+    from rich.console import Console  # noqa: PLC0415
+
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
 
 
