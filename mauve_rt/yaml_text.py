@@ -1,7 +1,8 @@
 """YAML as this project reads it: 1.2, one document, no key twice, no more than it can stand for.
 
 PyYAML splits the text into events, by libyaml where it has it. What the events mean is decided here, with the
-place of every value and key, so that errors point at it. Keys are text, whatever they look like.
+place of every value and key, so that errors point at it. Keys are text, whatever they look like. PyYAML
+refuses a little of YAML 1.2's syntax, such as the text `:a` without quotes in `[:a]`.
 """
 
 import re

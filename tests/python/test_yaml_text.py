@@ -83,7 +83,8 @@ def test_a_plain_scalar_means_what_ruamel_reads(text: str):
 @given(value=VALUES, flow=st.booleans())
 def test_what_ruamel_writes_is_read_as_ruamel_reads_it(value: Any, flow: bool):  # noqa: FBT001
     text = _written_by_ruamel(value, flow=flow)
-    assume(not flow or not re.search(r"[\[{ ][:?]", text))  # `[:a]`: refused, a colon begins no text here
+    # PyYAML refuses `[:a]` and, where it has no libyaml, `[a?b]`.
+    assume(not flow or not re.search(r"[\[{ ]:|\?", text))
     assert repr(read_yaml(text)) == repr(by_ruamel(text))
 
 
