@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from synthetic_traces import deploy, run
 
+from mauve_examples.figures import page
 from mauve_rt import _kernel
 from mauve_rt.cli.main import build_parser, main
 from mauve_rt.model import load_architecture
@@ -195,6 +196,18 @@ def test_files_that_readme_names_are_there() -> None:
     named = re.findall(rf"[`(]((?:{folders})/[\w./]*(?:\.\w+|/))[`)]", README)
     assert len(named) > 15
     assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_pages_of_docs_say_what_their_program_writes() -> None:
+    """What that is, system/test_figures.py holds to the traces; the numbers are those of one run."""
+    assert [file.name for file in (ROOT / "docs").glob("*.md")] == ["figures.md"]
+    said = " ".join((ROOT / "docs" / "figures.md").read_text(encoding="utf-8").split())
+    texts = [text for name, text in vars(page).items() if name.startswith("_") and isinstance(text, str)]
+    templates = [" ".join(text.split()) for text in texts if "## Fig." in text or text.startswith("# Fig.")]
+    assert len(templates) == 4
+    for template in templates:
+        pieces = [re.escape(piece) for piece in re.split(r"\{\w+\}", template)]
+        assert re.search(".{1,200}?".join(pieces), said), template
 
 
 def test_the_licence_is_the_one_named() -> None:

@@ -95,6 +95,10 @@ def test_bad_architecture(
             "topic to record: expected name, name:package/msg/Type of an installed message",
         ),
         (["-p", "architecture:=FILE", "-p", "conter.step:=1"], "unknown component; did you mean counter?"),
+        (
+            ["-p", "architecture:=FILE", "-p", "bagg:=BAG"],
+            "parameter bagg: an executor has none of that name",
+        ),
     ],
 )
 def test_bad_parameters(
