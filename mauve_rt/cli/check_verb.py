@@ -6,11 +6,13 @@ What a file is its contents say. Beside an architecture file, steps and rules ar
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mauve_rt.cli.verb import BAD_USAGE, OK
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model import ArchitectureModel
-from mauve_rt.model.file_kinds import FileKind, file_kind
+
+if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
+    from mauve_rt.model import ArchitectureModel
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Check every file; returns the exit status."""
+    from mauve_rt.model.file_kinds import FileKind, file_kind  # noqa: PLC0415
+
     kinds: dict[Path, FileKind] = {}
     for path in args.files:
         try:
@@ -54,8 +58,8 @@ def _tell(error: ArchitectureFileError) -> int:
     return BAD_USAGE
 
 
-def _check_architecture(path: Path) -> ArchitectureModel:
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415 - takes its time to load
+def _check_architecture(path: Path) -> "ArchitectureModel":
+    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
 
@@ -70,7 +74,7 @@ def _check_architecture(path: Path) -> ArchitectureModel:
     return model
 
 
-def _check_steps(path: Path, model: ArchitectureModel | None) -> None:
+def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
     from mauve_rt.model.steps import load_steps  # noqa: PLC0415
     from mauve_rt.node.rehearsal import try_steps  # noqa: PLC0415
 
@@ -80,7 +84,7 @@ def _check_steps(path: Path, model: ArchitectureModel | None) -> None:
     print(f"{path}: {len(steps)} steps{_tried_on(model)}: no error found")
 
 
-def _check_rules(path: Path, model: ArchitectureModel | None) -> None:
+def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
     from mauve_rt.model.rule_types import heard_type  # noqa: PLC0415
     from mauve_rt.model.rules import RulesFile  # noqa: PLC0415
     from mauve_rt.node.rehearsal import try_rule  # noqa: PLC0415
@@ -94,5 +98,5 @@ def _check_rules(path: Path, model: ArchitectureModel | None) -> None:
     print(f"{path}: {len(rules)} rules{_tried_on(model)}: no error found")
 
 
-def _tried_on(model: ArchitectureModel | None) -> str:
+def _tried_on(model: "ArchitectureModel | None") -> str:
     return f", tried on {model.path}" if model is not None else ""
