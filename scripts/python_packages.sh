@@ -99,13 +99,14 @@ venv_usable() {
 }
 
 # By uv where it can, with all downloads at once, else by pip, which also knows a user's own index and certificates.
+# Compiled here, as pip does it: who may not write here, or is told not to, would compile at every start.
 # uv links the files of its cache rather than copy them, where both are on one disk: they take their space once.
 install_python_packages() { # SET
   local files=() file
   while read -r file; do files+=(-r "$file"); done < <(requirement_files "$1")
   local pip=(clean_python -m pip install --disable-pip-version-check --no-input --no-cache-dir)
   if ! { "${pip[@]}" -r "$MAUVE_ROOT/requirements/installer.txt" &&
-    clean_python -m uv pip install --system-certs --python "$MAUVE_VENV" "${files[@]}"; }; then
+    clean_python -m uv pip install --system-certs --compile-bytecode --python "$MAUVE_VENV" "${files[@]}"; }; then
     "${pip[@]}" "${files[@]}"
   fi
 }
