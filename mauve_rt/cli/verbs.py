@@ -55,12 +55,17 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
 def _list(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import ListComponents  # noqa: PLC0415 - ROS takes its time to load
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.list_view import print_components  # noqa: PLC0415
-    from mauve_rt.cli.views import print_json  # noqa: PLC0415
 
     with connected() as client:
         reply = client.call(ListComponents, f"{args.executor}/list_components", ListComponents.Request())
-    (print_json if args.json else print_components)(reply)
+    if args.json:
+        from mauve_rt.cli.views import print_json  # noqa: PLC0415
+
+        print_json(reply)
+    else:
+        from mauve_rt.cli.list_view import print_components  # noqa: PLC0415
+
+        print_components(reply)
     return OK
 
 

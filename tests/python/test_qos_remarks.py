@@ -1,5 +1,8 @@
 """Subscriptions that ordinary publishers do not match are remarked upon, no others: rclpy is the judge."""
 
+import json
+from pathlib import Path
+
 import pytest
 from rclpy.qos import (
     DurabilityPolicy,
@@ -10,6 +13,7 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
+from mauve_rt.model import load_architecture
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import TopicModel
 from mauve_rt.node.qos import qos_profile
@@ -23,8 +27,21 @@ ORDINARY = QoSProfile(
 )
 
 
-def _topic(qos: object, *, direction: str = "subscribe") -> TopicModel:
-    return TopicModel.model_validate({"name": "scan", "direction": direction, "qos": qos})
+FILE = """\
+mauve: 1
+components: {{one: {{shell: a/A, core: a/A, fsm: a/A}}}}
+resources:
+  laser: {{kind: shared_data, type: sensor_msgs/msg/LaserScan,
+          topic: {{name: scan, direction: {direction}, qos: {qos}}}}}
+"""
+
+
+def _topic(folder: Path, qos: object, *, direction: str = "subscribe") -> TopicModel:
+    file = folder / "robot.yaml"
+    file.write_text(FILE.format(direction=direction, qos=json.dumps(qos)), encoding="utf-8")
+    topic = load_architecture(file).resources["laser"].topic
+    assert topic is not None
+    return topic
 
 
 @pytest.mark.parametrize(
@@ -44,8 +61,10 @@ def _topic(qos: object, *, direction: str = "subscribe") -> TopicModel:
         ({"liveliness": "manual_by_topic", "lease_ms": 2000}, ["lease_ms", "liveliness"]),
     ],
 )
-def test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard(qos: object, fields: list[str]) -> None:
-    topic = _topic(qos)
+def test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard(
+    qos: object, fields: list[str], tmp_path: Path
+) -> None:
+    topic = _topic(tmp_path, qos)
     remarks = [*qos_remarks(topic)]
     assert [field for field, _, _ in remarks] == fields
     verdict, reason = qos_check_compatible(ORDINARY, qos_profile(topic.qos))
@@ -58,6 +77,6 @@ def test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard(qos: object,
         assert "; " in text  # the remedy
 
 
-def test_what_a_publisher_offers_needs_none() -> None:
+def test_what_a_publisher_offers_needs_none(tmp_path: Path) -> None:
     everything = {"durability": "transient_local", "deadline_ms": 5, "lease_ms": 9}
-    assert [*qos_remarks(_topic(everything, direction="publish"))] == []
+    assert [*qos_remarks(_topic(tmp_path, everything, direction="publish"))] == []

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -24,8 +25,7 @@ def test_ci_runs_every_tool_and_every_test() -> None:
 
 def test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one(tmp_path: Path) -> None:
     copies = tmp_path / "clone" / "scripts"
-    copies.mkdir(parents=True)
-    (copies / "lib.sh").write_text((SCRIPTS / "lib.sh").read_text("utf-8"), encoding="utf-8")
+    shutil.copytree(SCRIPTS, copies)
     without_start = (SCRIPTS / "setup").read_text("utf-8").removesuffix('main "$@"\n')
     (copies / "setup").write_text(f'{without_start}find_installed_jazzy; echo "[$jazzy]"\n', encoding="utf-8")
     jazzy, wheels = tmp_path / "jazzy", tmp_path / "wheels"
