@@ -181,7 +181,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "From the start with `-p bag:=DIR`": ("ros/test_executor_process.py::test_signal_seals_the_bag",),
     "mauve record start": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
     "mauve record stop": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
-    "ros2 service call /robot_1/executor/start_recording mauve_msgs/srv/StartRecording": (
+    "start_recording mauve_msgs/srv/StartRecording": (
         "python/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
     ),
     "every record of every component's thread, the messages of bound topics": (
