@@ -33,6 +33,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
     # ---- two commands
+    "nothing comes by pip": ("python/test_package_xml.py::test_the_door_opens_with_rosdep_and_apt_alone",),
+    "the Python packages of Ubuntu 24.04 do as they are": (
+        "doors/test_apt_versions.py::test_a_run_is_started_changed_recorded_checked_and_reported",
+    ),
+    "YAML 1.2, where `on` and `yes` are text": ("python/test_yaml_text.py::test_scalars_of_yaml_1_2",),
     "system packages through apt": (
         "python/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
     ),
@@ -51,6 +56,18 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "scripts/test # sets everything up, builds, runs every test": (
         "python/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
+    ),
+    "`--help` of either answers at once": (
+        "python/test_scripts.py::test_help_needs_nothing_that_is_built_or_installed",
+    ),
+    "`scripts/setup` says what it needs before it begins": (
+        "python/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",
+    ),
+    "a package that uses any of them says `<depend>mauve_rt</depend>`": (
+        "doors/test_colcon.py::test_who_depends_on_mauve_rt_has_the_messages",
+    ),
+    "launch file is seen without a build": (
+        "doors/test_colcon.py::test_symlink_install_shows_an_edit_without_a_build",
     ),
     "two robots explore an office": ("system/test_demo_mission.py::test_coverage_is_a_share_and_grew",),
     "after 20 s the link is cut": (
@@ -173,7 +190,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/test_executor_diagnostics.py::test_figures_are_held_against_the_thresholds_of_the_file",
         "python/test_readme_examples.py::test_the_pieces_of_architecture_files_are_accepted",
     ),
-    "Discovery is limited to this machine by default": (
+    "stay on this machine unless `ROS_AUTOMATIC_DISCOVERY_RANGE` says otherwise": (
         "ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",
         "ros/test_discovery.py::test_another_machine_sees_an_executor_only_where_it_was_opened",
     ),
@@ -572,6 +589,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "On the disk the demo takes",  # figures of one day
+    "`scripts/lint` takes 0.2 GB more",
+    "The demo's verdict is about its supervisors' swaps",
     "MAUVE RT is a component framework on ROS 2 Jazzy",
     "It implements and extends the design of D",
     "Doose, C",

@@ -18,9 +18,11 @@ def test_every_folder_of_tests_is_a_stage() -> None:
 
 
 def test_ci_runs_every_tool_and_every_test() -> None:
-    text = (ROOT / ".ci" / "run").read_text("utf-8")
+    """By scripts/test, which lets scripts/lint run beside its stages."""
+    assert re.search(r"scripts/test\" all lint$", (ROOT / ".ci" / "run").read_text("utf-8"), re.MULTILINE)
+    text = (SCRIPTS / "test").read_text("utf-8")
     assert re.search(r"scripts/lint(?! *-?\w)", text)
-    assert re.search(r"scripts/test(?! *-?\w)", text)
+    assert re.search(r'all\) stages\+=\("\$\{ALL_STAGES\[@\]\}"\)', text)
 
 
 def test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one(tmp_path: Path) -> None:
