@@ -207,7 +207,7 @@ def test_too_little_space_is_told_before_anything_is_begun(tmp_path: Path):
     small = tmp_path / "small"
     small.mkdir()
     script = f"""
-        mount -t tmpfs -o size=60m small {small} || exit 77
+        mount -t tmpfs -o size=60m small {small} && echo mounted || exit
         mkdir {small}/clone && cp -r {SCRIPTS} {ROOT}/requirements {small}/clone
         {small}/clone/scripts/setup
         status=$?
@@ -220,11 +220,11 @@ def test_too_little_space_is_told_before_anything_is_begun(tmp_path: Path):
         text=True,
         check=False,
     )
-    if done.returncode == 77 or "unshare failed" in done.stderr:
-        pytest.skip("may not mount a small disk here")
+    if not done.stdout.startswith("mounted\n"):
+        pytest.skip(f"may not mount a small disk here ({done.stderr.strip()})")
     assert done.returncode == 2
     assert re.search(r"expected \d{3,} MB free .*, found \d\d MB; make room", done.stderr)
-    assert done.stdout.split() == ["build", "requirements", "scripts"]
+    assert done.stdout.split()[1:] == ["build", "requirements", "scripts"]
 
 
 def test_a_demo_builds_no_test_program():
@@ -245,16 +245,12 @@ def test_a_demo_builds_no_test_program():
 
 
 def test_patching_leaves_the_installer_s_cache_as_it_was(tmp_path: Path):
-    sys.path.insert(0, str(SCRIPTS))
-    try:
-        from patch_wheels import patch  # noqa: PLC0415
-    finally:
-        sys.path.remove(str(SCRIPTS))
     cached, installed = tmp_path / "cached.cmake", tmp_path / "prefix" / "share" / "x" / "installed.cmake"
     cached.write_text("include(/opt/python/cp311-cp311/lib)\n")
     installed.parent.mkdir(parents=True)
     installed.hardlink_to(cached)
-    assert patch(tmp_path / "prefix") == 1
+    program = "import pathlib, sys, patch_wheels; patch_wheels.patch(pathlib.Path(sys.argv[1]))"
+    subprocess.run([sys.executable, "-c", program, tmp_path / "prefix"], cwd=SCRIPTS, check=True)
     assert installed.read_text() == f"include({tmp_path}/prefix/lib)\n"
     assert cached.read_text() == "include(/opt/python/cp311-cp311/lib)\n"
     assert [path.name for path in installed.parent.iterdir()] == ["installed.cmake"]
