@@ -16,18 +16,26 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.rosbag2 import Reader
 
 
-def assert_rosbag2_reads(bag: Path) -> None:
-    """Every file of a bag is indexed, in order, and told of truly; by its folder and by itself."""
+def assert_rosbag2_reads(bag: Path, *, was_killed: bool = False) -> None:
+    """Every file of a bag is indexed, in order, and told of truly; by its folder and by itself.
+
+    A kill may leave a metadata.yaml that is older than the file.
+    """
     files = sorted(bag.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     counted = [_assert_file(file) for file in files]
     told = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    total = sum(counted, Counter())
+    if total:  # SequentialReader::seek does not find its way past a file without messages
+        files = [file for file, counts in zip(files, counted, strict=True) if counts]
+        counted = [counts for counts in counted if counts]
+    if was_killed and told["message_count"] < sum(total.values()):
+        return
     assert told["relative_file_paths"] == [file.name for file in files]
     assert told["message_count"] == sum(sum(counts.values()) for counts in counted)
     assert [file["message_count"] for file in told["files"]] == [sum(counts.values()) for counts in counted]
     of_topics = {
         topic["topic_metadata"]["name"]: topic["message_count"] for topic in told["topics_with_message_count"]
     }
-    total = sum(counted, Counter())
     assert {name: count for name, count in of_topics.items() if count} == total
     with Reader(bag) as reader:
         assert sum(1 for _ in reader.messages()) == told["message_count"]

@@ -191,7 +191,7 @@ class BagWriter:
     def abort(self) -> None:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
         self._file.abort()
-        if self._told_files == len(self._complete):  # the present file is a new one, and nothing tells of it
+        if self._complete and self._told_files == len(self._complete):  # the present file is new and empty
             self._file.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
@@ -211,7 +211,11 @@ class BagWriter:
             self.abort()
 
     def _files(self) -> list[BagFileCounts]:
-        return [*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)]
+        """Those that metadata.yaml names: rosbag2 does not find its way past a file without messages."""
+        present = BagFileCounts(self._file.path.name, self._file.flushed)
+        return (
+            self._complete if self._complete and not present.counts.messages else [*self._complete, present]
+        )
 
     def _new_file(self, directory: Path) -> McapFile:
         path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"

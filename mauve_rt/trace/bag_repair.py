@@ -27,15 +27,19 @@ class BagState:
     """What is wrong with metadata.yaml; empty when nothing is, or when a single file was asked about."""
     custom_data: Mapping[str, str]
     """What metadata.yaml tells beside."""
+    unreadable: Mapping[Path, str]
+    """Files of which nothing can be read, beside others, and why."""
 
     @property
     def is_finished(self) -> bool:
         """Whether every reader opens it."""
-        return not self.metadata_damage and all(file.is_finished for file in self.files)
+        files_are = all(file.is_finished for file in self.files)
+        return files_are and not self.metadata_damage and not self.unreadable
 
     def damages(self) -> list[str]:
         """What is wrong, a line for each file."""
         lines = [_damage(file) for file in self.files if not file.is_finished]
+        lines += [f"{path.name}: nothing of it can be read ({why})" for path, why in self.unreadable.items()]
         return [*lines, *([f"{METADATA}: {self.metadata_damage}"] if self.metadata_damage else [])]
 
 
@@ -47,21 +51,28 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
 
     """
     files = bag_files(path)
-    states = []
+    states, unreadable = [], {}
     for index, file in enumerate(files):
         progress_here = part(progress, index / len(files), (index + 1) / len(files))
-        states.append(examine(file, progress=progress_here))
+        try:
+            states.append(examine(file, progress=progress_here))
+        except TraceError as error:
+            if len(files) == 1:
+                raise
+            unreadable[file] = str(error).removeprefix(f"bag file {file}: ")
     if not path.is_dir():
-        return BagState(path, tuple(states), "", {})
+        return BagState(path, tuple(states), "", {}, {})
     try:
         custom_data = _custom_data(_read_metadata(path))
     except TraceError:
         custom_data = {}
-    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data)
+    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable)
 
 
 def repair_bag(state: BagState) -> None:
     """Make a finished bag of it: what is whole stays, what a kill left half-written is cut off.
+
+    A file of which nothing can be read gets another ending, so that no reader takes it for one of the bag.
 
     Raises:
         TraceError: it cannot be written.
@@ -70,12 +81,18 @@ def repair_bag(state: BagState) -> None:
     for file in state.files:
         if not file.is_finished:
             file.repair()
-    if state.metadata_damage:
+    try:
+        for path in state.unreadable:
+            path.rename(path.with_name(f"{path.name}.unreadable"))
+    except OSError as error:
+        msg = f"bag {state.path}: a file cannot be renamed ({error.strerror})"
+        raise TraceError(msg) from error
+    if not state.is_finished and state.path.is_dir():
         _write_metadata(state)
 
 
 def _damage(file: FileState) -> str:
-    found = f"{file.path.name}: no finished MCAP file ({file.damage})"
+    found = f"{file.path.name}: {'' if file.is_closed else 'no finished MCAP file: '}{file.damage}"
     if file.is_data_whole:
         return f"{found}; all of its {file.counts.messages:,} messages are whole"
     whole = f"its first {file.whole_bytes:,} bytes are whole, with {file.counts.messages:,} messages"
@@ -89,13 +106,22 @@ def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
     except TraceError as error:
         return str(error)
     names = [Path(str(name)).name for name in told.get("relative_file_paths", [])]
-    if names != [file.path.name for file in files]:
-        found = ", ".join(file.path.name for file in files)
-        return f"names the files {', '.join(names) or '(none)'}, there are {found}"
+    found = [file.path.name for file in _told_of(files)]
+    if names != found:
+        return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"
     messages = sum(file.counts.messages for file in files)
     if told.get("message_count") != messages:
         return f"tells of {told.get('message_count')} messages, there are {messages}"
     return ""
+
+
+def _told_of(files: Sequence[FileState]) -> Sequence[FileState]:
+    """The files that metadata.yaml names: among others, none without messages.
+
+    rosbag2 looks for a time by the files' times, and does not find its way past one that has none. A kill in
+    a split leaves one: begun, and not yet named.
+    """
+    return [file for file in files if file.counts.messages] or files
 
 
 def _read_metadata(path: Path) -> Mapping[str, Any]:
@@ -126,7 +152,7 @@ def _write_metadata(state: BagState) -> None:
         before = _read_metadata(state.path)
     except TraceError:
         before = {}
-    files = [BagFileCounts(file.path.name, file.counts) for file in state.files]
+    files = [BagFileCounts(file.path.name, file.counts) for file in _told_of(state.files)]
     try:
         write_metadata(
             state.path,

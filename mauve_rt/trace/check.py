@@ -32,8 +32,10 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
 
     """
     state = examine_bag(path, progress=part(progress, 0.0, 0.5))
-    trace = open_trace(path, progress=part(progress, 0.5, 1.0))
     found = [Finding(text, is_damage=True) for text in state.damages()]
+    if state.unreadable:
+        return found
+    trace = open_trace(path, progress=part(progress, 0.5, 1.0))
     found += [Finding(_words(name, loss), is_loss=True) for name, loss in trace.losses.items() if loss.lost]
     if dropped := _dropped_messages(state):
         found.append(

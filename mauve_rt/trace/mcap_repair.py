@@ -130,6 +130,8 @@ class FileState:
     size: int
     whole_bytes: int
     """Bytes of the data section that are whole."""
+    is_closed: bool
+    """Whether it has an end that can be read; if there is damage, that end does not tell the truth."""
     is_data_whole: bool
     """Whether that is all of the data section: only what closes the file is missing or damaged."""
     schemas: list[Schema]
@@ -222,6 +224,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             damage=damage,
             size=scan.size,
             whole_bytes=whole_bytes,
+            is_closed=not (scan.damage or told.damage),
             is_data_whole=scan.data_end is not None,
             schemas=list(scan.schemas.values()),
             channels=list(scan.channels.values()),

@@ -47,7 +47,7 @@ def write(bag: BagWriter, numbers: Iterable[int], topic: str = "/robot/words"):
         bag.write(topic, T0 + number, text(number))
 
 
-def read(directory: Path):
+def read(directory: Path, *, was_killed: bool = False):
     """Numbers of the messages by three readers, which must agree."""
     with Reader(directory) as reader:
         by_folder = [(connection.topic, time - T0) for connection, time, _ in reader.messages()]
@@ -63,7 +63,7 @@ def read(directory: Path):
     assert by_folder == by_file == indexed
     assert scanned == len(indexed)
     if indexed:
-        assert_rosbag2_reads(directory)
+        assert_rosbag2_reads(directory, was_killed=was_killed)
     return indexed
 
 
@@ -221,6 +221,21 @@ def test_a_message_that_comes_late_does_not_put_chunks_out_of_order(tmp_path: Pa
     assert found == [(10, 10), (20, 20), (20, 15), (20, 5)]
 
 
+def test_a_file_without_messages_is_none_of_the_bag(tmp_path: Path):
+    """rosbag2 looks for a time by the files' times: past a file without one it does not find its way."""
+    for end in (BagWriter.close, BagWriter.abort):
+        directory = tmp_path / end.__name__
+        bag = BagWriter(directory)
+        write(bag, [1, 2])
+        bag.split()
+        bag.flush()
+        assert_rosbag2_reads(directory)
+        assert len(list(directory.glob("*.mcap"))) == 2
+        end(bag)
+        assert_rosbag2_reads(directory)
+        assert len(list(directory.glob("*.mcap"))) == 1
+
+
 @pytest.fixture
 def small_disk(tmp_path: Path):
     disk = tmp_path / "disk"
@@ -302,6 +317,6 @@ def test_kill_9_at_any_moment_loses_nothing_that_was_flushed(tmp_path: Path):
             child.kill()
             told += child.stdout.readlines()
         flushed = int([line for line in told if line.endswith("\n")][-1])
-        numbers = [number for _, number in read(directory)]
+        numbers = [number for _, number in read(directory, was_killed=True)]
         assert numbers == list(range(len(numbers)))
         assert len(numbers) in (flushed, flushed + 20)  # killed between the flush and telling of it

@@ -18,7 +18,9 @@ from rosbags.rosbag2 import Reader, ReaderError
 
 import mauve_rt.trace
 from mauve_rt.trace import TraceError
+from mauve_rt.trace.bag import BagWriter
 from mauve_rt.trace.bag_repair import examine_bag, repair_bag
+from mauve_rt.trace.check import check_bag
 from mauve_rt.trace.mcap_file import McapFile
 from mauve_rt.trace.recorded import Split
 from mauve_rt.trace.recorder import Recorder
@@ -112,6 +114,37 @@ def test_the_old_end_below_a_torn_write_is_no_data(tmp_path: Path):
     repair_bag(examine_bag(bag))
     assert marks(bag) == list(range(10))
     assert messages_by_rosbags(bag) == messages_by_mcap(file)
+
+
+def test_a_file_that_a_kill_left_before_its_first_message_is_no_damage(tmp_path: Path):
+    bag = record(tmp_path / "bag")
+    writer = BagWriter(tmp_path / "other")
+    (tmp_path / "other" / "other_0.mcap").rename(bag / "bag_1.mcap")  # begun, and not yet named
+    writer.abort()
+    state = examine_bag(bag)
+    assert state.damages() == []
+    (bag / "metadata.yaml").unlink()
+    repair_bag(examine_bag(bag))
+    assert_rosbag2_reads(bag)
+    assert "bag_1" not in (bag / "metadata.yaml").read_text()
+    assert marks(bag) == list(range(30))
+
+
+@pytest.mark.parametrize("size", [0, 5, 20])
+def test_a_file_of_which_nothing_is_left_does_not_keep_the_others(tmp_path: Path, size: int):
+    bag = record(tmp_path / "bag", count=60, split=Split(after_s=0, after_bytes=12_000))
+    os.truncate(bag / "bag_1.mcap", size)
+    found = [finding.text for finding in check_bag(bag)]
+    assert any("bag_1.mcap: nothing of it can be read (" in text for text in found), found
+    state = examine_bag(bag)
+    assert not state.is_finished
+    repair_bag(state)
+    assert (bag / "bag_1.mcap.unreadable").stat().st_size == size
+    assert examine_bag(bag).is_finished
+    assert_rosbag2_reads(bag)
+    left = marks(bag)
+    assert 0 < len(left) < 60
+    assert left == sorted(left)
 
 
 def test_metadata_that_is_missing_or_older_is_made_again(tmp_path: Path):
