@@ -55,6 +55,14 @@ class Demo:
         self.process.send_signal(signal.SIGINT)
         return self.finish()
 
+    def interrupt_until_heard(self) -> int:
+        """Ctrl-C, and again where it was lost, as one may be while the interpreter itself loads."""
+        while self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(10)
+        return self.finish()
+
     def handles_signals(self) -> bool:
         """Whether it catches SIGTERM, which a bare interpreter does not."""
         status = Path(f"/proc/{self.process.pid}/status").read_text("ascii")
