@@ -565,6 +565,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench:  components, from its process to the first release",
         "bench: of it, until the components are being configured",
     ),
+    "| CPU time of it / memory resident after it": (
+        "bench: CPU time of it, with some of the components' own",
+        "bench: resident memory after it",
+    ),
+    "| CPU time of `mauve list` / `mauve nodes`": ("bench: CPU time of `mauve ",),
+    "| from typing `mauve list` / `mauve nodes` to its end": ("bench: from typing `mauve ",),
     "| recording 100,000 trace records a second": (
         "bench: the executor's threads but the components', recording",
         "bench: records lost at that rate, in any round",
@@ -619,6 +625,7 @@ PROMISE_NOTHING = (
     "The soak is from `--full`",
     "(*) From a later run",
     "(**) Of the same day",
+    "(***) Of the evening",
     "| what | measured | reference",
     "| --- |",
     "| `mauve_",
