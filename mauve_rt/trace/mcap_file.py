@@ -122,13 +122,11 @@ class McapFile:
             and complete.
 
         """
+        chunk, before = self._written, self._before = self._chunk, self._now
         if not self.is_waiting:
             return
-        chunk, before = self._chunk, self._now
-        self._written = chunk
         block, index = chunk.build(before.data_end)
         self._chunk_indexes += index
-        self._before = before
         self._now = self._finished(
             before.counts.plus(chunk.counts),
             before.chunk_count + 1,

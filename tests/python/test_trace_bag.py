@@ -284,8 +284,15 @@ def test_when_the_metadata_does_not_fit_what_was_flushed_waits_again(
         with pytest.raises(TraceError, match=r"cannot be written \(No space left\); .* 1 messages"):
             bag.flush()
     assert len(read(tmp_path / "bag")) == 1
-    bag.close()  # room again
+    bag.flush()  # room again
     assert len(read(tmp_path / "bag")) == 2
+    bag.set_custom_data("key", "value")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", refuse)
+        with pytest.raises(TraceError, match="2 messages"):
+            bag.flush()
+    assert len(read(tmp_path / "bag")) == 2, "nothing was flushed, so nothing is taken back"
+    bag.close()
 
 
 WRITING = """
