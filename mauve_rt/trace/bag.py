@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from mauve_rt import __version__
-from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write_metadata
+from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
 from mauve_rt.trace.definitions import Definition, find_definition
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_file import McapFile
@@ -49,7 +49,7 @@ class BagWriter:
         self._topics: dict[str, _Topic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._stale = True  # metadata.yaml does not tell what the files hold
-        self._told_files = 0  # of the bag, by metadata.yaml
+        self._told: set[str] = set()  # the files that metadata.yaml names
         self._flushed_ns = 0  # latest log time of all that was flushed
         # Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it.
         unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
@@ -191,7 +191,7 @@ class BagWriter:
     def abort(self) -> None:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
         self._file.abort()
-        if self._complete and self._told_files == len(self._complete):  # the present file is new and empty
+        if self._complete and self._file.path.name not in self._told:  # new and empty
             self._file.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
@@ -210,12 +210,8 @@ class BagWriter:
         else:
             self.abort()
 
-    def _files(self) -> list[BagFileCounts]:
-        """Those that metadata.yaml names: rosbag2 does not find its way past a file without messages."""
-        present = BagFileCounts(self._file.path.name, self._file.flushed)
-        return (
-            self._complete if self._complete and not present.counts.messages else [*self._complete, present]
-        )
+    def _files(self) -> Sequence[BagFileCounts]:
+        return named_files([*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)])
 
     def _new_file(self, directory: Path) -> McapFile:
         path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
@@ -226,7 +222,7 @@ class BagWriter:
         write_metadata(
             directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
         )
-        self._told_files = len(self._files())
+        self._told = {file.name for file in self._files()}
 
 
 def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:

@@ -29,6 +29,15 @@ class BagTopic(NamedTuple):
     messages: int
 
 
+def named_files(files: Sequence[BagFileCounts]) -> Sequence[BagFileCounts]:
+    """Those of a bag's files that metadata.yaml names: among others, none without messages.
+
+    rosbag2 looks for a time by the files' times, and does not find its way past one that has none. A kill in
+    a split leaves one: begun, and not yet named.
+    """
+    return [file for file in files if file.counts.messages] or files
+
+
 def write_metadata(
     directory: Path,
     files: Sequence[BagFileCounts],

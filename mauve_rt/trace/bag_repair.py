@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, write_metadata
+from mauve_rt.trace.bag_metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_repair import FileState, examine
 from mauve_rt.trace.progress import Progress, part, silent
@@ -106,7 +106,7 @@ def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
     except TraceError as error:
         return str(error)
     names = [Path(str(name)).name for name in told.get("relative_file_paths", [])]
-    found = [file.path.name for file in _told_of(files)]
+    found = [file.name for file in _named(files)]
     if names != found:
         return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"
     messages = sum(file.counts.messages for file in files)
@@ -115,13 +115,8 @@ def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
     return ""
 
 
-def _told_of(files: Sequence[FileState]) -> Sequence[FileState]:
-    """The files that metadata.yaml names: among others, none without messages.
-
-    rosbag2 looks for a time by the files' times, and does not find its way past one that has none. A kill in
-    a split leaves one: begun, and not yet named.
-    """
-    return [file for file in files if file.counts.messages] or files
+def _named(files: Sequence[FileState]) -> Sequence[BagFileCounts]:
+    return named_files([BagFileCounts(file.path.name, file.counts) for file in files])
 
 
 def _read_metadata(path: Path) -> Mapping[str, Any]:
@@ -152,11 +147,10 @@ def _write_metadata(state: BagState) -> None:
         before = _read_metadata(state.path)
     except TraceError:
         before = {}
-    files = [BagFileCounts(file.path.name, file.counts) for file in _told_of(state.files)]
     try:
         write_metadata(
             state.path,
-            files,
+            _named(state.files),
             _topics(state.files),
             custom_data=state.custom_data,
             ros_distro=str(before.get("ros_distro") or "jazzy"),
