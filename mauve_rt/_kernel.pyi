@@ -112,6 +112,12 @@ class ComponentDescription:
     allocations: Final[int]  # C++ operators new of its thread since its last start; see allocation_counting()
     page_faults: Final[int]  # of its thread since its last start, minor and major
     execution_times: Final[list[ExecutionTimeDescription]]  # one for each execution state
+    # How long it has been executing current_state; of a wait: how long past its pending instant; 0: parked.
+    state_age_ns: Final[int]
+    state_bound_ns: Final[int]  # declared max_execution of current_state; 0: none, or a wait
+    hung_after_ns: Final[int]  # an older state is told as hung
+    waiting: Final[bool]  # current_state is a wait
+    hung: Final[bool]
 
 @final
 class RecentMaxima:
@@ -326,6 +332,7 @@ class Transaction:
         max_backlog: int = 10,
         stack_bytes: int = 524288,
         trace_records: int = 0,
+        hung_after_ns: int = 0,
         properties: dict[str, PropertyValue] = {},
         alternatives: list[str] = [],
         fallback: str = "",
@@ -381,6 +388,7 @@ class Architecture:
         max_backlog: int = 10,
         stack_bytes: int = 524288,
         trace_records: int = 0,
+        hung_after_ns: int = 0,
         alternatives: list[str] = [],
         fallback: str | type[Core[Any]] | None = None,
         reconfigurable: bool = True,

@@ -42,8 +42,8 @@ void bind_architecture(py::module_& module) {
           [](const py::object& object, const std::string& name, const py::object& shell,
              const py::object& core, const py::object& fsm, int priority, const std::vector<int>& cpus,
              time_ns_t offset_ns, time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
-             std::size_t stack_bytes, std::size_t trace_records, const std::vector<std::string>& alternatives,
-             const py::object& fallback, bool reconfigurable) {
+             std::size_t stack_bytes, std::size_t trace_records, time_ns_t hung_after_ns,
+             const std::vector<std::string>& alternatives, const py::object& fallback, bool reconfigurable) {
             auto& self = object.cast<PyArchitecture&>();
             const PluginRegistry& registry = self.registry;
             std::unique_ptr<CoreBase> fallback_core;
@@ -51,7 +51,7 @@ void bind_architecture(py::module_& module) {
             Component& component = self.architecture.add_component(
                 name, make_shell(shell, registry), make_core(core, registry), make_fsm(fsm, registry),
                 task_settings(priority, cpus, offset_ns, period_ns, overrun, max_backlog, stack_bytes,
-                              trace_records),
+                              trace_records, hung_after_ns),
                 fsm_factory(fsm, registry));
             if (fallback_core != nullptr) component.set_fallback(std::move(fallback_core));
             component.allow(alternatives, reconfigurable);
@@ -62,6 +62,7 @@ void bind_architecture(py::module_& module) {
           py::arg("period_ns") = 0, py::arg("overrun") = "skip", py::arg("max_backlog") = 10,
           py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
           py::arg("trace_records") = TaskSettings{}.trace_records,
+          py::arg("hung_after_ns") = TaskSettings{}.hung_after_ns,
           py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = py::none(),
           py::arg("reconfigurable") = true)
       .def(

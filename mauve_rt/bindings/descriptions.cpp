@@ -68,6 +68,7 @@ ComponentDescription describe_component(Component& component) {
   const Fault fault = faulted || fell_back ? task.fault() : Fault{};
   const bool deployed = task.has_thread();
   const TaskStatistics& statistics = task.statistics();
+  const StateAge age = task.state_age();
   constexpr double kMedian = 0.5;
   constexpr double kTail = 0.99;
   return {.name = component.name(),
@@ -75,7 +76,7 @@ ComponentDescription describe_component(Component& component) {
           .core = shown.core,
           .fsm = shown.fsm,
           .state = std::string(to_string(state)),
-          .current_state = task.current_state(),
+          .current_state = age.state,
           .clock_ns = task.get_time(),
           .period_ns = component.task().context().period_ns,
           .offset_ns = task.settings().offset_ns,
@@ -99,7 +100,8 @@ ComponentDescription describe_component(Component& component) {
           .wakeup_max_ns = statistics.wakeup.max_ns(),
           .allocations = task.counters().allocations(),
           .page_faults = task.counters().page_faults(),
-          .execution_times = describe_execution_times(*component.state_times())};
+          .execution_times = describe_execution_times(*component.state_times()),
+          .state_age = age};
 }
 
 RecentMaxima take_recent_maxima(const Component& component) {
@@ -173,7 +175,12 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("wakeup_max_ns", &C::wakeup_max_ns)
       .def_readonly("allocations", &C::allocations)
       .def_readonly("page_faults", &C::page_faults)
-      .def_readonly("execution_times", &C::execution_times);
+      .def_readonly("execution_times", &C::execution_times)
+      .def_property_readonly("state_age_ns", [](const C& self) { return self.state_age.age_ns; })
+      .def_property_readonly("state_bound_ns", [](const C& self) { return self.state_age.bound_ns; })
+      .def_property_readonly("hung_after_ns", [](const C& self) { return self.state_age.hung_after_ns; })
+      .def_property_readonly("waiting", [](const C& self) { return self.state_age.is_wait; })
+      .def_property_readonly("hung", [](const C& self) { return self.state_age.is_hung(); });
   py::class_<RecentMaxima>(module, "RecentMaxima")
       .def_readonly("component", &RecentMaxima::component)
       .def_readonly("wakeup_ns", &RecentMaxima::wakeup_ns)

@@ -64,7 +64,7 @@ py::object to_python(const PropertyValue& value);
 Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry);
 TaskSettings task_settings(int priority, const std::vector<int>& cpus, time_ns_t offset_ns,
                            time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
-                           std::size_t stack_bytes, std::size_t trace_records);
+                           std::size_t stack_bytes, std::size_t trace_records, time_ns_t hung_after_ns);
 
 struct PortDescription {
   std::string name;
@@ -149,6 +149,7 @@ struct ComponentDescription {
   time_ns_t wakeup_p50_ns, wakeup_p99_ns, wakeup_max_ns;
   std::uint64_t allocations, page_faults;
   std::vector<ExecutionTimeDescription> execution_times;
+  StateAge state_age;
 };
 ComponentDescription describe_component(Component& component);
 

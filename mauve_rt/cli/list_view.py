@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mauve_rt.cli.views import console, duration
+from mauve_rt.node.state_age import in_words
 
 STATES = (
     "UNCONFIGURED",
@@ -23,7 +24,7 @@ _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_m
 
 
 def print_components(reply: Any, out: Console | None = None) -> None:
-    """A ListComponents reply: its tables, faults, and what is missing for real time."""
+    """A ListComponents reply: its tables, faults, states that last, and what is missing for real time."""
     out = out or console()
     for table in (_components(reply), _cores(reply), _connections(reply)):
         if table.row_count:
@@ -31,6 +32,12 @@ def print_components(reply: Any, out: Console | None = None) -> None:
     for component in reply.components:
         if component.fault:
             out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
+    for component in reply.components:
+        if component.hung or component.state_age_ns > component.period_ns > 0:
+            style = "bold red" if component.hung else "yellow"
+            text = in_words(component)
+            words = f"hung: {text}" if component.hung else text
+            out.print(f"[{style}]{component.name}[/]: {escape(words)}", soft_wrap=True)
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")

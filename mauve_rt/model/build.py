@@ -128,6 +128,7 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
         "max_backlog": component.max_backlog,
         "stack_bytes": component.stack_bytes,
         "trace_records": component.trace_records or 0,
+        "hung_after_ns": component.hung_after_ns,
         "alternatives": [core for core in allowed_parts(component, "core", loader) if core != component.core],
         "reconfigurable": component.reconfigurable,
     }

@@ -19,7 +19,8 @@
 `alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
 `installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
 `trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
-does not fit is counted as lost.
+does not fit is counted as lost. A state that lasts longer than `hung_after_ms` is told as hung: an error in
+/diagnostics, in ~/state and in the log; without the key after 10 periods, but no sooner than after 1 s.
 
 From which figures on /diagnostics warns, for all components and for each one:
 
@@ -258,6 +259,8 @@ class ComponentModel(Section):
         hint="the default of 524288 does for most components",
     )
     trace_records: int | None = setting(Whole(2, MAX_TRACE_RECORDS), default=None)  # None: by the period
+    # A state that lasts longer is told as hung; None: 10 periods, 1 s at least.
+    hung_after_ms: float | None = setting(Real(above=0, most=_LONGEST_MS), default=None)
     reconfigurable: bool = setting(Flag(), default=True)
     properties: dict[str, PropertyValue] = setting(TableOf(Scalar()), default={})
     diagnostics: DiagnosticsModel = setting(Part(DiagnosticsModel), default=DiagnosticsModel())
@@ -266,6 +269,11 @@ class ComponentModel(Section):
     def offset_ns(self) -> int:
         """The offset from the epoch in nanoseconds."""
         return round(self.offset_ms * 1e6)
+
+    @property
+    def hung_after_ns(self) -> int:
+        """As the kernel takes it: 0 stands for its own rule."""
+        return 0 if self.hung_after_ms is None else max(1, round(self.hung_after_ms * 1e6))
 
 
 class FileModel(Section):

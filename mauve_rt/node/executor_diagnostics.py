@@ -14,6 +14,7 @@ from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_recording import Recording, RecordingStatus
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.state_age import in_words
 
 _ONE = ThresholdModel(warn=1)
 _DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
@@ -55,11 +56,18 @@ class Diagnostics:
         elif part.fell_back:
             text = f"fallback core {part.core} runs after a fault: {part.fault}"
             remarks.insert(0, (DiagnosticStatus.WARN, text))
+        if part.hung:
+            text = f"hung: {in_words(part)}"
+            remarks.insert(0, (DiagnosticStatus.ERROR, text))
         level = max((level for level, _ in remarks), default=DiagnosticStatus.OK)
         message = "; ".join(text for _, text in remarks) or part.state.lower()
         values: dict[str, object] = {
             "core": part.core,
             "state": part.current_state,
+            "state_age_ns": part.state_age_ns,
+            "state_bound_ns": part.state_bound_ns,
+            "period_ns": part.period_ns,
+            "hung_after_ns": part.hung_after_ns,
             "releases": part.releases,
             "overruns": part.overruns,
             "skipped": part.skipped,

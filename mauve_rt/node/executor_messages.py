@@ -46,7 +46,20 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
         releases=component.releases,
         overruns=component.overruns,
         skipped=component.skipped,
+        **_state_age(component),
     )
+
+
+def _state_age(component: ComponentDescription) -> dict[str, Any]:
+    """What ComponentInfo and ComponentStatus tell alike."""
+    return {
+        "current_state": component.current_state,
+        "state_age_ns": component.state_age_ns,
+        "state_bound_ns": component.state_bound_ns,
+        "hung_after_ns": component.hung_after_ns,
+        "hung": component.hung,
+        "waiting": component.waiting,
+    }
 
 
 def component_infos(runtime: Runtime) -> list[Any]:
@@ -95,6 +108,7 @@ def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, erro
                 state=getattr(ComponentInfo, component.state),
                 core=component.core,
                 fault=component.fault,
+                **_state_age(component),
             )
             for component in observed.components
         ],

@@ -215,6 +215,7 @@ class ExecutorNode(LifecycleNode):
         self._properties.follow()
 
     def _tell_health(self) -> None:
+        self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
 
     def _log_realtime(self) -> None:

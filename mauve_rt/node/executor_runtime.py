@@ -267,11 +267,11 @@ class Runtime:
         with self._lock:
             return self._revision
 
-    def observe(self, *, changed_since: int | None = None) -> Observed:
+    def observe(self, *, changed_since: int | None = None, anew: bool = False) -> Observed:
         """The components; a change since the last look is counted. Figures may be those of the last change.
 
         `changed_since`: a revision after which there was a change, which need not show: a core replaced by
-        another one of its kind, or a restart, counts all the same.
+        another one of its kind, or a restart, counts all the same. `anew`: figures are those of now.
         """
         with self._lock:
             mark = (
@@ -279,7 +279,7 @@ class Runtime:
                 self.active,
                 self.kernel_revision(),
             )  # first: what comes after is news
-            if mark != self._mark or self._revision == changed_since:
+            if anew or mark != self._mark or self._revision == changed_since:
                 parts = self.components()
                 seen = (self.active, [_facts(part) for part in parts], self.resources())
                 if seen != self._seen or self._revision == changed_since:

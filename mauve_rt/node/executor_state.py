@@ -14,6 +14,7 @@ from mauve_rt.node.executor_messages import architecture_state, reconfiguration_
 from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_requests import Outcome, Request
 from mauve_rt.node.executor_runtime import Observed, Runtime
+from mauve_rt.node.state_age import HangWatch
 
 _WAIT_NS = 200_000_000  # how long a watching thread that should end may go on waiting
 _EVENT_DEPTH = 100
@@ -33,6 +34,7 @@ class StatePublisher:
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
         self._published_revision = -1
+        self._hangs = HangWatch()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -41,12 +43,24 @@ class StatePublisher:
         with self._lock:
             observed = self._runtime.observe()
             if again or observed.revision != self._published_revision:
+                observed = self._runtime.observe(anew=True)  # how long states last is told as of the stamp
                 stamp = self._node.get_clock().now().to_msg()
                 state = architecture_state(self._runtime, observed, stamp, error=self.error)
                 self._published_revision = observed.revision
                 self._recording.tell_architecture(observed)
                 self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
             return observed
+
+    def look_for_hung(self) -> None:
+        """Tell who is hung since the last call, and who no longer is. One thread at a time."""
+        turns = [*self._hangs.look(self._runtime.components())]
+        for turn in turns:
+            if turn.hung:  # a call each: rclpy lets none change its severity
+                self._node.get_logger().error(turn.message)
+            else:
+                self._node.get_logger().warning(turn.message)
+        if turns:
+            self.refresh(again=True)
 
     def event(self, request: Request, outcome: Outcome) -> None:
         """Publish what came of a request."""

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A small package of plug-ins for the executor's tests: a component that counts, in every temper.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -169,6 +172,34 @@ struct Held : Counter {
     const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(30);
     while (!shell().set.read().is_new() && mauve::monotonic_now_ns() < until) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+};
+
+/// Does not come out of its third activation in the way that `label` says: loop (until it is told a number), sleep (for
+/// four seconds), lock (a second time what it holds), or the path of a pipe to read from.
+struct Hanging : Counter {
+  int acts = 0;
+  std::mutex mutex;
+
+  void act() override {
+    if (++acts == 3) hang(shell().label.value());
+    Counter::act();
+  }
+  void hang(const std::string& how) {
+    if (how == "loop") {
+      while (!shell().set.read().is_new()) {
+      }
+    } else if (how == "sleep") {
+      std::this_thread::sleep_for(std::chrono::seconds(4));
+    } else if (how == "lock") {
+      mutex.lock();
+      mutex.lock();
+    } else if (!how.empty()) {
+      char byte = 0;
+      const int pipe = open(how.c_str(), O_RDONLY | O_CLOEXEC);
+      if (read(pipe, &byte, 1) != 1) throw std::runtime_error("the pipe was closed");
+      close(pipe);
     }
   }
 };
@@ -379,6 +410,7 @@ MAUVE_PLUGINS(registry) {
   registry.core<Wasteful>("executor_tests/Wasteful", shell);
   registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);
+  registry.core<Hanging>("executor_tests/Hanging", shell);
   registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);
   registry.fsm<CalmFsm>("executor_tests/CalmFsm", shell);

@@ -1,4 +1,8 @@
-"""A core in Python for the executor's tests."""
+"""Cores in Python for the executor's tests."""
+
+import threading
+import time
+from pathlib import Path
 
 from std_msgs.msg import Float64
 
@@ -19,3 +23,33 @@ class PyCounter(Core):
             self.count = sample.value.data
         self.count += 100.0 * self.shell.step.value
         self.shell.count.write(Float64(data=self.count))
+
+
+class PyHanging(PyCounter):
+    """Does not come out of its third activation: as Hanging of executor_tests.cpp."""
+
+    def configure(self) -> None:
+        """Not hung yet."""
+        super().configure()
+        self.acts = 0
+        self.mutex = threading.Lock()
+
+    def act(self) -> None:
+        """Count once, but the third time."""
+        self.acts += 1
+        if self.acts == 3:
+            self.hang(self.shell.label.value)
+        super().act()
+
+    def hang(self, how: str) -> None:
+        """In the way that a label says."""
+        if how == "loop":
+            while not self.shell.set.read().is_new:
+                pass
+        elif how == "sleep":
+            time.sleep(4)
+        elif how == "lock":
+            self.mutex.acquire()
+            self.mutex.acquire()
+        elif how:
+            Path(how).read_bytes()

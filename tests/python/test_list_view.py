@@ -106,3 +106,28 @@ def test_forty_components_of_long_names_lose_no_word_on_a_narrow_terminal(width:
 def test_states_are_those_of_the_message() -> None:
     for number, name in enumerate(STATES):
         assert getattr(ComponentInfo, name) == number
+
+
+def test_a_state_that_lasts_is_told_against_period_and_bound() -> None:
+    def part(name: str, age_ns: int, **fields: object) -> ComponentInfo:
+        return ComponentInfo(
+            name=name,
+            period_ns=10_000_000,
+            current_state="Act",
+            state_age_ns=age_ns,
+            hung_after_ns=1_000_000_000,
+            **fields,
+        )
+
+    parts = [
+        part("well", 9_000_000),
+        part("late", 20_000_000, state_bound_ns=50_000_000),
+        part("stuck", 2_500_000_000, hung=True),
+        part("starved", 2_500_000_000, hung=True, waiting=True),
+    ]
+    told = [line for line in _printed(ListComponents.Response(components=parts)) if "hung" in line]
+    assert told == [
+        "late: state Act has lasted 0.02 s (period 0.01 s, declared bound 0.05 s, hung from 1 s on)",
+        "stuck: hung: state Act has lasted 2.5 s (period 0.01 s, hung from 1 s on)",
+        "starved: hung: wait Act is 2.5 s past its instant (period 0.01 s, hung from 1 s on)",
+    ]

@@ -82,6 +82,13 @@ void Component::set_settings(const TaskSettings& settings) {
     throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
                 {.component = name_, .expected = "period_ns >= 0, max_backlog >= 1, stack_bytes >= 65536"});
   }
+  if (settings.hung_after_ns < 0) {
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "hung_after_ns",
+                 .expected = ">= 0 (0: 10 periods, 1 s at least)",
+                 .found = std::to_string(settings.hung_after_ns)});
+  }
   task_.set_settings(settings);
 }
 

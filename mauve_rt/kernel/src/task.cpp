@@ -14,6 +14,9 @@ namespace {
 
 /// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
+/// What lasts for so many periods, and so long, is told as hung where no other figure was set.
+constexpr std::int64_t kHungPeriods = 10;
+constexpr time_ns_t kHungAtLeast = s_to_ns(1);
 
 /// Room for what a component with this period writes while nobody drains: at most 3 MiB.
 std::size_t ring_capacity(time_ns_t period_ns) {
@@ -87,6 +90,21 @@ Fault Task::fault() const {
 }
 
 std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
+
+StateAge Task::state_age() const {
+  time_ns_t hung_after_ns = settings_.hung_after_ns;
+  if (hung_after_ns == 0) {
+    const time_ns_t period = context_.period_ns.load(std::memory_order_relaxed);
+    hung_after_ns = std::max(kHungAtLeast, kHungPeriods * std::min(period, kForever / kHungPeriods));
+  }
+  const std::optional<PresentState::Fact> fact = present_.look();
+  if (!fact) return {.state = current_state(), .hung_after_ns = hung_after_ns};  // it changes this moment
+  return {.state = TraceNames::word(fact->name),
+          .age_ns = fact->since_ns == 0 ? 0 : std::max<time_ns_t>(0, clock_->now_ns() - fact->since_ns),
+          .bound_ns = fact->bound_ns,
+          .hung_after_ns = hung_after_ns,
+          .is_wait = fact->is_wait};
+}
 
 void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped) {
   const std::lock_guard lock(ring_mutex_);

@@ -23,6 +23,7 @@ void Task::resume() noexcept {
       const time_ns_t period = grid_.period_ns;
       if (event_settled_ && period != 0 && boundary_ns_ - clock_ns() >= period)
         handle_overrun(*waiting_, boundary_ns_);
+      tell_wait();
     }
     if (!event_settled_ && (control & kEvent) != 0) settle_event();
     const time_ns_t now = clock_->now_ns();
@@ -56,6 +57,7 @@ void Task::start_machine(time_ns_t instant_ns) noexcept {
   event_settled_ = true;
   set_clock_ns(instant_ns);
   current_.store(waiting_->trace_id, std::memory_order_relaxed);
+  tell_wait();
   parked_.store(0, std::memory_order_release);
   publish_state(ComponentState::running);
   trace(TraceKind::deployment, 0, grid_.reference_ns - settings_.offset_ns, settings_.offset_ns,
@@ -96,6 +98,7 @@ void Task::run_to_next_wait() {
 
 const State* Task::execute(const State& state) {
   const time_ns_t began = boundary_ns_;
+  present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
   trace_at(began, TraceKind::state_begin, state.trace_id);
   if (state.max_execution_ns != 0) {
     execution_limit_ns_.store(state.max_execution_ns,
@@ -131,7 +134,7 @@ void Task::enter_wait(const State& state) {
     set_clock_ns(clock_ns() + state.duration_ns);
     trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
     if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
-    return;
+    return tell_wait();
   }
   wait_from_ns_ = clock_ns();
   event_settled_ = false;
@@ -142,6 +145,11 @@ void Task::enter_wait(const State& state) {
     event_settled_ = true;
     handle_overrun(state, boundary_ns_);
   }
+  tell_wait();
+}
+
+void Task::tell_wait() noexcept {
+  present_.tell({.since_ns = due_ns(), .name = waiting_->trace_id, .is_wait = true});
 }
 
 /// An event fixes the end of the wait: not before min_interarrival has passed since the last release.
@@ -152,6 +160,7 @@ void Task::settle_event() noexcept {
   if (!came) return;
   set_clock_ns(std::max(wait_from_ns_ + waiting_->min_interarrival_ns, *came));
   event_settled_ = true;
+  tell_wait();
 }
 
 void Task::signal_event() noexcept {
@@ -263,6 +272,7 @@ void Task::fall_back(CommitAction& fallback) noexcept {
 
 void Task::park(ComponentState state) noexcept {
   waiting_ = next_ = nullptr;
+  present_.tell({.name = current_.load(std::memory_order_relaxed)});
   deferrals_ = 0;
   left_gate_ = false;
   control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);

@@ -20,6 +20,7 @@
 #include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/plugin.hpp"
 #include "mauve_rt/port.hpp"
+#include "mauve_rt/present_state.hpp"
 #include "mauve_rt/property.hpp"
 #include "mauve_rt/resource.hpp"
 #include "mauve_rt/ring_buffer.hpp"

@@ -14,6 +14,7 @@
 #include "mauve_rt/context.hpp"
 #include "mauve_rt/fsm.hpp"
 #include "mauve_rt/pi_mutex.hpp"
+#include "mauve_rt/present_state.hpp"
 #include "mauve_rt/statistics.hpp"
 #include "mauve_rt/thread_counters.hpp"
 
@@ -44,6 +45,7 @@ struct TaskSettings {
   std::int64_t max_backlog{10};
   std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 64 KiB are prefaulted
   std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
+  time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
 };
 
 /// What the kernel gave the thread, read back from it.
@@ -51,6 +53,7 @@ struct ThreadFacts {
   std::string policy;
   int priority{0};
   std::vector<int> cpus;
+  std::size_t guard_bytes{0};  // below its stack
 };
 
 struct Fault {
@@ -86,6 +89,7 @@ struct ChangeSignal {
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | current_               | machine                               | anyone       | relaxed: a lone fact               |
+/// | present_               | machine                               | anyone       | its own: present_state.hpp         |
 /// | execution_*            | machine                               | watchdog     | release: the limit before began    |
 /// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
 /// | shell_, fsm_, core_,   | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
@@ -207,6 +211,8 @@ class Task {
   bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
   /// The state being executed or waited in; empty before the start. [non-rt]
   std::string current_state() const;
+  /// How long that lasts, also while it does, against the declared bound and what counts as hung. [non-rt]
+  StateAge state_age() const;
   /// The last fault, also of a core that a fallback has replaced; empty when there was none. [non-rt]
   Fault fault() const;
   const ThreadFacts& facts() const noexcept { return facts_; }
@@ -245,6 +251,7 @@ class Task {
   void run_to_next_wait();
   const State* execute(const State& state);
   void enter_wait(const State& state);
+  void tell_wait() noexcept;
   void settle_event() noexcept;
   void handle_overrun(const State& state, time_ns_t now_ns);
   void release(time_ns_t actual_ns) noexcept;
@@ -317,6 +324,7 @@ class Task {
   std::atomic<std::uint32_t> condemned_{0};
   std::atomic<CommitAction*> fallback_{nullptr};
   std::atomic<bool> fallen_back_{false};
+  PresentState present_;
 
   // the machine's own
   const State* waiting_{
