@@ -1,6 +1,7 @@
 """The installed programs in a shell that has not loaded the workspace; what is installed is compiled."""
 
 import importlib.util
+import json
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from mauve_rt import _kernel
 
 SITE = Path(_kernel.__file__).resolve().parents[1]
 PREFIX = SITE.parents[2]
+DOWNSTREAM = Path(__file__).parents[1] / "downstream"
 PROGRAMS = ["bin/mauve", "lib/mauve_rt/executor", "lib/mauve_rt/supervisor", "lib/mauve_examples/radio"]
 
 
@@ -39,3 +41,19 @@ def test_what_is_installed_is_compiled(package: str) -> None:
     compiled = [Path(importlib.util.cache_from_source(str(source))) for source in sources]
     assert sources
     assert [path for path in compiled if not path.exists()] == []
+
+
+def test_who_links_the_kernel_is_compiled_with_stack_protection(tmp_path: Path) -> None:
+    words = [
+        "-S",
+        DOWNSTREAM,
+        "-B",
+        tmp_path,
+        "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+        f"-DCMAKE_PREFIX_PATH={PREFIX}",
+    ]
+    done = subprocess.run(["cmake", *words], capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    commands = json.loads((tmp_path / "compile_commands.json").read_text("utf-8"))
+    assert commands
+    assert all("-fstack-clash-protection" in command["command"].split() for command in commands)

@@ -9,6 +9,8 @@
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/task.hpp"
 
+#include "thread_attributes.hpp"
+
 namespace mauve {
 
 namespace {
@@ -31,26 +33,17 @@ void check_state(const Task& task) {
 }  // namespace
 
 Conductor::Conductor() {
-  pthread_attr_t attributes;
-  pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, kConductorStackBytes);
-  pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-  pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
-  const sched_param above{.sched_priority = kConductorPriority};
-  pthread_attr_setschedparam(&attributes, &above);
+  ThreadAttributes attributes(kConductorStackBytes, kConductorPriority);
   sigset_t all_signals;
   sigset_t callers_signals;
   sigfillset(&all_signals);
   pthread_sigmask(SIG_SETMASK, &all_signals, &callers_signals);
-  int result = pthread_create(&thread_, &attributes, &Conductor::entry, this);
+  int result = pthread_create(&thread_, &attributes.value, &Conductor::entry, this);
   if (result == EPERM) {
-    const sched_param ordinary{};
-    pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-    pthread_attr_setschedparam(&attributes, &ordinary);
-    result = pthread_create(&thread_, &attributes, &Conductor::entry, this);
+    attributes.set_policy(SCHED_OTHER, 0);
+    result = pthread_create(&thread_, &attributes.value, &Conductor::entry, this);
   }
   pthread_sigmask(SIG_SETMASK, &callers_signals, nullptr);
-  pthread_attr_destroy(&attributes);
   if (result != 0) throw Error(ErrorCode::internal, "the system refuses the conductor's thread");
   pthread_setname_np(thread_, "conductor");
 }

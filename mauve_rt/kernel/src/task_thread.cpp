@@ -10,6 +10,8 @@
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/task.hpp"
 
+#include "thread_attributes.hpp"
+
 namespace mauve {
 
 namespace {
@@ -31,14 +33,6 @@ constexpr std::size_t kPrefaultedStackBytes = std::size_t{64} * 1024;
 
 thread_local Task* task_of_this_thread = nullptr;
 
-struct ThreadAttributes {
-  pthread_attr_t value;
-  ThreadAttributes() { pthread_attr_init(&value); }
-  ~ThreadAttributes() { pthread_attr_destroy(&value); }
-  ThreadAttributes(const ThreadAttributes&) = delete;
-  ThreadAttributes& operator=(const ThreadAttributes&) = delete;
-};
-
 }  // namespace
 
 void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace) {
@@ -49,8 +43,7 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   ended_.store(0, std::memory_order_relaxed);
   ready_.store(0, std::memory_order_relaxed);
 
-  ThreadAttributes attributes;
-  pthread_attr_setstacksize(&attributes.value, settings_.stack_bytes);
+  ThreadAttributes attributes(settings_.stack_bytes, settings_.priority);
   if (!settings_.cpus.empty()) {
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
@@ -62,15 +55,9 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   sigfillset(&all_signals);
   pthread_sigmask(SIG_SETMASK, &all_signals, &callers_signals);  // the new thread inherits it
 
-  const sched_param scheduling{.sched_priority = settings_.priority};
-  pthread_attr_setinheritsched(&attributes.value, PTHREAD_EXPLICIT_SCHED);
-  pthread_attr_setschedpolicy(&attributes.value, SCHED_FIFO);
-  pthread_attr_setschedparam(&attributes.value, &scheduling);
   int result = pthread_create(&thread_, &attributes.value, &Task::thread_entry, this);
   if (result == EPERM && !require_realtime) {
-    const sched_param ordinary{};
-    pthread_attr_setschedpolicy(&attributes.value, SCHED_OTHER);
-    pthread_attr_setschedparam(&attributes.value, &ordinary);
+    attributes.set_policy(SCHED_OTHER, 0);
     result = pthread_create(&thread_, &attributes.value, &Task::thread_entry, this);
   }
   pthread_sigmask(SIG_SETMASK, &callers_signals, nullptr);
@@ -162,7 +149,13 @@ void Task::read_back_thread() {
   pthread_getschedparam(thread_, &policy, &scheduling);
   facts_ = {.policy = policy == SCHED_FIFO ? "SCHED_FIFO" : "SCHED_OTHER",
             .priority = scheduling.sched_priority,
-            .cpus = {}};
+            .cpus = {},
+            .guard_bytes = 0};
+  pthread_attr_t attributes;
+  if (pthread_getattr_np(thread_, &attributes) == 0) {
+    pthread_attr_getguardsize(&attributes, &facts_.guard_bytes);
+    pthread_attr_destroy(&attributes);
+  }
   cpu_set_t cpus;
   CPU_ZERO(&cpus);
   pthread_getaffinity_np(thread_, sizeof(cpus), &cpus);
