@@ -50,6 +50,7 @@ class PropertyDescription:
     description: Final[str]
     minimum: Final[float | None]
     maximum: Final[float | None]
+    structural: Final[list[str]]  # parts that read it only when they are configured: shell, core, fsm
 
 @final
 class ShellDescription:
@@ -187,6 +188,7 @@ class ShellBuilder:
         description: str,
         minimum: float | None,
         maximum: float | None,
+        structural: list[str],
     ) -> None: ...
 
 @final

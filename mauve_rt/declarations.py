@@ -8,10 +8,10 @@
 A type is a class of ROS messages, or a name such as "geometry_msgs/msg/Point".
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
-from mauve_rt.ports import CallPort, EventPort, OutputPolicy, Property, ReadPort, WritePort
+from mauve_rt.ports import CallPort, EventPort, OutputPolicy, PartName, Property, ReadPort, WritePort
 from mauve_rt.resources import service_type
 
 __all__ = ["call_port", "event_port", "property", "read_port", "write_port"]
@@ -58,6 +58,18 @@ def property(  # noqa: A001 - its name in C++
     description: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
+    structural: PartName | Collection[PartName] = (),
 ) -> Property[V]:
-    """A property: bool, int, float or str, by its initial value."""
-    return Property(initial, unit=unit, description=description, minimum=minimum, maximum=maximum)
+    """A property: bool, int, float or str, by its initial value.
+
+    `structural`: the parts, "shell", "core" or "fsm", that read it in configure or define, such as the length
+    of a wait or a size. Once the component is configured it is set only beside their replacement.
+    """
+    return Property(
+        initial,
+        unit=unit,
+        description=description,
+        minimum=minimum,
+        maximum=maximum,
+        structural=structural,
+    )

@@ -1,6 +1,7 @@
 """Ports and properties of shells. A port's methods are for the component's thread, in actions and guards."""
 
 import copy
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Literal, ParamSpec, TypeVar
@@ -22,6 +23,7 @@ __all__ = [
 
 Status = Literal["none", "old", "new"]
 OutputPolicy = Literal["hold", "set_zero"]
+PartName = Literal["shell", "core", "fsm"]
 _STATUSES: tuple[Status, Status, Status] = ("none", "old", "new")
 
 T = TypeVar("T")
@@ -186,6 +188,7 @@ class Property(Member, Generic[V]):
         description: str = "",
         minimum: float | None = None,
         maximum: float | None = None,
+        structural: PartName | Collection[PartName] = (),
     ) -> None:
         super().__init__()
         self.initial = initial
@@ -193,6 +196,7 @@ class Property(Member, Generic[V]):
         self.description = description
         self.minimum = minimum
         self.maximum = maximum
+        self.structural: list[str] = [structural] if isinstance(structural, str) else list(structural)
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
@@ -203,6 +207,7 @@ class Property(Member, Generic[V]):
             description=self.description,
             minimum=self.minimum,
             maximum=self.maximum,
+            structural=self.structural,
         )
 
     @property

@@ -22,8 +22,11 @@ struct TalkerShell : mauve::Shell {
   mauve::Property<std::int64_t>& topics = property("topics", 1, {.minimum = 0, .maximum = kMostTopics});
   mauve::Property<std::int64_t>& marks = property(
       "marks", 0, {.description = "trace records of its own, each release", .minimum = 0, .maximum = 1000});
-  mauve::Property<std::int64_t>& releases =
-      property("releases", 0, {.description = "so many are remembered", .minimum = 0, .maximum = 1e7});
+  mauve::Property<std::int64_t>& releases = property("releases", 0,
+                                                     {.description = "so many are remembered",
+                                                      .minimum = 0,
+                                                      .maximum = 1e7,
+                                                      .structural = mauve::ReadBy::core});
   mauve::Property<std::string>& file =
       property("file", "", {.description = "gets the releases at the end, as 64 bit integers"});
   std::vector<mauve::WritePort<Point>*> points;

@@ -14,7 +14,8 @@
 namespace bench {
 
 struct WorkerShell : mauve::Shell {
-  mauve::Property<std::int64_t>& period_us = property("period_us", 1000, {.unit = "us"});
+  mauve::Property<std::int64_t>& period_us =
+      property("period_us", 1000, {.unit = "us", .structural = mauve::ReadBy::fsm});
   mauve::Property<std::int64_t>& work_us = property("work_us", 0, {.unit = "us"});
 };
 

@@ -24,12 +24,15 @@ inline void compute_for(mauve::time_ns_t processor_ns) noexcept {
 }
 
 struct WorkShell : mauve::Shell {
-  mauve::Property<std::int64_t>& period_us = property("period_us", 40'000, {.unit = "us", .minimum = 1000});
+  mauve::Property<std::int64_t>& period_us =
+      property("period_us", 40'000, {.unit = "us", .minimum = 1000, .structural = mauve::ReadBy::fsm});
   mauve::Property<std::int64_t>& work_us =
       property("work_us", 8000, {.unit = "us", .description = "processor time in a period", .minimum = 0});
   mauve::Property<std::int64_t>& prepare_us =
       property("prepare_us", 6000,
-               {.unit = "us", .description = "processor time that ShortWork's configuration takes"});
+               {.unit = "us",
+                .description = "processor time that ShortWork's configuration takes",
+                .structural = mauve::ReadBy::core});
 };
 
 /// C_A of Fig. 6.

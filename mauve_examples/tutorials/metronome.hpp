@@ -12,8 +12,12 @@ using Beat = mauve::types::Float64;
 
 /// The shell: what others see of the component.
 struct MetronomeShell : mauve::Shell {
-  mauve::Property<std::int64_t>& period_us = property(
-      "period_us", 1000, {.unit = "us", .description = "from tick to tick", .minimum = 100, .maximum = 1e6});
+  mauve::Property<std::int64_t>& period_us = property("period_us", 1000,
+                                                      {.unit = "us",
+                                                       .description = "from tick to tick",
+                                                       .minimum = 100,
+                                                       .maximum = 1e6,
+                                                       .structural = mauve::ReadBy::fsm});
   mauve::Property<std::int64_t>& ticks_per_beat =
       property("ticks_per_beat", 100, {.unit = "1", .description = "from beat to beat", .minimum = 1});
   mauve::WritePort<Beat>& beat = write_port<Beat>("beat");

@@ -34,7 +34,7 @@ class RoverShell(Shell):
     pose = write_port(Pose2D, on_stop="hold")
     target = write_port(Point, on_stop="hold")
     target_x = property(2.0, unit="m", description="where to go", minimum=-50.0, maximum=50.0)
-    period_ms = property(10, unit="ms", description="of the motion", minimum=1, maximum=100)
+    period_ms = property(10, unit="ms", description="of the motion", minimum=1, maximum=100, structural="fsm")
 
 
 class RoverCore(Core[RoverShell]):

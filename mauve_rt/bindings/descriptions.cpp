@@ -29,7 +29,7 @@ PropertyDescription describe_property(const ShownProperty& property) {
   return {property.name,       std::string(property_type_name(property.value)),
           property.value,      options.unit,
           options.description, options.minimum,
-          options.maximum};
+          options.maximum,     names_of(options.structural)};
 }
 
 ResourceDescription describe_resource(const Resource& resource) {
@@ -125,7 +125,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("unit", &PropertyDescription::unit)
       .def_readonly("description", &PropertyDescription::description)
       .def_readonly("minimum", &PropertyDescription::minimum)
-      .def_readonly("maximum", &PropertyDescription::maximum);
+      .def_readonly("maximum", &PropertyDescription::maximum)
+      .def_readonly("structural", &PropertyDescription::structural);
   py::class_<ShellDescription>(module, "ShellDescription")
       .def_readonly("name", &ShellDescription::name)
       .def_readonly("ports", &ShellDescription::ports)

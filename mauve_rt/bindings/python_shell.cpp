@@ -17,6 +17,22 @@ OutputPolicy output_policy(const std::string& name, const char* element) {
               {.element = element, .expected = "hold or set_zero", .found = name});
 }
 
+ReadBy read_by(const std::vector<std::string>& parts) {
+  ReadBy all = ReadBy::none;
+  for (const std::string& part : parts) {
+    const ReadBy one = part == "shell"  ? ReadBy::shell
+                       : part == "core" ? ReadBy::core
+                       : part == "fsm"  ? ReadBy::fsm
+                                        : ReadBy::none;
+    if (one == ReadBy::none) {
+      throw Error(ErrorCode::invalid_argument, "a component has no such part",
+                  {.element = "structural", .expected = "shell, core or fsm", .found = part});
+    }
+    all = all | one;
+  }
+  return all;
+}
+
 /// Handed to the Python object while it declares itself.
 class ShellBuilder {
  public:
@@ -37,9 +53,9 @@ class ShellBuilder {
   }
   void event_port(const std::string& name) { shell_.event_port(name); }
   void property(const std::string& name, const PropertyValue& value, const std::string& unit,
-                const std::string& description, std::optional<double> minimum,
-                std::optional<double> maximum) {
-    const PropertyOptions options{unit, description, minimum, maximum};
+                const std::string& description, std::optional<double> minimum, std::optional<double> maximum,
+                const std::vector<std::string>& structural) {
+    const PropertyOptions options{unit, description, minimum, maximum, read_by(structural)};
     std::visit([&](const auto& initial) { add_property(name, initial, options); }, value);
     static_cast<void>(shell_.find_property(name)->checked(value));  // the default is in the range, too
   }
@@ -185,7 +201,7 @@ void bind_python_shell(py::module_& module) {
       .def("call_port", &ShellBuilder::call_port, py::arg("name"), py::arg("type"))
       .def("event_port", &ShellBuilder::event_port, py::arg("name"))
       .def("property", &ShellBuilder::property, py::arg("name"), py::arg("value"), py::arg("unit"),
-           py::arg("description"), py::arg("minimum"), py::arg("maximum"));
+           py::arg("description"), py::arg("minimum"), py::arg("maximum"), py::arg("structural"));
 }
 
 }  // namespace mauve::bindings

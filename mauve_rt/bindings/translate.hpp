@@ -83,6 +83,7 @@ struct PropertyDescription {
   std::string description;
   std::optional<double> minimum;
   std::optional<double> maximum;
+  std::vector<std::string> structural;  // the parts that read it only when they are configured
 };
 std::vector<PropertyDescription> describe_properties(const Shell& shell);
 PropertyDescription describe_property(const ShownProperty& property);

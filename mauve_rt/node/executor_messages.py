@@ -47,6 +47,7 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
         overruns=component.overruns,
         skipped=component.skipped,
         **_state_age(component),
+        structural=[item.name for item in component.properties if item.structural],
     )
 
 

@@ -67,6 +67,7 @@ _CODES = {
     "already_running": Code.ALREADY_RUNNING,
     "faulted": Code.FAULTED,
     "not_reconfigurable": Code.NOT_RECONFIGURABLE,
+    "structural_property": Code.NOT_RECONFIGURABLE,
     "wrong_revision": Code.WRONG_REVISION,
     "adopt_refused": Code.ADOPT_REFUSED,
     "timeout": Code.TIMEOUT,

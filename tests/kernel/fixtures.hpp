@@ -29,7 +29,7 @@ namespace mauve::testing {
 struct TestShell : Shell {
   Property<double>& gain =
       property("gain", 1.0, {.unit = "1", .description = "a factor", .minimum = 0.0, .maximum = 10.0});
-  Property<std::int64_t>& period_ms = property("period_ms", 1);
+  Property<std::int64_t>& period_ms = property("period_ms", 1, {.structural = ReadBy::fsm});
   ReadPort<Number>& input = read_port<Number>("input", Number{7.0});
   WritePort<Number>& output = write_port<Number>("output");
   WritePort<Number>& held =

@@ -96,7 +96,7 @@ namespace executor_tests {
 
 struct CounterShell : mauve::Shell {
   mauve::Property<double>& step = property("step", 1.0, {.unit = "1", .minimum = 0.0, .maximum = 10.0});
-  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10);
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
   mauve::Property<bool>& enabled = property("enabled", true);
   mauve::Property<std::string>& label = property("label", "");
   mauve::Property<std::string>& list_file = property("list_file", "");
@@ -276,7 +276,7 @@ struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
 
 /// Calls at every activation, with true and false in turns.
 struct CallerShell : mauve::Shell {
-  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10);
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
   mauve::CallPort<mauve::CallOf<SetBool>>& lamp = call_port<SetBool>("lamp");
   mauve::WritePort<Number>& count = write_port<Number>("count");
 };

@@ -81,7 +81,8 @@ class HoverShell(Shell):
     height = property(1.0, unit="m", description="above ground", minimum=0.0, maximum=9.0)
     tries = property(3)
     eager = property(initial=True)
-    frame = property("map")
+    frame = property("map", structural="core")
+    pace = property(10, structural=("core", "fsm"))
     wrong = write_port(Pose, on_commit="default")  # type: ignore[arg-type]
 
 

@@ -10,12 +10,13 @@
 namespace mauve_examples {
 
 struct ExplorationShell : mauve::Shell {
-  mauve::Property<std::string>& robot_name =
-      property("robot_name", "robot_1", {.description = "what its peers call it"});
-  mauve::Property<std::string>& peers =
-      property("peers", "", {.description = "the robots it explores with, separated by commas"});
-  mauve::Property<std::string>& map =
-      property("map", "", {.description = "YAML file: how large the world is"});
+  mauve::Property<std::string>& robot_name = property(
+      "robot_name", "robot_1", {.description = "what its peers call it", .structural = mauve::ReadBy::core});
+  mauve::Property<std::string>& peers = property(
+      "peers", "",
+      {.description = "the robots it explores with, separated by commas", .structural = mauve::ReadBy::core});
+  mauve::Property<std::string>& map = property(
+      "map", "", {.description = "YAML file: how large the world is", .structural = mauve::ReadBy::core});
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::CallPort<void(MapReader)>& map_get = call_port<void(MapReader)>("map_get", kMapReaderType);

@@ -18,11 +18,14 @@ struct GuidanceShell : mauve::Shell {
   mauve::Property<double>& path_step =
       property("path_step", 1.0,
                {.unit = "m", .description = "between points of the path", .minimum = 0.1, .maximum = 20.0});
-  mauve::Property<std::string>& map =
-      property("map", "", {.description = "YAML file: how large the world is"});
-  mauve::Property<std::int64_t>& unit_ms = property(
-      "unit_ms", 100,
-      {.unit = "ms", .description = "of the waits: 1, 2 and 5 units", .minimum = 1, .maximum = 10000});
+  mauve::Property<std::string>& map = property(
+      "map", "", {.description = "YAML file: how large the world is", .structural = mauve::ReadBy::core});
+  mauve::Property<std::int64_t>& unit_ms = property("unit_ms", 100,
+                                                    {.unit = "ms",
+                                                     .description = "of the waits: 1, 2 and 5 units",
+                                                     .minimum = 1,
+                                                     .maximum = 10000,
+                                                     .structural = mauve::ReadBy::fsm});
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::ReadPort<Point>& goal = read_port<Point>("goal");

@@ -11,8 +11,8 @@
 namespace mauve_examples {
 
 struct MappingShell : mauve::Shell {
-  mauve::Property<std::string>& map =
-      property("map", "", {.description = "YAML file: how large the world is"});
+  mauve::Property<std::string>& map = property(
+      "map", "", {.description = "YAML file: how large the world is", .structural = mauve::ReadBy::core});
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");

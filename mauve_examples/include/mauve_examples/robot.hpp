@@ -13,11 +13,15 @@
 namespace mauve_examples {
 
 struct RobotShell : mauve::Shell {
-  mauve::Property<std::string>& map =
-      property("map", "", {.description = "YAML file of the world the robot moves in"});
-  mauve::Property<double>& start_x = property("start_x", 0.0, {.unit = "m"});
-  mauve::Property<double>& start_y = property("start_y", 0.0, {.unit = "m"});
-  mauve::Property<double>& start_yaw = property("start_yaw", 0.0, {.unit = "rad"});
+  mauve::Property<std::string>& map = property(
+      "map", "",
+      {.description = "YAML file of the world the robot moves in", .structural = mauve::ReadBy::core});
+  mauve::Property<double>& start_x =
+      property("start_x", 0.0, {.unit = "m", .structural = mauve::ReadBy::core});
+  mauve::Property<double>& start_y =
+      property("start_y", 0.0, {.unit = "m", .structural = mauve::ReadBy::core});
+  mauve::Property<double>& start_yaw =
+      property("start_yaw", 0.0, {.unit = "rad", .structural = mauve::ReadBy::core});
   mauve::Property<double>& radius =
       property("radius", 0.2, {.unit = "m", .description = "", .minimum = 0.05, .maximum = 1.0});
   mauve::Property<double>& max_speed =

@@ -127,12 +127,32 @@ PortBase& Component::require_port(const std::string& name) const {
   return find_port(*parts_.shell, name, name_);
 }
 
+void Component::check_structural(const PropertyBase& property, const PropertyValue& value,
+                                 ReadBy replaced) const {
+  const ReadBy kept = without(property.options().structural, replaced);
+  if (kept == ReadBy::none || !is_configured()) return;
+  for (const ShownProperty& present : shown().properties) {
+    if (present.name == property.name() && present.value == value) return;
+  }
+  const std::string parts = join(names_of(kept));
+  throw Error(ErrorCode::structural_property,
+              "it is structural: " + parts + " would have to be configured anew, or it changed nothing",
+              {.component = name_,
+               .element = "property " + property.name(),
+               .expected = "replacement of " + parts + " in the same transaction",
+               .found = "none",
+               .remedy = "replace " + parts +
+                         " beside it, by the same kind if it is to stay, or stop the component, clean it up, "
+                         "set it and configure it"});
+}
+
 StepReport Component::set_property(const std::string& name, const PropertyValue& value,
                                    const CommitTimeouts& timeouts) {
   const time_ns_t began = monotonic_now_ns();
   PropertyBase& property = require_property(name);
   const PropertyValue checked = property.checked(value);
   if (is_configured()) check_reconfigurable();
+  check_structural(property, checked);
   PropertyChange change(property, checked);
   const time_ns_t prepared = monotonic_now_ns();
   StepReport report = run_commit(change, timeouts, {});

@@ -2,6 +2,7 @@
 // Draft: what the steps of a transaction, one after another, will have made of an architecture.
 #pragma once
 
+#include <algorithm>
 #include <list>
 #include <map>
 #include <memory>
@@ -48,6 +49,18 @@ struct DraftComponent {
   const std::string& name() const noexcept { return component->name(); }
   /// The shell that will be in force.
   Shell& shell() const noexcept { return fresh.shell != nullptr ? *fresh.shell : component->shell(); }
+  /// The parts that are configured anew; with a new shell the fsm is, whether it is another one or not.
+  ReadBy replaced() const noexcept {
+    ReadBy parts = core_step != 0 ? ReadBy::core : ReadBy::none;
+    if (fsm_step != 0) parts = parts | ReadBy::fsm;
+    if (shell_step != 0) parts = parts | ReadBy::shell | ReadBy::fsm;
+    return parts;
+  }
+  bool sets_structural() const noexcept {
+    return std::any_of(properties.begin(), properties.end(), [this](const auto& set) {
+      return component->require_property(set.first).options().structural != ReadBy::none;
+    });
+  }
   bool has_new_parts() const noexcept {
     return fresh.shell != nullptr || fresh.core != nullptr || fresh.fsm != nullptr;
   }
@@ -91,7 +104,7 @@ class Draft {
   void disconnect(DraftComponent& component, const std::string& port);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
 
-  /// Checks what only the whole shows: kept connections of new shells, ports per service. Throws Error with the step.
+  /// Checks what only the whole shows: kept connections of new shells, structural properties, ports per service. Throws Error with the step.
   void finish() const;
 
   std::list<DraftComponent>& components() noexcept { return components_; }
@@ -101,6 +114,7 @@ class Draft {
 
  private:
   void check_kept_wires(const DraftComponent& component) const;
+  static void check_structural(const DraftComponent& component);
   void check_port_counts() const;
 
   Architecture& architecture_;

@@ -16,6 +16,7 @@ void rethrow_as_of(const Error& failure, const std::string& component, int step)
 void Draft::finish() const {
   for (const DraftComponent& component : components_) {
     if (component.shell_step != 0) check_kept_wires(component);
+    if (!component.is_added) check_structural(component);
   }
   check_port_counts();
 }
@@ -36,6 +37,17 @@ void Draft::check_kept_wires(const DraftComponent& component) const {
       port->check(*wire.service);
     } catch (const Error& failure) {
       rethrow_as_of(failure, component.name(), std::max(wire.step, component.shell_step));
+    }
+  }
+}
+
+void Draft::check_structural(const DraftComponent& component) {
+  for (const auto& [name, property] : component.properties) {
+    try {
+      component.component->check_structural(*component.shell().find_property(name), property.value,
+                                            component.replaced());
+    } catch (const Error& failure) {
+      rethrow_as_of(failure, component.name(), property.step);
     }
   }
 }

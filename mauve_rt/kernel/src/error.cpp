@@ -70,6 +70,8 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "faulted";
     case ErrorCode::not_reconfigurable:
       return "not_reconfigurable";
+    case ErrorCode::structural_property:
+      return "structural_property";
     case ErrorCode::adopt_refused:
       return "adopt_refused";
     case ErrorCode::prepare_failed:

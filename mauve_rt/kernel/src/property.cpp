@@ -42,6 +42,15 @@ std::string to_string(const PropertyValue& value) {
   return std::get<std::string>(value);
 }
 
+std::vector<std::string> names_of(ReadBy parts) {
+  std::vector<std::string> names;
+  for (const auto& [part, name] :
+       {std::pair{ReadBy::shell, "shell"}, std::pair{ReadBy::core, "core"}, std::pair{ReadBy::fsm, "fsm"}}) {
+    if (without(part, parts) == ReadBy::none) names.emplace_back(name);
+  }
+  return names;
+}
+
 void PropertyBase::check_range(double value) const {
   const bool below = options_.minimum && !(value >= *options_.minimum);
   const bool above = options_.maximum && !(value <= *options_.maximum);

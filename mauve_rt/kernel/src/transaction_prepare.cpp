@@ -23,6 +23,26 @@ void set_all(Shell& shell, const std::map<std::string, DraftProperty>& propertie
   }
 }
 
+/// While it lives the calling thread reads the properties of a shell as they will be.
+class Preview {
+ public:
+  Preview(const Shell& shell, const std::map<std::string, DraftProperty>& properties) {
+    for (const auto& [name, property] : properties) {
+      PropertyBase* previewed = shell.find_property(name);
+      previewed->preview(property.value);
+      previewed_.push_back(previewed);
+    }
+  }
+  ~Preview() {
+    for (PropertyBase* property : previewed_) property->end_preview();
+  }
+  Preview(const Preview&) = delete;
+  Preview& operator=(const Preview&) = delete;
+
+ private:
+  std::vector<PropertyBase*> previewed_;
+};
+
 }  // namespace
 
 template <typename Action>
@@ -101,6 +121,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
       if (port->is_connected()) keep(std::make_unique<WiringChange>(*port, PortConnection{}));
     }
   }
+  const Preview preview(change.parts->shell(), draft.properties);
   change.parts->prepare();
 }
 

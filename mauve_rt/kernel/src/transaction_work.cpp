@@ -151,13 +151,14 @@ void TransactionCommit::Work::publish() {
   architecture_.change_lists(lists);
 }
 
-/// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced.
+/// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced
+/// or a structural property was set that it may have read.
 void TransactionCommit::Work::renew_fallback(Change& change) {
   Component& component = *change.draft->component;
-  const bool restarts = change.parts->restarts();
+  const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
   std::unique_ptr<CoreBase> out = change.parts->give_back_core();
   const std::string& fallback = component.fallback_implementation();
-  if (fallback.empty() || !(restarts || (out != nullptr && out->implementation() == fallback))) return;
+  if (fallback.empty() || !(is_outdated || (out != nullptr && out->implementation() == fallback))) return;
   try {
     component.renew_fallback(std::move(out));
   } catch (const Error&) {  // it cannot be configured anew; the change itself is in

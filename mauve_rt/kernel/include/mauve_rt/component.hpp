@@ -188,14 +188,18 @@ class Component final : public Configurable {
   void check_reconfigurable() const;
   /// Throws Error: unknown_property.
   PropertyBase& require_property(const std::string& name) const;
+  /// Throws Error (structural_property) when the component is configured and a part that reads the property only then
+  /// is not among those `replaced`; a value that it has already may always be set. [non-rt]
+  void check_structural(const PropertyBase& property, const PropertyValue& value,
+                        ReadBy replaced = ReadBy::none) const;
   /// Throws Error: unknown_port.
   PortBase& require_port(const std::string& name) const;
   /// Whether an fsm of the present kind can be made once more. [non-rt]
   const FsmFactory& fsm_factory() const noexcept { return make_fsm_; }
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
-  /// Throws Error: unknown_property, type_mismatch, out_of_range, not_reconfigurable (while running),
-  /// timeout.
+  /// Throws Error: unknown_property, type_mismatch, out_of_range; once configured structural_property,
+  /// not_reconfigurable; timeout.
   StepReport set_property(const std::string& name, const PropertyValue& value,
                           const CommitTimeouts& timeouts = {});
 

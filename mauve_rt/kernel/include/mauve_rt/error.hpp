@@ -37,6 +37,7 @@ enum class ErrorCode : std::uint16_t {
   already_running,
   faulted,
   not_reconfigurable,
+  structural_property,
   adopt_refused,
   prepare_failed,
   timeout,

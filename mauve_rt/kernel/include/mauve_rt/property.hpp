@@ -2,12 +2,16 @@
 // Properties: typed parameters of a shell, with default, unit, description and range.
 #pragma once
 
+#include <pthread.h>
+
+#include <atomic>
 #include <concepts>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 namespace mauve {
 
@@ -22,11 +26,27 @@ std::string_view property_type_name(const PropertyValue& value) noexcept;
 /// The value as an architecture file would show it. [non-rt]
 std::string to_string(const PropertyValue& value);
 
+/// The parts of a component that read a property only when they are configured: `ReadBy::core | ReadBy::fsm`.
+enum class ReadBy : std::uint8_t { none = 0, shell = 1, core = 2, fsm = 4 };
+
+constexpr ReadBy operator|(ReadBy a, ReadBy b) noexcept {
+  return static_cast<ReadBy>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+/// Those of `a` that are not in `b`. [rt]
+constexpr ReadBy without(ReadBy a, ReadBy b) noexcept {
+  return static_cast<ReadBy>(static_cast<unsigned>(a) & ~static_cast<unsigned>(b));
+}
+/// "shell", "core", "fsm", as many as there are. [non-rt]
+std::vector<std::string> names_of(ReadBy parts);
+
 struct PropertyOptions {
   std::string unit{};
   std::string description{};
   std::optional<double> minimum{};
   std::optional<double> maximum{};
+  /// Who reads it in configure or define, such as the length of a wait or a size: once the component is configured
+  /// it is set only beside the replacement of these parts, in one transaction.
+  ReadBy structural{};
   bool operator==(const PropertyOptions&) const = default;
 };
 
@@ -34,7 +54,9 @@ struct PropertyOptions {
 ///
 /// | member           | written by                                                  | read by            |
 /// |------------------|-------------------------------------------------------------|--------------------|
-/// | the value        | assign(): the component's thread inside a wait, or [setup]  | component's thread |
+/// | the value        | swap(): the component's thread inside a wait, or [setup]    | component's thread |
+/// | the preview      | preview(), end_preview(): who prepares a transaction        | that thread        |
+/// | previewer_       | the same                                                    | anyone             |
 /// | name_, options_  | constructor                                                 | anyone             |
 class PropertyBase {
  public:
@@ -51,13 +73,25 @@ class PropertyBase {
   virtual PropertyValue checked(const PropertyValue& value) const = 0;
   /// Takes a value that checked() returned, by swapping it with the present one. [rt]
   virtual void swap(PropertyValue& value) noexcept = 0;
+  /// Until end_preview() the calling thread reads this value, which checked() returned; all others read the present
+  /// one. So the parts that a transaction puts in are configured with what it sets. [non-rt]
+  virtual void preview(const PropertyValue& value) = 0;
+  virtual void end_preview() noexcept = 0;
 
  protected:
   void check_range(double value) const;
+  void set_previewer(pthread_t thread) noexcept { previewer_.store(thread, std::memory_order_relaxed); }
+  bool is_previewed() const noexcept {
+    // Relaxed: only the thread that stored its own id here finds it, and that one has written the preview itself.
+    const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
+    return previewer != kNobody && pthread_equal(previewer, pthread_self()) != 0;
+  }
+  static constexpr pthread_t kNobody{};  // as glibc never calls a thread
 
  private:
   std::string name_;
   PropertyOptions options_;
+  std::atomic<pthread_t> previewer_{kNobody};
 };
 
 template <PropertyType T>
@@ -67,17 +101,26 @@ class Property final : public PropertyBase {
       : PropertyBase(std::move(name), std::move(options)), value_(std::move(initial)) {}
 
   /// The value in force since the component last left a wait. [rt]
-  const T& value() const noexcept { return value_; }
+  const T& value() const noexcept { return is_previewed() ? preview_ : value_; }
   operator const T&() const noexcept {
-    return value_;
+    return value();
   }  // NOLINT: reads like the value, as in the paper's listings
 
-  PropertyValue boxed() const override { return value_; }
+  PropertyValue boxed() const override { return value(); }
   PropertyValue checked(const PropertyValue& value) const override;
   void swap(PropertyValue& value) noexcept override { std::swap(std::get<T>(value), value_); }
+  void preview(const PropertyValue& value) override {
+    preview_ = std::get<T>(value);
+    set_previewer(pthread_self());
+  }
+  void end_preview() noexcept override {
+    set_previewer(kNobody);
+    preview_ = {};
+  }
 
  private:
   T value_;
+  T preview_{};
 };
 
 extern template class Property<bool>;

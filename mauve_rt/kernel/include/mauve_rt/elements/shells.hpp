@@ -10,9 +10,10 @@ namespace mauve {
 struct PeriodicShell : Shell {
   Property<std::int64_t>& period_us = property("period_us", 10'000,
                                                {.unit = "us",
-                                                .description = "from one update to the next; as configured",
+                                                .description = "from one update to the next",
                                                 .minimum = 1,
-                                                .maximum = 3.6e9});
+                                                .maximum = 3.6e9,
+                                                .structural = ReadBy::fsm});
 };
 
 /// Produces: a sensor's driver, a generator.
