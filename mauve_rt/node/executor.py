@@ -15,7 +15,15 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from mauve_rt.node.discovery import limit_discovery
-from mauve_rt.node.process import BAD_INPUT, FAILED, Stop, complain, leave_now, run_until_signalled
+from mauve_rt.node.process import (
+    BAD_INPUT,
+    FAILED,
+    Stop,
+    asks_for_help,
+    complain,
+    leave_now,
+    run_until_signalled,
+)
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
 _SPIN_S = 0.2  # how long a stop may go unnoticed
@@ -29,6 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     seen to hang.
     """
     words = list(sys.argv if arguments is None else arguments)
+    if asks_for_help(words):
+        from mauve_rt.node.executor_settings import help_text  # noqa: PLC0415 - takes its time to load
+
+        sys.stdout.write(help_text())
+        leave_now(0)
     discovery = limit_discovery()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work

@@ -5,10 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType, SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.node.executor_bound_resources import BoundResources
@@ -21,11 +19,12 @@ from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
+from mauve_rt.node.setting_parameters import declare_settings
+from mauve_rt.node.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.recorded import Split
 
 NODE_NAME = "executor"
-MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
 
 
 class ExecutorNode(LifecycleNode):
@@ -79,11 +78,11 @@ class ExecutorNode(LifecycleNode):
             self,
             self._properties,
             services.handle,
+            refusal=self._refusal,
             control_group=control_group,
             query_group=query_group,
         )
         self.create_timer(1.0, self._tell_health, callback_group=query_group)
-        self.add_on_set_parameters_callback(_refuse_sim_time)
 
     # ---- transitions
     #
@@ -118,12 +117,11 @@ class ExecutorNode(LifecycleNode):
         self._runtime.configure()
         self._properties.follow()
         self._bound.configure(self._runtime.model, self._runtime.architecture)
-        bag = str(self.get_parameter("bag").value)
+        with self._properties.lock:
+            names = ("bag", "record_topics", "bag_split_s", "bag_split_bytes")
+            bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
         if bag:
-            split = Split(
-                after_s=self._settings["bag_split_s"], after_bytes=self._settings["bag_split_bytes"]
-            )
-            self._recording.start(Path(bag), self._settings["record_topics"], split=split)
+            self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
         self._log_realtime()
 
     def _activate(self) -> None:
@@ -227,38 +225,13 @@ class ExecutorNode(LifecycleNode):
 
     def _declared(self) -> dict[str, Any]:
         try:
-            settings = {
-                name: self.declare_parameter(
-                    name, default, ParameterDescriptor(description=description)
-                ).value
-                for name, (default, description) in PARAMETERS.items()
-            }
-            strings = ParameterDescriptor(
-                description="topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos",
-                type=ParameterType.PARAMETER_STRING_ARRAY,
-            )
-            topics = self.declare_parameter("record_topics", Parameter.Type.STRING_ARRAY, strings).value
+            settings = declare_settings(self, PARAMETERS)
         except Exception as error:  # rclpy has an exception class of its own for each mistake
             raise ParameterError(one_line(f"bad parameter: {error}")) from error
-        settings["record_topics"] = list(topics or ())
-        phase_timeout_s = settings["report_phase_timeout_s"]
-        if not 0.0 <= phase_timeout_s <= MAX_PHASE_TIMEOUT_S:
-            expected = f"expected 0 to {MAX_PHASE_TIMEOUT_S:g} s, found {phase_timeout_s:g}"
-            raise ParameterError(f"report_phase_timeout_s: {expected}")
-        for name in ("bag_split_s", "bag_split_bytes"):
-            if not settings[name] >= 0:
-                raise ParameterError(
-                    f"parameter {name}: expected 0 (never) or more, found {settings[name]:g}"
-                )
         if self.get_parameter("use_sim_time").value:
-            raise ParameterError(
-                "use_sim_time: expected false: components run by the monotonic clock; leave it out"
-            )
+            raise ParameterError(f"use_sim_time: {NO_SIMULATED_TIME}")
         return settings
 
-
-def _refuse_sim_time(parameters: list[Any]) -> Any:
-    for parameter in parameters:
-        if parameter.name == "use_sim_time" and parameter.value:
-            return SetParametersResult(successful=False, reason="components run by the monotonic clock")
-    return SetParametersResult(successful=True)
+    def _refusal(self, parameter: str) -> str:
+        setting = PARAMETERS.get(parameter) or OF_RCLPY.get(parameter)
+        return "" if setting is None else refusal(parameter, setting, configured=self._runtime.configured)

@@ -26,6 +26,7 @@ from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_requests import Outcome, Request, Step
+from mauve_rt.node.settings import QOS_OVERRIDES, no_qos_overrides
 
 
 class ParameterServices:
@@ -37,13 +38,18 @@ class ParameterServices:
         parameters: Parameters,
         handle: Callable[[Request], Outcome],
         *,
+        refusal: Callable[[str], str],
         control_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
-        """`handle` carries out a request and lets `parameters` follow it."""
+        """`handle` carries out a request and lets `parameters` follow it.
+
+        `refusal` says why a parameter of the node's own is not set now, or nothing.
+        """
         self._node = node
         self._lock = parameters.lock
         self._handle = handle
+        self._refusal = refusal
         for service, name, callback, group in (
             (ListParameters, "list_parameters", self._list, query_group),
             (DescribeParameters, "describe_parameters", self._describe, query_group),
@@ -115,10 +121,14 @@ class ParameterServices:
     def _set_own(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         with self._lock:
             for parameter in parameters:
+                if parameter.name.startswith(QOS_OVERRIDES):
+                    return _refused(no_qos_overrides("executor"))
                 if not self._node.has_parameter(parameter.name):
                     known = self._node.list_parameters([], 0).names
                     remedy = did_you_mean(parameter.name, known)
                     return _refused(f"there is no parameter {shown(parameter.name)}; {remedy}")
+                if reason := self._refusal(parameter.name):
+                    return _refused(reason)
             return self._node.set_parameters_atomically(list(parameters))
 
 
@@ -127,7 +137,7 @@ def _refused(reason: str) -> SetParametersResult:
 
 
 def _is_property(name: str) -> bool:
-    return "." in name and not name.startswith("qos_overrides.")
+    return "." in name and not name.startswith(QOS_OVERRIDES)
 
 
 def _step(parameter: Parameter) -> Step:

@@ -7,23 +7,41 @@ from typing import Any, Self
 
 from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
-from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.model.words import shown
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
+from mauve_rt.node.settings import Setting, check_given, usage
 
-PARAMETERS: dict[str, tuple[Any, str]] = {
-    "architecture": ("", "architecture file"),
-    "bag": ("", "folder of the bag to record from the start, which must not exist yet; empty: none"),
-    "bags": ("", "folder below which ~/start_recording makes bags; empty: the working directory"),
-    "bag_split_s": (60.0, "a recording goes on in a new file after so long; 0: never"),
-    "bag_split_bytes": (0, "a recording goes on in a new file when one is so large; 0: never"),
-    "autostart": (True, "configure and activate at the start"),
-    "require_realtime": (False, "refuse to start without real-time rights"),
-    "trace": (True, "component threads write traces"),
-    "report_phase_timeout_s": (1.0, "how long a reply may wait to measure the next release after a commit"),
+MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
+_CONFIGURED: Any = "when configured"
+
+PARAMETERS: dict[str, Setting] = {
+    "architecture": Setting("", "architecture file"),
+    "bag": Setting(
+        "", "folder of the bag to record from the start, which must not exist yet; empty: none", _CONFIGURED
+    ),
+    "bags": Setting("", "folder below which ~/start_recording makes bags; empty: the working directory"),
+    "record_topics": Setting(
+        [], "topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
+    ),
+    "bag_split_s": Setting(
+        60.0, "a recording goes on in a new file after so long; 0: never", _CONFIGURED, minimum=0
+    ),
+    "bag_split_bytes": Setting(
+        0, "a recording goes on in a new file when one is so large; 0: never", _CONFIGURED, minimum=0
+    ),
+    "autostart": Setting(default=True, description="configure and activate at the start"),
+    "require_realtime": Setting(default=False, description="refuse to start without real-time rights"),
+    "trace": Setting(default=True, description="component threads write traces"),
+    "report_phase_timeout_s": Setting(
+        1.0,
+        "how long a reply may wait to measure the next release after a commit",
+        minimum=0,
+        maximum=MAX_PHASE_TIMEOUT_S,
+    ),
 }
-# A list without a default, what overrides the file's peers, and those that rclpy gives every node.
-_OTHERS = ("record_topics", "peers", "use_sim_time", "start_type_description_service")
+# Not declared: without a value the file's peers count, which are no default that could be told.
+PEERS = Setting([], "the other robots' names; overrides the file's")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,14 +64,7 @@ class Settings:
         arguments = parse_ros_arguments(words, node="executor")
         namespace = _namespace(arguments)
         given = arguments.within(namespace)
-        for name in arguments.meant_for_it(namespace):
-            if "." not in name and name not in (*PARAMETERS, *_OTHERS):
-                remedy = did_you_mean(name, (*PARAMETERS, *_OTHERS))
-                raise ParameterError(f"parameter {name}: an executor has none of that name; {remedy}")
-        if given.get("use_sim_time"):
-            raise ParameterError(
-                "use_sim_time: expected false: components run by the monotonic clock; leave it out"
-            )
+        check_given(arguments, {**PARAMETERS, "peers": PEERS}, namespace=namespace)
         peers = given.get("peers")
         if peers is not None and not (
             isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)
@@ -64,7 +75,7 @@ class Settings:
         properties = {}
         for name, value in given.items():
             component, dot, property_name = name.partition(".")
-            if not dot or component == "qos_overrides":
+            if not dot or component == "qos_overrides":  # told to nodes of any name
                 continue
             if not isinstance(value, bool | int | float | str):
                 expected = f"expected true, false, a number or text, found {shown(value)}"
@@ -95,6 +106,15 @@ class Settings:
             usage = "ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
             raise ParameterError(f"parameter 'architecture' is missing: {usage}")
         return load_architecture(Path(self.architecture), overrides=self.overrides)
+
+
+def help_text() -> str:
+    """What `executor --help` says."""
+    more = [
+        ("peers:=string_array", f"{PEERS.description} (default: as in the architecture file)"),
+        ("COMPONENT.PROPERTY:=VALUE", "a component's property (default: as in the architecture file)"),
+    ]
+    return usage("ros2 run mauve_rt executor", PARAMETERS, more=more)
 
 
 def _namespace(arguments: RosArguments) -> str:

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NoReturn
 
 _GRACE_S = 2.7  # after a signal; then the process ends where it stands, telling where that is
@@ -86,3 +86,8 @@ def complain(text: str) -> None:
     """One line on stderr."""
     sys.stderr.write(" ".join(text.split()) + "\n")
     sys.stderr.flush()
+
+
+def asks_for_help(words: Iterable[str]) -> bool:
+    """Whether -h or --help is among a command line's words."""
+    return any(word in ("-h", "--help") for word in words)

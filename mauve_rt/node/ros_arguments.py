@@ -22,6 +22,7 @@ class RosArguments:
     given: tuple[tuple[str, dict[str, Any]], ...] = ()  # nodes (as in a parameter file) and their parameters
     node: str = ""
     namespace: str = ""  # of __ns:=, empty: not remapped
+    default_node: str = ""  # its name unless remapped
 
     @property
     def names_namespaces(self) -> bool:
@@ -59,8 +60,9 @@ def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
     What else rcl would refuse is left out: rcl says so itself when the node is made.
 
     Raises:
-        ParameterError: the node's name or namespace is remapped to what is none.
+        ParameterError: the node's name or namespace is remapped to what is none, or a file is no YAML.
     """
+    default_node = node
     options = list(_options(arguments))
     rules = [value for option, value in options if option in _REMAP]
     node = _remapped(rules, ("__node", "__name"), node=node) or node
@@ -78,7 +80,7 @@ def parse_ros_arguments(arguments: Sequence[str], *, node: str) -> RosArguments:
                 given.append((_ANYWHERE + node, {name: _parse(text)}))
         elif option not in _REMAP:
             given += _of_file(value)
-    return RosArguments(given=tuple(given), node=node, namespace=namespace)
+    return RosArguments(given=tuple(given), node=node, namespace=namespace, default_node=default_node)
 
 
 def _remapped(rules: Sequence[str], sources: Sequence[str], *, node: str) -> str:
@@ -117,8 +119,10 @@ def _parse(text: str) -> Any:
 def _of_file(path: str) -> list[tuple[str, dict[str, Any]]]:
     try:
         return [*_sections(read_yaml(Path(path).read_text(encoding="utf-8")), "")]
-    except (OSError, UnicodeDecodeError, YamlError):
+    except OSError:
         return []
+    except (UnicodeDecodeError, YamlError) as error:
+        raise ParameterError(f"parameter file {path}: {error}") from error
 
 
 def _sections(values: Any, nodes: str) -> Iterator[tuple[str, dict[str, Any]]]:

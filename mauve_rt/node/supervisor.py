@@ -9,16 +9,22 @@ import sys
 from collections.abc import Sequence
 
 from mauve_rt.node.discovery import limit_discovery
-from mauve_rt.node.process import Stop, run_until_signalled
+from mauve_rt.node.process import Stop, asks_for_help, run_until_signalled
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
+    words = sys.argv if arguments is None else arguments
+    if asks_for_help(words):
+        from mauve_rt.node.supervisor_settings import help_text  # noqa: PLC0415 - takes its time to load
+
+        sys.stdout.write(help_text())
+        return 0
     limit_discovery()
-    return run_until_signalled(lambda stop: _work(arguments, stop))
+    return run_until_signalled(lambda stop: _work(words, stop))
 
 
-def _work(arguments: Sequence[str] | None, stop: Stop) -> int:
+def _work(arguments: Sequence[str], stop: Stop) -> int:
     # Imported here: a signal while modules load is handled already, and threads they start block signals too.
     from mauve_rt.node.supervisor_node import run_node  # noqa: PLC0415
 

@@ -23,9 +23,11 @@ from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.rule_types import heard_type
 from mauve_rt.model.rules import Rule, RulesFile
 from mauve_rt.node.process import BAD_INPUT, complain
+from mauve_rt.node.setting_parameters import declare_settings
 from mauve_rt.node.supervisor_conditions import Condition, SilenceCondition
 from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
 from mauve_rt.node.supervisor_messages import architecture_view, decision_message
+from mauve_rt.node.supervisor_settings import PARAMETERS, check_arguments
 
 NODE_NAME = "supervisor"
 CHECK_PERIOD_S = 0.02
@@ -124,11 +126,12 @@ class Supervisor:
         self._node.get_logger().info(f"{decision.rule}: {decision.decision}: {decision.reason}{reply}")
 
 
-def run_node(arguments: Sequence[str] | None, stop: threading.Event) -> int:
+def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
+        check_arguments(arguments)
         rclpy.init(
-            args=None if arguments is None else list(arguments),
+            args=list(arguments),
             signal_handler_options=SignalHandlerOptions.NO,
         )
         node = Node(NODE_NAME)
@@ -157,7 +160,7 @@ def run_node(arguments: Sequence[str] | None, stop: threading.Event) -> int:
 
 def _rules_path(node: Node) -> str:
     try:
-        path = str(node.declare_parameter("rules", "").value)
+        path = str(declare_settings(node, PARAMETERS)["rules"])
     except rclpy.exceptions.InvalidParameterTypeException:
         path = ""
     if not path:

@@ -165,6 +165,22 @@ def test_an_unknown_parameter_is_refused(name: str, message: str, tmp_path: Path
         assert message in str(caught.value)
 
 
+def test_qos_overrides_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    text = "executor: {ros__parameters: {qos_overrides: {/count: {publisher: {depth: 5}}}}}\n"
+    file.write_text(text, encoding="utf-8")
+    for words in (["-p", "qos_overrides./count.publisher.depth:=5"], ["--params-file", str(file)]):
+        with pytest.raises(ParameterError, match="quality of service is in the architecture file"):
+            Settings.of(["executor", "--ros-args", *words])
+
+
+def test_a_parameter_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("executor: {ros__parameters: {counter.step: 1, counter.step: 2}}\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"parameter file .*parameters\.yaml: .*counter\.step"):
+        Settings.of(["executor", "--ros-args", "--params-file", str(file)])
+
+
 def test_parameters_for_nodes_of_any_name_may_be_for_others(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text("/**: {ros__parameters: {colour: red, bags: here}}\n", encoding="utf-8")

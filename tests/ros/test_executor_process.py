@@ -78,7 +78,10 @@ def test_bad_architecture(
             "parameter autostart: expected true or false",
         ),
         (["-p", "architecture:=FILE", "-p", "bag:=5"], "bag"),
-        (["-p", "architecture:=FILE", "-p", "report_phase_timeout_s:=5.0"], "expected 0 to 2 s, found 5"),
+        (
+            ["-p", "architecture:=FILE", "-p", "report_phase_timeout_s:=5.0"],
+            "report_phase_timeout_s out of range Min: 0, Max: 2.0",
+        ),
         (
             ["-p", "architecture:=FILE", "-p", "counter.step:=99"],
             "(parameter counter.step): expected at least 0",

@@ -1,0 +1,25 @@
+"""What the command line says to a supervisor before there is a node."""
+
+from collections.abc import Sequence
+
+from mauve_rt.errors import ParameterError
+from mauve_rt.node.ros_arguments import parse_ros_arguments
+from mauve_rt.node.settings import Setting, check_given, usage
+
+PARAMETERS = {"rules": Setting("", "rules file")}
+
+
+def check_arguments(words: Sequence[str]) -> None:
+    """Whether a supervisor has all that its command line names.
+
+    Raises:
+        ParameterError: a name that no parameter has, `qos_overrides`, or `use_sim_time`.
+    """
+    arguments = parse_ros_arguments(words, node="supervisor")
+    for name in check_given(arguments, PARAMETERS, namespace=arguments.namespace or "/"):
+        raise ParameterError(f"parameter {name}: a supervisor has none of that name; known: rules")
+
+
+def help_text() -> str:
+    """What `supervisor --help` says."""
+    return usage("ros2 run mauve_rt supervisor", PARAMETERS)
