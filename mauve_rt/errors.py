@@ -13,7 +13,9 @@ __all__ = [
     "PluginError",
     "Problem",
     "error_code",
+    "exception_text",
     "one_line",
+    "valid_text",
 ]
 
 
@@ -108,9 +110,23 @@ def error_code(error: BaseException) -> str:
     return str(getattr(error, "code", "internal")) if isinstance(error, MauveError) else "internal"
 
 
+def exception_text(error: BaseException) -> str:
+    """`ValueError: what it says` in one line of valid Unicode, whatever was raised."""
+    try:
+        text = str(error)
+    except BaseException as second:  # noqa: BLE001 - of an exception that somebody else wrote
+        text = f"its text cannot be had ({type(second).__name__})"
+    return one_line(f"{type(error).__name__}: {text}")
+
+
 def one_line(text: str) -> str:
-    """The text with every run of white space made one blank."""
-    return " ".join(text.split())
+    """The text, in valid Unicode, with every run of white space made one blank."""
+    return valid_text(" ".join(text.split()))
+
+
+def valid_text(text: str) -> str:
+    """The text with lone surrogates, which neither ROS messages nor bags can have, written out."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _describe(

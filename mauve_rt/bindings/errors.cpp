@@ -18,6 +18,22 @@ ErrorCode error_code_of(std::string_view name) noexcept {
   return ErrorCode::internal;
 }
 
+namespace {
+
+/// What pybind11 makes an exception of the standard library: it refuses a text that is no UTF-8.
+py::handle python_type_of(const std::exception& error) {
+  const auto is_a = [&error](auto* example) { return dynamic_cast<decltype(example)>(&error) != nullptr; };
+  if (is_a(static_cast<const std::bad_alloc*>(nullptr))) return PyExc_MemoryError;
+  if (is_a(static_cast<const std::out_of_range*>(nullptr))) return PyExc_IndexError;
+  if (is_a(static_cast<const std::overflow_error*>(nullptr))) return PyExc_OverflowError;
+  if (is_a(static_cast<const std::logic_error*>(nullptr)) ||
+      is_a(static_cast<const std::range_error*>(nullptr)))
+    return PyExc_ValueError;
+  return PyExc_RuntimeError;
+}
+
+}  // namespace
+
 void bind_errors(py::module_& module) {
   module.attr("MauveError") = mauve_error_type();
   // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
@@ -36,6 +52,12 @@ void bind_errors(py::module_& module) {
       exception.attr("step") = error.detail().step;
       exception.attr("step_name") = error.detail().step_name;
       PyErr_SetObject(mauve_error_type().ptr(), exception.ptr());
+    } catch (const py::error_already_set&) {
+      throw;  // Python's own
+    } catch (const py::builtin_exception&) {
+      throw;  // pybind11 knows which of Python's it stands for
+    } catch (const std::exception& error) {
+      PyErr_SetObject(python_type_of(error).ptr(), py::cast(error.what()).ptr());
     }
   });
 }

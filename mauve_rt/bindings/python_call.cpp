@@ -6,7 +6,10 @@ namespace mauve::bindings {
 void rethrow(const py::error_already_set& error) {
   if (error.matches(mauve_error_type()) && py::hasattr(error.value(), "statement")) {
     const py::object& value = error.value();
-    const auto text = [&value](const char* name) { return value.attr(name).cast<std::string>(); };
+    const auto text = [&value](const char* name) {
+      const py::object held = py::getattr(value, name, py::str());
+      return py::isinstance<py::str>(held) ? held.cast<std::string>() : std::string();
+    };
     throw Error(error_code_of(text("code")), text("statement"),
                 {.component = text("component"),
                  .element = text("element"),

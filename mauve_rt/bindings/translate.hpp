@@ -11,6 +11,8 @@
 
 #include "mauve_rt/mauve_rt.hpp"
 
+#include "text.hpp"
+
 namespace mauve::bindings {
 
 namespace py = pybind11;

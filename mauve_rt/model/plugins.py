@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mauve_rt._kernel import PluginRegistry
-from mauve_rt.errors import MauveError, PluginError, one_line
+from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
 from mauve_rt.model import ament_index
 from mauve_rt.model.words import did_you_mean
 
@@ -181,7 +181,7 @@ def _factory(plugin: Plugin) -> Callable[[Any], object]:
     module_name, _, class_name = plugin.target.partition(":")
     try:
         core_class = getattr(importlib.import_module(module_name), class_name)
-    except Exception as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
-        text = f"core '{plugin.name}': cannot load {plugin.target}: {type(error).__name__}: {error}"
-        raise PluginError(one_line(text), element=plugin.name) from None
+    except BaseException as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
+        text = f"core '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
+        raise PluginError(text, element=plugin.name) from None
     return core_factory(core_class)

@@ -92,7 +92,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         gc.enable()
         status = _autostart(node, stop) if settings.autostart else 0
         if status == 0:
-            _spin(node, stop)
+            status = _spin(node, stop)
     finally:
         node.close()
         try_shutdown()
@@ -109,23 +109,24 @@ def _autostart(node: Any, stop: threading.Event) -> int:
     return 0
 
 
-def _spin(node: Any, stop: threading.Event) -> None:
+def _spin(node: Any, stop: threading.Event) -> int:
     from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThread  # noqa: PLC0415
 
-    requests = ServiceThread(node, node.control_group)
+    requests = ServiceThread(node, node.control_group, node.watch)
     requests.start()
     executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
     executor.add_node(node)
-    while not stop.is_set():
+    while not stop.is_set() and not node.watch.broken.is_set():
         try:
             executor.spin_once(timeout_sec=_SPIN_S)
-        except Exception as error:  # noqa: BLE001 - a malformed request must not end the process
-            node.get_logger().error(f"a message or request was dropped: {type(error).__name__}: {error}")
+        except BaseException as error:  # noqa: BLE001 - a malformed request must not end the process
+            node.watch.tell("taking a message or request", error)
     node.quiesce()  # ends what a request may be waiting for
     requests.stop()
     # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
     executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
     executor.shutdown(timeout_sec=0)
+    return FAILED if node.watch.broken.is_set() else 0
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from mauve_rt._kernel import (
     TransactionReport,
     monotonic_ns,
 )
-from mauve_rt.errors import MauveError, error_code, one_line
+from mauve_rt.errors import MauveError, error_code, exception_text, one_line
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.node.executor_checks import check_form, check_revision, check_state, check_time
 from mauve_rt.node.executor_requests import (
@@ -118,8 +118,8 @@ class Control:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
             outcome = Outcome(code=code_of(error), message=one_line(str(error)))
-        except Exception as error:  # noqa: BLE001 - an error of ours must not cost the requester the answer
-            text = one_line(f"internal error: {type(error).__name__}: {error}")
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it must not cost the requester the answer
+            text = f"internal error: {exception_text(error)}"
             outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
         after = self._runtime.observe(
             changed_since=revision if outcome.success and request.steps and not request.dry_run else None

@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from mauve_rt.errors import MauveError, ParameterError, one_line
+from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
 from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_diagnostics import Diagnostics
@@ -19,8 +19,10 @@ from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
+from mauve_rt.node.service_thread import refusal as refused_reply
 from mauve_rt.node.setting_parameters import declare_settings
 from mauve_rt.node.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
+from mauve_rt.node.watch import Watch
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.recorded import Split
 
@@ -45,6 +47,7 @@ class ExecutorNode(LifecycleNode):
             ParameterError: a parameter of the wrong type, or `use_sim_time`.
         """
         # Transitions are in the node's default group.
+        self.watch = Watch(lambda text: self.get_logger().error(text))
         super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
         self.control_group = control_group = MutuallyExclusiveCallbackGroup()
@@ -55,7 +58,7 @@ class ExecutorNode(LifecycleNode):
         self._settings = self._declared()
         self._bound = BoundResources(self)
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
-        self._state = StatePublisher(self, runtime, self._recording)
+        self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording)
         self._properties = Parameters(self, runtime)
         control = Control(
@@ -71,6 +74,7 @@ class ExecutorNode(LifecycleNode):
             bound=self._bound,
             state=self._state,
             parameters=self._properties,
+            watch=self.watch,
             control_group=control_group,
             query_group=query_group,
         )
@@ -83,6 +87,25 @@ class ExecutorNode(LifecycleNode):
             query_group=query_group,
         )
         self.create_timer(1.0, self._tell_health, callback_group=query_group)
+
+    # ---- callbacks, none of which may raise: rclpy would leave the others of its group waiting for ever
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded(f"the handler of {srv_name}", callback, otherwise=refused_reply)
+        return super().create_service(srv_type, srv_name, guarded, **options)
+
+    def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded("a timer's work", callback)
+        return super().create_timer(timer_period_sec, guarded, *more, **options)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Any, *more: Any, **options: Any
+    ) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded(f"receiving from {topic}", callback)
+        return super().create_subscription(msg_type, topic, guarded, *more, **options)
 
     # ---- transitions
     #
@@ -146,9 +169,9 @@ class ExecutorNode(LifecycleNode):
                 result, reason = TransitionCallbackReturn.FAILURE, str(failure)
                 if undo is not None:
                     undo()
-        except Exception as failure:  # noqa: BLE001 - rclpy would swallow it without a word
+        except BaseException as failure:  # noqa: BLE001 - rclpy would swallow it without a word
             result = TransitionCallbackReturn.ERROR
-            reason = f"{type(failure).__name__}: {failure}"
+            reason = exception_text(failure)
         if result != TransitionCallbackReturn.SUCCESS:
             reason = one_line(f"{reason}; after {error}" if error else reason)
             self.get_logger().error(reason)
@@ -164,7 +187,7 @@ class ExecutorNode(LifecycleNode):
         def answer(request: Any, response: Any) -> Any:
             try:
                 return change_state(request, response)
-            except Exception as error:  # noqa: BLE001 - RCLError, of which rclpy publishes no name
+            except BaseException as error:  # noqa: BLE001 - RCLError, of which rclpy publishes no name
                 self.get_logger().warning(one_line(f"transition refused: {error}"))
                 response.success = False
                 return response

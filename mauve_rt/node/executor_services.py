@@ -23,6 +23,7 @@ from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_requests import Outcome, RecordingOrder, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_state import StatePublisher
+from mauve_rt.node.watch import Watch
 
 _CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "replace_shell"}
 
@@ -42,6 +43,7 @@ class Services:
         bound: BoundResources,
         state: StatePublisher,
         parameters: Parameters,
+        watch: Watch,
         control_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
@@ -49,7 +51,8 @@ class Services:
         self._control = control
         self._bound = bound
         self._state = state
-        self._parameters = parameters
+        # The change is made by then: what is wrong here is told, and no refusal of it.
+        self._follow = watch.guarded("the parameters", parameters.follow)
         self._untold: deque[tuple[Request, Outcome]] = deque()  # of `control_group` only
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
         for service, name, translate in (
@@ -73,7 +76,7 @@ class Services:
         outcome = self._control.handle(request)
         if not outcome.replayed:
             if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
-                self._parameters.follow()
+                self._follow()
             self._untold.append((request, outcome))
         return outcome
 

@@ -1,5 +1,6 @@
 """What the executor tells by itself: ~/state on changes, ~/events on requests and on cores that took over."""
 
+import functools
 import threading
 from typing import Any
 
@@ -15,6 +16,7 @@ from mauve_rt.node.executor_recording import Recording
 from mauve_rt.node.executor_requests import Outcome, Request
 from mauve_rt.node.executor_runtime import Observed, Runtime
 from mauve_rt.node.state_age import HangWatch
+from mauve_rt.node.watch import Watch
 
 _WAIT_NS = 200_000_000  # how long a watching thread that should end may go on waiting
 _EVENT_DEPTH = 100
@@ -23,8 +25,9 @@ _EVENT_DEPTH = 100
 class StatePublisher:
     """~/state and ~/events. refresh() and event() may be called from any thread."""
 
-    def __init__(self, node: LifecycleNode, runtime: Runtime, recording: Recording) -> None:
+    def __init__(self, node: LifecycleNode, runtime: Runtime, recording: Recording, watch: Watch) -> None:
         self._node = node
+        self._watch = watch
         self._runtime = runtime
         self._recording = recording
         self._state_qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -37,6 +40,7 @@ class StatePublisher:
         self._hangs = HangWatch()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
+        self._behind = False  # of that thread
 
     def refresh(self, *, again: bool = False) -> Observed:
         """Publish the state if it changed since it was published last, or in any case `again`."""
@@ -71,7 +75,8 @@ class StatePublisher:
     def start(self, deployer: Deployer) -> None:
         """Watch the components, so that changes nobody asked for, such as faults, are published at once."""
         self._ending.clear()
-        self._thread = threading.Thread(target=self._watch, args=(deployer,), name="state", daemon=True)
+        look = functools.partial(self._look, deployer, FaultWatch())
+        self._thread = self._watch.thread("state", look, ending=self._ending)
         self._thread.start()
 
     def stop(self) -> None:
@@ -81,16 +86,17 @@ class StatePublisher:
             self._thread.join()
             self._thread = None
 
-    def _watch(self, deployer: Deployer) -> None:
-        watch = FaultWatch()
-        while not self._ending.is_set():
-            if not deployer.wait_change(_WAIT_NS):
-                continue
-            observed = self.refresh()
-            for fault in watch.look(observed.components):
-                self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
-                if fault.part.fell_back:
-                    self.event(*fault.event(observed.revision))
+    def _look(self, deployer: Deployer, faults: FaultWatch) -> None:
+        """Wait for a change, and tell of it; one that could not be told is told with the next look."""
+        if not deployer.wait_change(_WAIT_NS) and not self._behind:
+            return
+        self._behind = True
+        observed = self.refresh()
+        for fault in faults.look(observed.components):
+            self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
+            if fault.part.fell_back:
+                self.event(*fault.event(observed.revision))
+        self._behind = False
 
     def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
         data = serialize_message(message)

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterable
 from typing import NoReturn
 
@@ -59,6 +60,8 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
             status = work(stop)
         except ImportError as error:
             missing = error
+        except BaseException:  # noqa: BLE001 - a SystemExit too, which would end the thread without a word
+            traceback.print_exc()
         finally:
             done.set()
             signal.pthread_kill(main_thread, signal.SIGTERM)

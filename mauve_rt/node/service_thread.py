@@ -3,10 +3,15 @@
 import threading
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import CallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+
+from mauve_rt.errors import exception_text
+from mauve_rt.node.executor_requests import Code
+from mauve_rt.node.watch import Watch
 
 _FOREVER_NS = -1
 
@@ -19,13 +24,15 @@ class ServiceThread:
     interpreter's lock: most of what a short call costs. This waits for a few services with one wait set.
     """
 
-    def __init__(self, node: Node, group: CallbackGroup) -> None:
+    def __init__(self, node: Node, group: CallbackGroup, watch: Watch) -> None:
         """Of the services that the group has now; no executor may serve it (`OtherGroupsExecutor`)."""
         self._node = node
+        self._watch = watch
         self._services = [service for service in node.services if service.callback_group is group]
         self._wakeup = node.create_guard_condition(lambda: None, callback_group=group)
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="services", daemon=True)
+        self._wait_set: Any = None  # of the thread
+        self._thread = watch.thread("services", self._take_requests, ending=self._ending)
 
     def start(self) -> None:
         """Begin to answer."""
@@ -37,29 +44,48 @@ class ServiceThread:
         self._wakeup.trigger()
         self._thread.join()
 
-    def _run(self) -> None:
-        context = self._node.context.handle
-        wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, len(self._services), 0, context)
-        while not self._ending.is_set():
-            wait_set.clear_entities()
-            wait_set.add_guard_condition(self._wakeup.handle)
-            for service in self._services:
-                wait_set.add_service(service.handle)
-            wait_set.wait(_FOREVER_NS)
-            ready = wait_set.get_ready_entities("service")
-            for service in self._services:
-                if service.handle.pointer in ready and not self._ending.is_set():
-                    self._answer(service)
+    def _take_requests(self) -> None:
+        """Wait until there are some, and answer them; their handlers are guarded (`ExecutorNode`)."""
+        if self._wait_set is None:
+            context = self._node.context.handle
+            self._wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, len(self._services), 0, context)
+        wait_set = self._wait_set
+        wait_set.clear_entities()
+        wait_set.add_guard_condition(self._wakeup.handle)
+        for service in self._services:
+            wait_set.add_service(service.handle)
+        wait_set.wait(_FOREVER_NS)
+        ready = wait_set.get_ready_entities("service")
+        for service in self._services:
+            if service.handle.pointer in ready and not self._ending.is_set():
+                self._answer(service)
 
     def _answer(self, service: Any) -> None:
-        kind = service.srv_type
+        """Answer one request."""
         try:
-            request, header = service.handle.service_take_request(kind.Request)
-            if header is not None:
-                service.send_response(service.callback(request, kind.Response()), header)
-        except Exception as error:  # noqa: BLE001 - a malformed request must not end the process
-            text = f"a request was dropped: {type(error).__name__}: {error}"
-            self._node.get_logger().error(text)
+            request, header = service.handle.service_take_request(service.srv_type.Request)
+        except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
+            self._node.get_logger().error(f"a request was dropped: {exception_text(error)}")
+            return
+        if header is None:
+            return
+        service.send_response(service.callback(request, service.srv_type.Response()), header)
+
+
+def refusal(request: Any, filled: Any, error: BaseException) -> Any:
+    """A response that says no, as far as it has words for that, to a request whose handler raised."""
+    response = type(filled)()  # nothing of what the handler filled in already
+    text = f"internal error: {exception_text(error)}"
+    if hasattr(response, "message"):
+        response.success, response.message = False, text
+        if hasattr(response, "code"):
+            response.code = int(Code.PREPARE_FAILED)
+    no = SetParametersResult(successful=False, reason=text)
+    if hasattr(response, "results"):
+        response.results = [no for _ in request.parameters]
+    elif hasattr(response, "result"):
+        response.result = no
+    return response
 
 
 class OtherGroupsExecutor(MultiThreadedExecutor):

@@ -28,6 +28,7 @@ from mauve_rt.node.supervisor_conditions import Condition, SilenceCondition
 from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
 from mauve_rt.node.supervisor_messages import architecture_view, decision_message
 from mauve_rt.node.supervisor_settings import PARAMETERS, check_arguments
+from mauve_rt.node.watch import Watch
 
 NODE_NAME = "supervisor"
 CHECK_PERIOD_S = 0.02
@@ -45,6 +46,7 @@ class Supervisor:
             ArchitectureFileError: a rule names a message type that is not installed.
         """
         self._node = node
+        self.watch = watch = Watch(node.get_logger().error)
         self._pending: Any = None
         rules = rules_file.rules
         conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
@@ -61,10 +63,10 @@ class Supervisor:
         node.create_subscription(
             ArchitectureState,
             f"{executor}/state",
-            self._on_state,
+            watch.guarded("~/state", self._on_state),
             QoSProfile(depth=1, durability=latched),
         )
-        node.create_timer(CHECK_PERIOD_S, self._tick)
+        node.create_timer(CHECK_PERIOD_S, watch.guarded("the rules", self._tick))
 
     def _condition(self, rules_file: RulesFile, index: int) -> Condition:
         rule: Rule = rules_file.rules.rules[index]
@@ -105,7 +107,8 @@ class Supervisor:
                 ],
             )
         )
-        self._pending.add_done_callback(lambda future: self._on_reply(request.number, future))
+        on_reply = self.watch.guarded("the executor's reply", self._on_reply)
+        self._pending.add_done_callback(lambda future: on_reply(request.number, future))
 
     def _on_reply(self, number: int, future: Any) -> None:
         if future.exception() is not None:
@@ -141,10 +144,13 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         return BAD_INPUT
     executor = SingleThreadedExecutor()
     try:
-        _ = Supervisor(node, RulesFile(_rules_path(node)))
+        supervisor = Supervisor(node, RulesFile(_rules_path(node)))
         executor.add_node(node)
         while not stop.is_set():
-            executor.spin_once(timeout_sec=_SPIN_S)
+            try:
+                executor.spin_once(timeout_sec=_SPIN_S)
+            except BaseException as error:  # noqa: BLE001 - a malformed message must not end the watch
+                supervisor.watch.tell("taking a message", error)
     except ArchitectureFileError as error:
         complain(str(error))
         return BAD_INPUT

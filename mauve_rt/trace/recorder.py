@@ -190,7 +190,7 @@ class Recorder:
                 self._recording = False
             self._write()
             self._bag.close()
-        except Exception as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
+        except BaseException as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
             with self._lock:
                 self._recording = False
                 self._error = f"recording stopped: {error}"

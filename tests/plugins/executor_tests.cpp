@@ -109,6 +109,8 @@ struct Counter : mauve::Core<CounterShell> {
 
   virtual void act() {
     if (const auto sample = shell().set.read(); sample.is_new()) {
+      if (sample.value.data < -1e8) throw 42;
+      if (sample.value.data < -1e7) throw std::runtime_error("bytes \xff\xfe, no text");
       if (sample.value.data < -1e6) throw std::runtime_error("set to something unheard of");
       count = sample.value.data;
     }
@@ -133,6 +135,12 @@ struct Undeclared : Counter {};
 
 struct Reluctant : Counter {
   bool adopt(const mauve::CoreBase&) override { return false; }
+};
+
+/// Says no in bytes that are no text.
+struct Unspeakable : Counter {
+ protected:
+  bool configure_hook() override { throw std::invalid_argument("\xc3\x28 is no text"); }
 };
 
 struct Unready : Counter {
@@ -407,6 +415,7 @@ MAUVE_PLUGINS(registry) {
   registry.core<Undeclared>("executor_tests/Undeclared", shell);
   registry.core<Reluctant>("executor_tests/Reluctant", shell);
   registry.core<Unready>("executor_tests/Unready", shell);
+  registry.core<Unspeakable>("executor_tests/Unspeakable", shell);
   registry.core<Wasteful>("executor_tests/Wasteful", shell);
   registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);

@@ -53,3 +53,26 @@ class PyHanging(PyCounter):
             self.mutex.acquire()
         elif how:
             Path(how).read_bytes()
+
+
+class PyLeaving(PyCounter):
+    """Leaves as a program does."""
+
+    def configure(self) -> None:
+        """Never comes back."""
+        raise SystemExit("the core has left")
+
+
+class _GarbledError(Exception):
+    """One whose text cannot be had."""
+
+    def __str__(self) -> str:
+        raise UnicodeError("no words \udcff")
+
+
+class PyGarbled(PyCounter):
+    """Raises what has no text when it is prepared; what has no valid one when it runs."""
+
+    def configure(self) -> None:
+        """Never succeeds."""
+        raise _GarbledError

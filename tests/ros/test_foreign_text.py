@@ -1,0 +1,100 @@
+"""What users' code says when it fails may be no text at all: the executor tells it, and goes on answering."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+
+import mauve_rt.trace
+from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
+from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
+from mauve_rt.node.executor_requests import Code
+
+NODE = "/robot_1/executor"
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MORE_CORES = """\
+            alternatives: [executor_tests/Unspeakable, executor_tests/PyLeaving, executor_tests/PyGarbled,
+                           """
+
+
+@pytest.fixture
+def executor(architecture: Path, start_executor: Callable[..., Any], tmp_path: Path) -> Any:
+    text = architecture.read_text("utf-8")
+    architecture.write_text(text.replace("            alternatives: [", MORE_CORES, 1), "utf-8")
+    return start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={tmp_path / 'bag'}")
+
+
+def _list(graph: Any) -> dict[str, Any]:
+    reply = graph.ask(ListComponents, f"{NODE}/list_components")
+    return {component.name: component for component in reply.components}
+
+
+def _replace(graph: Any, core: str) -> Any:
+    return graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core=f"executor_tests/{core}")
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [(-2e7, "bytes \ufffd\ufffd, no text"), (-2e8, "an exception that is no std::exception")],
+    ids=["bytes", "no exception"],
+)
+def test_a_fault_that_is_no_text(executor: Any, graph: Any, tmp_path: Path, number: float, words: str):
+    states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
+    health = graph.hear(DiagnosticArray, "/diagnostics")
+    graph.voice(Float64, "/robot_1/set").publish(Float64(data=number))
+
+    def faults() -> list[str]:
+        return [part.fault for part in states[-1].components if part.state == ComponentInfo.FAULTED]
+
+    graph.spin_until(lambda: bool(states) and bool(faults()), "the fault in ~/state")
+    assert words in faults()[0]
+    assert words in _list(graph)["counter"].fault
+    health.clear()
+
+    def unwell() -> list[str]:
+        statuses = [status for array in health for status in array.status]
+        return [status.message for status in statuses if status.level == DiagnosticStatus.ERROR]
+
+    graph.spin_until(lambda: any(words in message for message in unwell()), "the fault in /diagnostics")
+    refused = _replace(graph, "Backwards")
+    assert (refused.success, words in refused.message) == (False, True)
+    before = len(states)
+    stopped = graph.ask(Stop, f"{NODE}/stop", component="sleepy")
+    assert stopped.success, stopped.message
+    graph.spin_until(lambda: len(states) > before, "the next ~/state")
+    executor.process.terminate()
+    assert executor.wait() == 0
+    assert words in executor.output
+    assert mauve_rt.trace.open(tmp_path / "bag").architecture
+
+
+@pytest.mark.parametrize(
+    ("core", "words"),
+    [
+        ("Unspeakable", "\ufffd( is no text"),
+        ("PyLeaving", "the core has left"),
+        ("PyGarbled", "_Garbled"),
+    ],
+)
+@pytest.mark.usefixtures("executor")
+def test_a_core_that_leaves_or_babbles_is_a_refusal(graph: Any, core: str, words: str) -> None:
+    reply = _replace(graph, core)
+    assert (reply.success, reply.code) == (False, Code.PREPARE_FAILED)
+    assert words in reply.message
+    again = _replace(graph, "Backwards")
+    assert again.success, again.message
+    assert _list(graph)["counter"].core == "executor_tests/Backwards"
+
+
+@pytest.mark.usefixtures("executor")
+def test_a_module_that_leaves_while_it_is_loaded_is_a_refusal(graph: Any) -> None:
+    part = "{shell: executor_tests/CounterShell, core: executor_tests/PyGone, fsm: executor_tests/CounterFsm}"
+    step = ReconfigurationStep(kind="add_component", target="late", value=part)
+    reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step])
+    assert (reply.success, reply.code) == (False, Code.UNKNOWN_CORE)
+    assert "cannot load executor_tests_gone:PyGone: SystemExit: this module is gone" in reply.message
+    assert graph.ask(Stop, f"{NODE}/stop", component="sleepy").success
