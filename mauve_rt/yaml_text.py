@@ -33,6 +33,7 @@ _LONG = 100_000  # characters: Python's own parser takes a second for so many
 _NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f]|[\ud800-\udfff]|\ufeff|[\ufffe-\uffff]")
 
 Place = tuple[int, int]  # line and column, from 1
+_NO_PLACES: Mapping[str, Place] = {}
 
 
 class YamlError(ValueError):
@@ -56,16 +57,19 @@ class Node:
         self,
         value: Any,
         place: Place,
-        children: "Mapping[str, Node] | Sequence[Node] | None" = None,
+        children: "dict[str, Node] | Sequence[Node] | None" = None,
         key_places: Mapping[str, Place] | None = None,
     ) -> None:
         self.value = value
         self.place = place
         self.children = children  # of a mapping by key, of a list by index; None: a scalar
-        self.key_places = key_places or {}
-        parts = children.values() if isinstance(children, Mapping) else children or ()
-        texts = children if isinstance(children, Mapping) else (value,) if isinstance(value, str) else ()
-        self.size = 1 + sum(part.size for part in parts) + sum(len(text) // _LINE for text in texts)
+        self.key_places = _NO_PLACES if key_places is None else key_places
+        self.size = 1 + (len(value) // _LINE if isinstance(value, str) else 0)
+        if isinstance(children, dict):
+            self.size += sum(len(key) // _LINE for key in children)
+            self.size += sum(part.size for part in children.values())
+        elif children is not None:
+            self.size += sum(part.size for part in children)
 
 
 def read_yaml(text: str, *, max_bytes: int = MAX_BYTES) -> Any:
@@ -149,7 +153,10 @@ class _Composer:
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
-        place = _place(event)
+        mark = event.start_mark
+        place = (mark.line + 1, mark.column + 1)
+        if isinstance(event, ScalarEvent) and event.anchor is None and depth <= MAX_DEPTH:
+            return Node(_scalar(event, place), place)  # most of them: shortest way
         if isinstance(event, AliasEvent):
             if event.anchor not in self._anchors:
                 raise YamlError(f"not YAML: found undefined alias '{event.anchor}'", place)
