@@ -29,6 +29,15 @@ def resources(kind: str) -> Iterator[tuple[str, Path, Path]]:
                 yield file.name, prefix, file
 
 
+def contents(kind: str, package: str) -> Iterator[tuple[Path, str]]:
+    """(prefix, text) of a package's resource of that kind, in every prefix that has it."""
+    for prefix in prefixes():
+        try:
+            yield prefix, (prefix / _INDEX / kind / package).read_text("utf-8", errors="replace")
+        except OSError:  # there is none, or the name is too long for one
+            continue
+
+
 def share_folder(package: str) -> Path | None:
     """The package's `share` folder; None when it is not installed."""
     for prefix in prefixes():

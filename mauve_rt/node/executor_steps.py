@@ -2,6 +2,15 @@
 
 What a step before will have made of the architecture counts: step 3 may connect what step 1 adds. What needs
 the kernel to tell (states, wiring, whether parts fit), the kernel tells at the commit.
+
+What is loaded for a name that comes by request, and where the name has to be listed before:
+
+| name                               | listed in                                | loaded                       |
+| ---------------------------------- | ---------------------------------------- | ---------------------------- |
+| core, fsm, shell, kind of resource | `mauve_rt_plugins` of the ament index    | its library, its module      |
+| type of a resource                 | the same; else `rosidl_interfaces` of it | its library; package.msg     |
+| type of a topic to record          | `rosidl_interfaces`                      | package.msg                  |
+| type of an offered or called srv   | `rosidl_interfaces`                      | package.srv, type supports   |
 """
 
 from collections.abc import Iterable

@@ -13,7 +13,8 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64
 
 import mauve_rt.trace
-from mauve_msgs.srv import ReplaceCore, StartRecording, StopRecording
+from mauve_msgs.msg import ReconfigurationStep
+from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording
 from mauve_rt.trace.bag_repair import examine_bag
 from mauve_rt.trace.reconfigurations import reconfigurations
 from mauve_rt.trace.statistics import component_statistics
@@ -161,3 +162,28 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     assert examine_bag(tmp_path / "bag").is_finished
     assert_rosbag2_reads(tmp_path / "bag")
     assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0
+
+
+@pytest.fixture
+def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the module that leaves a trace when it is imported leave it as `imported`."""
+    monkeypatch.setenv("EXECUTOR_TESTS_TRAP", str(tmp_path / "imported"))
+
+
+@pytest.mark.parametrize(
+    "type_name",
+    ["executor_tests_trap/msg/X", "../executor_tests_trap/msg/X", "executor_tests_trap.msg/msg/X", "X" * 900],
+)
+@pytest.mark.usefixtures("trap", "executor")
+def test_a_type_that_no_package_lists_is_refused_and_not_imported(
+    graph: Any, tmp_path: Path, type_name: str
+) -> None:
+    reply = start(graph, bag="first", topics=[f"/x:{type_name}"])
+    assert (reply.success, reply.code) == (False, StartRecording.Response.INVALID)
+    assert "of an installed message" in reply.message
+    resource_text = f"{{kind: shared_data, type: {type_name}, topic: {{name: x, direction: publish}}}}"
+    step = ReconfigurationStep(kind="add_resource", target="x", value=resource_text)
+    added = graph.ask(Reconfigure, f"{EXECUTOR}/reconfigure", steps=[step])
+    assert (added.success, added.code) == (False, StartRecording.Response.INVALID)
+    assert not (tmp_path / "imported").exists()
+    assert not (tmp_path / "first").exists()

@@ -3,6 +3,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
@@ -22,6 +23,7 @@ class TypeName {
     if (package_end == std::string::npos) throw_unknown("a name without /" + kind + "/");
     package_ = full.substr(0, package_end);
     name_ = full.substr(package_end + kind.size() + 2);
+    if (!is_word(package_) || !is_word(name_)) throw_unknown("a name of other characters");
   }
 
   [[noreturn]] void throw_unknown(const std::string& found) const {
@@ -45,6 +47,14 @@ class TypeName {
   }
 
  private:
+  /// Whether it can be no more than a part of a file's name: what is opened is in the package's folder.
+  static bool is_word(const std::string& text) {
+    const auto is_part = [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+    };
+    return !text.empty() && std::all_of(text.begin(), text.end(), is_part);
+  }
+
   /// Its path in the first prefix that has it; its bare name, for the linker's own search, where none has.
   std::string library_path(const std::string& suffix) const {
     std::string name = "lib" + package_ + "__" + suffix + ".so";
