@@ -121,7 +121,8 @@ class Diagnostics:
             "deadlines missed": troubles.deadlines_missed,
             "publishers lost": troubles.liveliness_lost,
         }
-        remarks = self._grown(f"topic {report.topic}", counts)
+        name = f"topic {report.topic} ({report.resource})"  # several resources may be bound to one
+        remarks = self._grown(name, counts)
         if other_types:
             remarks.append(f"other nodes use {' and '.join(other_types)} on it, with whom it does not talk")
         if troubles.incompatible_qos:
@@ -136,14 +137,15 @@ class Diagnostics:
             "incompatible_qos": troubles.incompatible_qos,
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
-        return self._status(f"topic {report.topic}", level, "; ".join(remarks) or "no trouble", values)
+        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
 
     def _call(self, report: CallReport) -> Any:
         counts = report.counts
         failures = {"calls refused": counts.other}
         if not report.is_offered:
             failures |= {"calls without a server": counts.no_server, "calls timed out": counts.timed_out}
-        remarks = self._grown(f"service {report.service}", failures)
+        name = f"service {report.service} ({report.resource})"
+        remarks = self._grown(name, failures)
         values: dict[str, object] = {
             "resource": report.resource,
             "side": "server" if report.is_offered else "client",
@@ -154,7 +156,7 @@ class Diagnostics:
             "refused": counts.other,
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
-        return self._status(f"service {report.service}", level, "; ".join(remarks) or "no trouble", values)
+        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
 
     def _bag(self, status: RecordingStatus) -> Any:
         remarks = self._grown("recording", {"messages dropped": status.dropped})

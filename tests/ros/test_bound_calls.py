@@ -72,12 +72,13 @@ def test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared(
     delay_s[0] = 0.2  # over the client's time
     graph.spin_until(lambda: _said(calling) == TIMED_OUT, "a call that timed out")
     graph.spin_until(
-        lambda: "timed out" in _health(graph, health, "service /robot_1/lamp").message, "a warning of it"
+        lambda: "timed out" in _health(graph, health, "service /robot_1/lamp (lamp)").message,
+        "a warning of it",
     )
     delay_s[0] = 0.0
     answered = max(count.data for count in calling)
     graph.spin_until(lambda: _said(calling) > answered, "answers again")
-    status = _health(graph, health, "service /robot_1/lamp")
+    status = _health(graph, health, "service /robot_1/lamp (lamp)")
     values = {item.key: item.value for item in status.values}
     assert int(values["answered"]) >= answered
     assert int(values["timed_out"]) > 0
@@ -101,7 +102,7 @@ def test_a_resources_call_is_a_ros_service(graph: Any) -> None:
         reply = graph.ask(SetBool, "/robot_1/own/set", data=data)
         assert (reply.success, reply.message) == (True, "on" if data else "off")
     health = graph.hear(DiagnosticArray, "/diagnostics")
-    status = _health(graph, health, "service /robot_1/own/set")
+    status = _health(graph, health, "service /robot_1/own/set (own)")
     values = {item.key: item.value for item in status.values}
     assert (values["side"], values["answered"], status.level) == ("server", "3", DiagnosticStatus.OK)
 

@@ -108,3 +108,21 @@ def test_the_interpreter_s_allocations_are_no_warning(executor: Any, graph: Any)
     health.await_releases("counter", int(health.values("counter")["releases"]) + 100)
     told = [status for status in health.of("counter") if status.level == DiagnosticStatus.WARN]
     assert not [status.message for status in told if "allocations" in status.message]
+
+
+def test_every_status_has_a_name_of_its_own(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8").replace(
+        "connections:",
+        "  again: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: set, direction: subscribe}}\n"
+        "connections:",
+    )
+    architecture.write_text(text, encoding="utf-8")
+    start_executor("-p", f"architecture:={architecture}")
+    heard = graph.hear(DiagnosticArray, "/diagnostics")
+    graph.spin_until(lambda: bool(heard) and len(heard[-1].status) > len(PARTS) + 1, "the statuses")
+    names = [status.name for status in heard[-1].status]
+    assert len(names) == len(set(names)), names
+    topics = {name.partition(": ")[2] for name in names if ": topic /robot_1/set " in name}
+    assert topics == {"topic /robot_1/set (set)", "topic /robot_1/set (again)"}
