@@ -369,6 +369,14 @@ class TransactionReport:
     revision: Final[int]  # of the architecture, after
     prepare_ns: Final[int]
     blackout_ns: Final[int]  # the longest of any component's
+    is_complete: Final[bool]  # False: a release that follows has not come yet
+
+@final
+class Committed:
+    """A transaction that is in force. Others may change what it did while its report is asked for."""
+
+    def report(self, phase_timeout_ns: int = 0) -> TransactionReport:
+        """What it cost, so far; waits up to so long for the releases that follow. May be called again."""
 
 @final
 class Architecture:
@@ -495,6 +503,15 @@ class Deployer:
 
         Raises MauveError with the number of the failed step (`step`); nothing was changed then.
         """
+    def make(
+        self,
+        transaction: Transaction,
+        *,
+        dry_run: bool = False,
+        expected_revision: int = 0,
+        commit_timeout_ns: int = 1_000_000_000,
+    ) -> Committed:
+        """As commit(), but waits for no release that follows: ask what it returns."""
     def replace_core(
         self,
         component: str,

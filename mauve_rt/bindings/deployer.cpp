@@ -138,15 +138,38 @@ StepReport replace_core(PyDeployer& self, const std::string& component, const py
   return self.deployer().commit(std::move(transaction), {.timeouts = limits}).steps.at(0);
 }
 
+/// A transaction that is in force, for who asks for its report later.
+class PyCommitted {
+ public:
+  explicit PyCommitted(std::unique_ptr<TransactionCommit> work) : work_(std::move(work)) {}
+  ~PyCommitted() {
+    const py::gil_scoped_release release;  // a component it removed may need the interpreter for its end
+    work_.reset();
+  }
+  PyCommitted(const PyCommitted&) = delete;
+  PyCommitted& operator=(const PyCommitted&) = delete;
+
+  TransactionReport report(time_ns_t phase_timeout_ns) { return work_->report(phase_timeout_ns); }
+
+ private:
+  std::unique_ptr<TransactionCommit> work_;
+};
+
+std::unique_ptr<PyCommitted> make(PyDeployer& self, const PyTransaction& steps, bool dry_run,
+                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns) {
+  Transaction transaction = steps.build(self.registry());
+  const py::gil_scoped_release release;
+  const TransactionOptions options{
+      .timeouts = timeouts(commit_timeout_ns, 0), .dry_run = dry_run, .expected_revision = expected_revision};
+  return std::make_unique<PyCommitted>(self.deployer().make(std::move(transaction), options));
+}
+
 TransactionReport commit(PyDeployer& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
                          time_ns_t phase_timeout_ns) {
-  Transaction transaction = steps.build(self.registry());
+  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns);
   const py::gil_scoped_release release;
-  return self.deployer().commit(std::move(transaction),
-                                {.timeouts = timeouts(commit_timeout_ns, phase_timeout_ns),
-                                 .dry_run = dry_run,
-                                 .expected_revision = expected_revision});
+  return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
 
 /// With Python's 5 ms a component in Python would wait that long for a thread that computes; DESIGN section 4.
@@ -187,6 +210,8 @@ void bind_reports(py::module_& module) {
 
 void bind_deployer(py::module_& module) {
   bind_reports(module);
+  py::class_<PyCommitted>(module, "Committed")
+      .def("report", &PyCommitted::report, py::arg("phase_timeout_ns") = 0, Unlocked());
   py::module_::import("atexit").attr("register")(py::cpp_function(&PyDeployer::shut_down_all));
   py::class_<PyDeployer>(module, "Deployer")
       .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
@@ -220,6 +245,9 @@ void bind_deployer(py::module_& module) {
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
            py::arg("phase_timeout_ns") = s_to_ns(1))
+      .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
+           py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
+           py::keep_alive<0, 1>())
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(

@@ -45,7 +45,10 @@ def report_lines(report: Sequence[Any]) -> list[str]:
         facts = [f"prepared in {duration(step.prepare_ns)}"] if step.prepare_ns >= _WORTH_TELLING_NS else []
         if step.blackout_ns != type(step).NOT_MEASURED:
             facts.append(f"blackout {duration(step.blackout_ns)}")
-            facts.append(f"missed releases {step.missed_releases}")
+            if step.missed_releases != type(step).NOT_MEASURED:
+                facts.append(f"missed releases {step.missed_releases}")
+            else:
+                facts.append("next release still to come")
         if step.phase_actual_ns != type(step).NOT_MEASURED:
             facts.append(f"next release woken {duration(step.phase_actual_ns)} after its instant")
         if len(report) > 1:

@@ -112,9 +112,13 @@ def _autostart(node: Any, stop: threading.Event) -> int:
 def _spin(node: Any, stop: threading.Event) -> int:
     from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThread  # noqa: PLC0415
 
-    requests = ServiceThread(node, node.control_group, node.watch)
-    requests.start()
-    executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
+    threads = (
+        ServiceThread(node, node.control_group, node.watch, name="changes"),
+        ServiceThread(node, node.direct_group, node.watch, name="stops"),
+    )
+    for thread in threads:
+        thread.start()
+    executor = OtherGroupsExecutor(node.control_group, node.direct_group, num_threads=node.THREADS)
     executor.add_node(node)
     while not stop.is_set() and not node.watch.broken.is_set():
         try:
@@ -122,7 +126,8 @@ def _spin(node: Any, stop: threading.Event) -> int:
         except BaseException as error:  # noqa: BLE001 - a malformed request must not end the process
             node.watch.tell("taking a message or request", error)
     node.quiesce()  # ends what a request may be waiting for
-    requests.stop()
+    for thread in threads:
+        thread.stop()
     # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
     executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
     executor.shutdown(timeout_sec=0)

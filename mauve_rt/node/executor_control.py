@@ -2,11 +2,12 @@
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from mauve_rt._kernel import (
+    Committed,
     ComponentDescription,
     ResourceDescription,
     StepReport,
@@ -69,7 +70,19 @@ class Recordings(Protocol):
 
 
 class Control:
-    """Carries out one request at a time. handle() may be called from any thread."""
+    """Carries out requests. handle() may be called from any thread.
+
+    Changes, which may take long to prepare, are carried out one at a time. A stop or a start by itself waits
+    for none of them: it takes no lock but the kernel's, of that one component. What it does to a component
+    that a change prepared meanwhile is about, the kernel finds at the commit: the change is refused then.
+
+    | member       | written by                    | guarded by                                      |
+    | ------------ | ----------------------------- | ----------------------------------------------- |
+    | `_log`       | every request                 | `_answered`, for a moment                       |
+    | `_under_way` | every request with an id      | `_answered`; who repeats an id waits in it      |
+    | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
+    | the bag      | orders, in `_recordings`      | `_changing`                                     |
+    """
 
     def __init__(
         self,
@@ -79,7 +92,7 @@ class Control:
         outside: Outside | None = None,
         recordings: Recordings | None = None,
     ) -> None:
-        """The reply to a commit waits up to `phase_timeout_s` for the next release, to report its phase.
+        """The report of a commit is pending up to `phase_timeout_s`, until the next release tells its phase.
 
         Without an `outside`, a request that binds a resource to a topic or service is refused; without
         `recordings`, one that records.
@@ -89,19 +102,29 @@ class Control:
         self._recordings = recordings
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
-        self._lock = threading.Lock()
+        self._under_way: set[str] = set()
+        self._answered = threading.Condition()
+        self._changing = threading.Lock()
 
     def handle(self, request: Request) -> Outcome:
         """Do what is asked, or nothing at all. Never raises: every request gets its outcome."""
-        with self._lock:
+        identity = request.request_id
+        with self._answered:
+            self._answered.wait_for(lambda: identity not in self._under_way)
             known = self._log.find(request)
             if known is not None:
                 if known.code is Code.REQUEST_ID_REUSED:
                     return replace(known, revision=self._runtime.revision)
                 return replace(known, replayed=True)
+            if identity:
+                self._under_way.add(identity)
+        with nullcontext() if _is_direct(request) else self._changing:
             outcome = self._outcome(request)
-            self._log.add(request, outcome)
-            return outcome
+        with self._answered:
+            self._log.add(request, replace(outcome, pending=None))
+            self._under_way.discard(identity)
+            self._answered.notify_all()
+        return outcome
 
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
@@ -133,24 +156,28 @@ class Control:
         plan = Plan(request.steps, self._runtime, parts)
         if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):
             step = request.steps[0]
-            present = self._runtime.components()  # of this moment: a stop may just have begun
-            check_state(step, next(part for part in present if part.name == step.target))
+            for part in self._runtime.components():  # of this moment: a stop may just have begun
+                if part.name == step.target:
+                    check_state(step, part)
             if not request.dry_run:
                 return self._start_or_stop(step, request)
         with self._bound(plan.bound, dry_run=request.dry_run):
-            measured = self._runtime.deployer.commit(
+            committed = self._runtime.deployer.make(
                 plan.transaction,
                 dry_run=request.dry_run,
                 expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
-                phase_timeout_ns=self._phase_timeout_of(request),
             )
-        reports = _reports(request.steps, measured)
         if request.dry_run:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
         self._runtime.declare(added=plan.added, removed=plan.removed)
-        return Outcome(code=Code.OK, message=_message(request.steps, measured), report=reports)
+        measured = committed.report()
+        report, pending = _reports(request.steps, measured), None
+        if not measured.is_complete and (timeout_ns := self._phase_timeout_of(request)) > 0:
+            pending = _Following(committed, request.steps, monotonic_ns() + timeout_ns)
+        message = _message(request.steps, measured)
+        return Outcome(code=Code.OK, message=message, report=report, pending=pending)
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
         check_revision(request, self._runtime)
@@ -184,7 +211,7 @@ class Control:
     def _phase_timeout_of(self, request: Request) -> int:
         """Of a property alone nobody wants to know the phase."""
         only_properties = all(step.kind == "set_property" for step in request.steps)
-        return 0 if only_properties or request.dry_run else self._phase_timeout_ns
+        return 0 if only_properties else self._phase_timeout_ns
 
     def _start_or_stop(self, step: Step, request: Request) -> Outcome:
         """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
@@ -208,6 +235,29 @@ class Control:
                     continue  # a stop that timed out stays pending
                 raise
             return
+
+
+@dataclass(frozen=True)
+class _Following:
+    """The releases that follow a commit."""
+
+    committed: Committed
+    steps: tuple[Step, ...]
+    until_ns: int
+
+    def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
+        """As Pending.look."""
+        left_ns = self.until_ns - monotonic_ns()
+        measured = self.committed.report(max(0, min(left_ns, wait_ns)))
+        is_over = measured.is_complete or left_ns <= wait_ns
+        return replace(
+            outcome, report=_reports(self.steps, measured), pending=None if is_over else outcome.pending
+        )
+
+
+def _is_direct(request: Request) -> bool:
+    """Whether it is carried out without a transaction, beside whatever else there is."""
+    return len(request.steps) == 1 and request.steps[0].kind in ("start", "stop") and not request.dry_run
 
 
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:
@@ -242,24 +292,30 @@ def _message(steps: tuple[Step, ...], measured: TransactionReport) -> str:
 
 def _reports(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Report, ...]:
     if len(steps) == 1:  # then all of it was for this one
-        return (_report(steps[0], measured.steps[0], prepare_ns=measured.prepare_ns),)
-    pairs = zip(steps, measured.steps, strict=True)
-    return tuple(_report(step, report, prepare_ns=report.prepare_ns) for step, report in pairs)
+        alone, complete = measured.steps[0], measured.is_complete
+        return (_report(steps[0], alone, prepare_ns=measured.prepare_ns, is_complete=complete),)
+    return tuple(
+        _report(step, report, prepare_ns=report.prepare_ns, is_complete=measured.is_complete)
+        for step, report in zip(steps, measured.steps, strict=True)
+    )
 
 
-def _report(step: Step, measured: StepReport, *, prepare_ns: int) -> Report:
+def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: bool) -> Report:
     is_long = step.kind in ("add_component", "add_resource")
     on_resource = step.kind in ("add_resource", "remove_resource")
     words = [step.kind, step.target if on_resource else step.name]
     if not is_long and step.kind != "replace_core":
         words.append(step.value)
     held = measured.blackout_ns != 0
+    follows = held and not is_complete and measured.phase_actual_ns == NOT_MEASURED
     return Report(
         step=" ".join(word for word in words if word),
         component=measured.component,
         prepare_ns=prepare_ns,
         blackout_ns=measured.blackout_ns if held else NOT_MEASURED,
-        missed_releases=measured.missed_releases,
+        missed_releases=NOT_MEASURED if follows else measured.missed_releases,
         phase_nominal_ns=measured.phase_nominal_ns if held else NOT_MEASURED,
         phase_actual_ns=measured.phase_actual_ns,
+        from_core=measured.from_core,
+        to_core=measured.to_core,
     )

@@ -151,6 +151,8 @@ def _step_report(report: Report) -> Any:
         missed_releases=report.missed_releases,
         phase_nominal_ns=report.phase_nominal_ns,
         phase_actual_ns=report.phase_actual_ns,
+        from_core=report.from_core,
+        to_core=report.to_core,
     )
 
 

@@ -32,10 +32,11 @@ NODE_NAME = "executor"
 class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
-    Requests, lifecycle transitions, listing and recorded topics have a callback group each, so that a stop
-    that waits for a component delays none of the others. Requests, in `control_group`, are for a
-    `ServiceThread`, the others for an executor with a thread for each: `THREADS`. Messages and calls
-    of bound resources do not come by here: they have threads of their own, in C++.
+    Changes, stops and starts, lifecycle transitions, listing and recorded topics have a callback group each,
+    so that a stop that waits for a component delays none of the others, and no preparation delays a stop.
+    Changes, in `control_group`, and stops and starts, in `direct_group`, are for a `ServiceThread` each,
+    the others for an executor with a thread for each: `THREADS`. Messages and calls of bound resources do not
+    come by here: they have threads of their own, in C++.
     """
 
     THREADS = 3
@@ -51,6 +52,7 @@ class ExecutorNode(LifecycleNode):
         super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
         self.control_group = control_group = MutuallyExclusiveCallbackGroup()
+        self.direct_group = MutuallyExclusiveCallbackGroup()
         query_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         # A signal may come while a transition starts or ends threads: nobody else may do that then.
@@ -76,6 +78,7 @@ class ExecutorNode(LifecycleNode):
             parameters=self._properties,
             watch=self.watch,
             control_group=control_group,
+            direct_group=self.direct_group,
             query_group=query_group,
         )
         ParameterServices(
@@ -217,6 +220,7 @@ class ExecutorNode(LifecycleNode):
                 self._recording.stop()
                 self._bound.close()
         finally:
+            self._state.close()
             self.destroy_node()
 
     def destroy_node(self) -> None:
@@ -230,6 +234,7 @@ class ExecutorNode(LifecycleNode):
 
     def _release(self) -> None:
         self._runtime.require_parked()
+        self._state.flush()
         self._recording.stop()
         self._bound.close()
         self._runtime.cleanup()

@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Protocol
 
 from mauve_rt._kernel import NOT_MEASURED
 from mauve_rt.errors import error_code
@@ -143,7 +144,7 @@ class Request:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What one step cost, as mauve_msgs/msg/StepReport. Times in ns."""
+    """What one step changed and cost, as mauve_msgs/msg/StepReport. Times in ns."""
 
     step: str
     component: str
@@ -152,6 +153,8 @@ class Report:
     missed_releases: int = 0
     phase_nominal_ns: int = NOT_MEASURED
     phase_actual_ns: int = NOT_MEASURED
+    from_core: str = ""
+    to_core: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,12 +168,20 @@ class Outcome:
     from_core: str = ""
     to_core: str = ""
     bag: str = ""  # of an order to the recording
+    pending: "Pending | None" = field(default=None, compare=False, repr=False)  # what its report lacks still
     replayed: bool = field(default=False, compare=False)  # the first outcome of a repeated request_id
 
     @property
     def success(self) -> bool:
         """Whether it was done."""
         return self.code is Code.OK
+
+
+class Pending(Protocol):
+    """A change that is in force, and what the releases after it will tell."""
+
+    def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
+        """The outcome with what is known by now, or soon; it is pending no more when no more will come."""
 
 
 class RequestLog:

@@ -81,6 +81,7 @@ class Runtime:
         self._deployer: Deployer | None = None
         self._lock = threading.Lock()
         self._revision = 0
+        self._claimed = 0  # the last revision that a request's own change was counted by
         self._seen: object = None
         self._observed = Observed(0, [])
         self._mark: object = None  # by which the kernel tells whether there is anything new to be seen
@@ -229,9 +230,10 @@ class Runtime:
         with self._loading:
             yield PluginLoader(self.registry, self.index)
 
-    def declared(self, component: str) -> ComponentModel:
-        """What the file, or the request that added it, says of a component."""
-        return self._declared[component].model
+    def declared(self, component: str) -> ComponentModel | None:
+        """What the file, or the request that added it, says of a component; None while it is being added."""
+        declared = self._declared.get(component)
+        return None if declared is None else declared.model
 
     def diagnostics(self, component: str) -> DiagnosticsModel:
         """The thresholds of a component: the executor's, overridden by its own. From any thread."""
@@ -270,8 +272,9 @@ class Runtime:
     def observe(self, *, changed_since: int | None = None, anew: bool = False) -> Observed:
         """The components; a change since the last look is counted. Figures may be those of the last change.
 
-        `changed_since`: a revision after which there was a change, which need not show: a core replaced by
-        another one of its kind, or a restart, counts all the same. `anew`: figures are those of now.
+        `changed_since`: a revision after which the caller made a change, which need not show: a core replaced
+        by another one of its kind, or a restart, counts all the same. Of changes made at once each counts.
+        `anew`: figures are those of now.
         """
         with self._lock:
             mark = (
@@ -279,13 +282,16 @@ class Runtime:
                 self.active,
                 self.kernel_revision(),
             )  # first: what comes after is news
-            if anew or mark != self._mark or self._revision == changed_since:
+            is_own = changed_since is not None and self._revision in (changed_since, self._claimed)
+            if anew or mark != self._mark or is_own:
                 parts = self.components()
                 seen = (self.active, [_facts(part) for part in parts], self.resources())
-                if seen != self._seen or self._revision == changed_since:
+                if seen != self._seen or is_own:
                     self._seen = seen
                     self._revision += 1
                 self._mark, self._observed = mark, Observed(self._revision, parts)
+            if changed_since is not None:
+                self._claimed = self._revision
             return self._observed
 
 

@@ -18,6 +18,7 @@ from mauve_msgs.srv import (
 )
 from mauve_rt.node.executor_bound_resources import BoundResources
 from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_events import Event
 from mauve_rt.node.executor_messages import component_infos, realtime_status, resource_infos, step_reports
 from mauve_rt.node.executor_parameters import Parameters
 from mauve_rt.node.executor_requests import Outcome, RecordingOrder, Request, Step
@@ -29,9 +30,15 @@ _CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "repl
 
 
 class Services:
-    """The services of a node. Requests for changes wait for each other in `control_group`, lists do not.
+    """The services of a node.
 
-    Who asked is answered first; then ~/state and ~/events tell of it, before the next request is looked at.
+    Requests for changes wait for each other in `control_group`, those to stop or start in `direct_group`, and
+    lists in `query_group`. Who asked is answered first; then ~/state tells of it, and ~/events will, before
+    the next request of the group is looked at.
+
+    | member    | written by              | guarded by               |
+    | --------- | ----------------------- | ------------------------ |
+    | `_untold` | the two request groups  | each has one of its own  |
     """
 
     def __init__(
@@ -45,6 +52,7 @@ class Services:
         parameters: Parameters,
         watch: Watch,
         control_group: CallbackGroup,
+        direct_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
         self._runtime = runtime
@@ -53,34 +61,39 @@ class Services:
         self._state = state
         # The change is made by then: what is wrong here is told, and no refusal of it.
         self._follow = watch.guarded("the parameters", parameters.follow)
-        self._untold: deque[tuple[Request, Outcome]] = deque()  # of `control_group` only
+        self._untold: dict[CallbackGroup, deque[Event]] = {
+            group: deque() for group in (control_group, direct_group)
+        }
+        self._control_group = control_group
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
-        for service, name, translate in (
-            (Stop, "~/stop", _stop),
-            (Start, "~/start", _start),
-            (ReplaceCore, "~/replace_core", _replace_core),
-            (Reconfigure, "~/reconfigure", _reconfigure),
-            (StartRecording, "~/start_recording", _start_recording),
-            (StopRecording, "~/stop_recording", _stop_recording),
+        for service, name, translate, group in (
+            (Stop, "~/stop", _stop, direct_group),
+            (Start, "~/start", _start, direct_group),
+            (ReplaceCore, "~/replace_core", _replace_core, control_group),
+            (Reconfigure, "~/reconfigure", _reconfigure, control_group),
+            (StartRecording, "~/start_recording", _start_recording, control_group),
+            (StopRecording, "~/stop_recording", _stop_recording, control_group),
         ):
-            handler = self._handler(translate)
-            self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
+            handler = self._handler(translate, group)
+            self._tell_after(node.create_service(service, name, handler, callback_group=group), group)
 
     def handle(self, request: Request) -> Outcome:
         """Carry out a request, and tell of it. In `control_group`."""
-        outcome = self._carry_out(request)
-        self._tell()
+        outcome = self._carry_out(request, self._control_group)
+        self._tell(self._control_group)
         return outcome
 
-    def _carry_out(self, request: Request) -> Outcome:
+    def _carry_out(self, request: Request, group: CallbackGroup) -> Outcome:
+        if request.recording is not None and not request.recording.start:
+            self._state.flush()  # the bag that ends tells of all that was in it
         outcome = self._control.handle(request)
         if not outcome.replayed:
+            self._untold[group].append(self._state.take_down(request, outcome))
             if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
                 self._follow()
-            self._untold.append((request, outcome))
         return outcome
 
-    def _tell_after(self, service: Any) -> None:
+    def _tell_after(self, service: Any, group: CallbackGroup) -> None:
         """Let a service tell when it has sent its reply."""
         send_response = service.send_response
 
@@ -88,15 +101,14 @@ class Services:
             try:
                 send_response(response, header)
             finally:
-                self._tell()
+                self._tell(group)
 
         service.send_response = send_and_tell
 
-    def _tell(self) -> None:
-        while self._untold:
-            request, outcome = self._untold.popleft()
+    def _tell(self, group: CallbackGroup) -> None:
+        while self._untold[group]:
             self._state.refresh()
-            self._state.event(request, outcome)
+            self._state.tell(self._untold[group].popleft())
 
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
@@ -106,9 +118,11 @@ class Services:
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         return response
 
-    def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
+    def _handler(
+        self, translate: Callable[[Any], Request], group: CallbackGroup
+    ) -> Callable[[Any, Any], Any]:
         def handle(ros_request: Any, response: Any) -> Any:
-            outcome = self._carry_out(translate(ros_request))
+            outcome = self._carry_out(translate(ros_request), group)
             response.success = outcome.success
             response.code = int(outcome.code)
             response.message = outcome.message

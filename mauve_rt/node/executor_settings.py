@@ -12,7 +12,7 @@ from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.settings import Setting, check_given, usage
 
-MAX_PHASE_TIMEOUT_S = 2.0  # the end of the process may have to wait for it
+MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
 _CONFIGURED: Any = "when configured"
 
 PARAMETERS: dict[str, Setting] = {
@@ -35,7 +35,7 @@ PARAMETERS: dict[str, Setting] = {
     "trace": Setting(default=True, description="component threads write traces"),
     "report_phase_timeout_s": Setting(
         1.0,
-        "how long a reply may wait to measure the next release after a commit",
+        "how long an event may wait to tell the next release after a commit",
         minimum=0,
         maximum=MAX_PHASE_TIMEOUT_S,
     ),

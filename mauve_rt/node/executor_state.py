@@ -10,6 +10,7 @@ from rclpy.serialization import serialize_message
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent
 from mauve_rt._kernel import Deployer
+from mauve_rt.node.executor_events import Event, Events
 from mauve_rt.node.executor_faults import FaultWatch
 from mauve_rt.node.executor_messages import architecture_state, reconfiguration_event
 from mauve_rt.node.executor_recording import Recording
@@ -41,6 +42,7 @@ class StatePublisher:
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self._behind = False  # of that thread
+        self._queue = Events(self._publish_event, watch)
 
     def refresh(self, *, again: bool = False) -> Observed:
         """Publish the state if it changed since it was published last, or in any case `again`."""
@@ -67,10 +69,22 @@ class StatePublisher:
             self.refresh(again=True)
 
     def event(self, request: Request, outcome: Outcome) -> None:
-        """Publish what came of a request."""
-        stamp = self._node.get_clock().now().to_msg()
-        event = reconfiguration_event(request, outcome, stamp=stamp, instance_id=self._runtime.instance_id)
-        self._send(self._events, "mauve_msgs/msg/ReconfigurationEvent", event, self._event_qos)
+        """Publish what came of a request, when its report is complete."""
+        self.tell(self.take_down(request, outcome))
+
+    def take_down(self, request: Request, outcome: Outcome) -> Event:
+        """As event(), but not before tell()."""
+        event = Event(request, outcome, self._node.get_clock().now().to_msg())
+        self._queue.add(event)
+        return event
+
+    def tell(self, event: Event) -> None:
+        """Who asked has the answer: publish it now."""
+        self._queue.tell(event)
+
+    def flush(self) -> None:
+        """Publish all events there are, with what is known by now."""
+        self._queue.flush()
 
     def start(self, deployer: Deployer) -> None:
         """Watch the components, so that changes nobody asked for, such as faults, are published at once."""
@@ -80,11 +94,17 @@ class StatePublisher:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the watch."""
+        """End the watch; no event is left behind."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
+        self.flush()
+
+    def close(self) -> None:
+        """As stop(), and there will be no event any more."""
+        self.stop()
+        self._queue.close()
 
     def _look(self, deployer: Deployer, faults: FaultWatch) -> None:
         """Wait for a change, and tell of it; one that could not be told is told with the next look."""
@@ -97,6 +117,13 @@ class StatePublisher:
             if fault.part.fell_back:
                 self.event(*fault.event(observed.revision))
         self._behind = False
+
+    def _publish_event(self, event: Event) -> None:
+        instance_id = self._runtime.instance_id
+        message = reconfiguration_event(
+            event.request, event.outcome, stamp=event.stamp, instance_id=instance_id
+        )
+        self._send(self._events, "mauve_msgs/msg/ReconfigurationEvent", message, self._event_qos)
 
     def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
         data = serialize_message(message)

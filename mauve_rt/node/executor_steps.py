@@ -65,7 +65,10 @@ class Plan:
         self.removed: set[str] = set()
         self.bound = Bound()
         self._runtime = runtime
-        self._sketches = {part.name: self._sketch_of(part) for part in parts}
+        self._sketches: dict[str, _Sketch] = {}
+        for part in parts:
+            if (model := runtime.declared(part.name)) is not None:
+                self._sketches[part.name] = _sketch_of(part, model)
         self._resources = set(runtime.resources())
         all_steps = tuple(steps)
         for number, step in enumerate(all_steps, start=1):
@@ -76,11 +79,6 @@ class Plan:
                 raise RefusalError(refusal.code, f"{where}{refusal}") from None
             except MauveError as error:
                 raise RefusalError(code_of(error), one_line(f"{where}{_words(error)}")) from None
-
-    def _sketch_of(self, part: ComponentDescription) -> _Sketch:
-        fault = part.fault if part.state == "FAULTED" else ""
-        properties = {item.name: item for item in part.properties}
-        return _Sketch(self._runtime.declared(part.name), properties, fault)
 
     def _take(self, step: Step) -> None:
         transaction, name = self.transaction, step.target
@@ -202,6 +200,11 @@ class Plan:
 
     def _fragment(self, step: Step, section: str) -> ArchitectureModel:
         return fragment(self._runtime.model, step.value, section=section, name=step.target)
+
+
+def _sketch_of(part: ComponentDescription, model: ComponentModel) -> _Sketch:
+    fault = part.fault if part.state == "FAULTED" else ""
+    return _Sketch(model, {item.name: item for item in part.properties}, fault)
 
 
 def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -> RefusalError:

@@ -24,7 +24,7 @@ class ServiceThread:
     interpreter's lock: most of what a short call costs. This waits for a few services with one wait set.
     """
 
-    def __init__(self, node: Node, group: CallbackGroup, watch: Watch) -> None:
+    def __init__(self, node: Node, group: CallbackGroup, watch: Watch, *, name: str) -> None:
         """Of the services that the group has now; no executor may serve it (`OtherGroupsExecutor`)."""
         self._node = node
         self._watch = watch
@@ -32,7 +32,7 @@ class ServiceThread:
         self._wakeup = node.create_guard_condition(lambda: None, callback_group=group)
         self._ending = threading.Event()
         self._wait_set: Any = None  # of the thread
-        self._thread = watch.thread("services", self._take_requests, ending=self._ending)
+        self._thread = watch.thread(name, self._take_requests, ending=self._ending)
 
     def start(self) -> None:
         """Begin to answer."""
@@ -89,12 +89,12 @@ def refusal(request: Any, filled: Any, error: BaseException) -> Any:
 
 
 class OtherGroupsExecutor(MultiThreadedExecutor):
-    """Runs the callbacks of all groups of a node but one."""
+    """Runs the callbacks of all groups of a node but some."""
 
-    def __init__(self, group: CallbackGroup, *, num_threads: int) -> None:
+    def __init__(self, *groups: CallbackGroup, num_threads: int) -> None:
         super().__init__(num_threads=num_threads)
-        self._group = group
+        self._groups = groups
 
     def can_execute(self, entity: Any) -> bool:
         """Whether a callback can be executed, and here."""
-        return entity.callback_group is not self._group and super().can_execute(entity)
+        return entity.callback_group not in self._groups and super().can_execute(entity)

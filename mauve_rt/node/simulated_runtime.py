@@ -28,6 +28,17 @@ class NoRealtime:
     missing: tuple[str, ...] = (SIMULATED,)
 
 
+@dataclass(frozen=True)
+class _Committed:
+    """As `mauve_rt._kernel.Committed`."""
+
+    measured: TransactionReport
+
+    def report(self, _phase_timeout_ns: int = 0) -> TransactionReport:
+        """As Committed.report: all of it is known."""
+        return self.measured
+
+
 class SimulatedDeployer:
     """One architecture of a simulation, with the calls of a Deployer. Its timeouts pass in no time."""
 
@@ -58,17 +69,19 @@ class SimulatedDeployer:
         """As Deployer.start."""
         self._simulation.start(self._architecture, component, clock_ns)
 
-    def commit(
+    def make(
         self,
         transaction: Transaction,
         *,
         dry_run: bool = False,
         expected_revision: int = 0,
         **_timeouts_ns: int,
-    ) -> TransactionReport:
-        """As Deployer.commit; the phases of the next releases are not measured, they are yet to come."""
-        return self._simulation.commit(
-            self._architecture, transaction, dry_run=dry_run, expected_revision=expected_revision
+    ) -> "_Committed":
+        """As Deployer.make; the phases of the next releases are not measured, they are yet to come."""
+        return _Committed(
+            self._simulation.commit(
+                self._architecture, transaction, dry_run=dry_run, expected_revision=expected_revision
+            )
         )
 
     def realtime_status(self) -> NoRealtime:

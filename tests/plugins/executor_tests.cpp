@@ -222,6 +222,17 @@ struct CounterFsm : mauve::Fsm<CounterShell, Counter> {
   }
 };
 
+/// Declares how long an execution may last.
+struct GuardedFsm : mauve::Fsm<CounterShell, Counter> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Counter::act, mauve::ms_to_ns(500));
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 /// Waits three times as long.
 struct CalmFsm : mauve::Fsm<CounterShell, Counter> {
   void define() override {
@@ -421,6 +432,7 @@ MAUVE_PLUGINS(registry) {
   registry.core<Slow>("executor_tests/Slow", shell);
   registry.core<Hanging>("executor_tests/Hanging", shell);
   registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
+  registry.fsm<GuardedFsm>("executor_tests/GuardedFsm", shell);
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);
   registry.fsm<CalmFsm>("executor_tests/CalmFsm", shell);
   registry.fsm<EventFsm>("executor_tests/EventFsm", shell);

@@ -76,3 +76,29 @@ class PyGarbled(PyCounter):
     def configure(self) -> None:
         """Never succeeds."""
         raise _GarbledError
+
+
+class PyHeld(Core):
+    """Executes until it is told a number; says by counting -1 that it does. Raises for one far below zero."""
+
+    def act(self) -> None:
+        """Wait for the number."""
+        self.shell.count.write(Float64(data=-1.0))
+        until_s = time.monotonic() + 30.0
+        while not (sample := self.shell.set.read()).is_new and time.monotonic() < until_s:
+            time.sleep(0.001)
+        if sample.value.data < -1e6:
+            raise ValueError("set to something unheard of")
+
+
+class PyPatient(PyCounter):
+    """Is being configured until there is a file that its label names; says by a file beside it that it is."""
+
+    def configure(self) -> None:
+        """Wait for the file."""
+        super().configure()
+        awaited = Path(self.shell.label.value)
+        awaited.with_suffix(".begun").touch()
+        until_s = time.monotonic() + 60.0
+        while not awaited.exists() and time.monotonic() < until_s:
+            time.sleep(0.001)

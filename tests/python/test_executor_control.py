@@ -1,6 +1,7 @@
 """Requests to an executor, carried out on real components without ROS."""
 
 import struct
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -71,6 +72,13 @@ def control(runtime: Runtime) -> Control:
 
 def _ask(control: Control, *steps: Step, dry_run: bool = False, expected_revision: int = 0) -> Outcome:
     return control.handle(Request(steps=steps, dry_run=dry_run, expected_revision=expected_revision))
+
+
+def _followed(outcome: Outcome) -> Outcome:
+    """With what the releases after it tell."""
+    while outcome.pending is not None:
+        outcome = outcome.pending.look(outcome, wait_ns=100_000_000)
+    return outcome
 
 
 def _part(runtime: Runtime, name: str) -> ComponentDescription:
@@ -276,6 +284,7 @@ def test_an_fsm_is_replaced_with_its_grid(runtime: Runtime, control: Control) ->
     assert report.step == "replace_fsm executor_tests/CalmFsm"
     assert report.blackout_ns > 0
     assert report.phase_nominal_ns == 0
+    (report,) = _followed(outcome).report
     assert report.phase_actual_ns != NOT_MEASURED
     assert _ask(control, Step("replace_fsm", "counter", "executor_tests/EventFsm")).success
     assert _part(runtime, "counter").period_ns == 0, "it waits for events"
@@ -332,3 +341,41 @@ def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) 
     assert (refused.code, "remove it" in refused.message) == (Code.FAULTED, True)
     assert _ask(control, Step("remove_component", "weak")).success
     assert "weak" not in [part.name for part in runtime.components()]
+
+
+def test_every_step_names_the_core_that_it_changed(runtime: Runtime, control: Control) -> None:
+    outcome = _ask(
+        control,
+        Step("replace_core", "free", "executor_tests/Backwards"),
+        Step("set_property", "free", "step", "2.0"),
+        Step("set_property", "counter", "step", "3.0"),
+        Step("add_component", "second", "", COUNTER),
+    )
+    assert outcome.success, outcome.message
+    assert [(report.component, report.from_core, report.to_core) for report in outcome.report] == [
+        ("free", "executor_tests/Counter", "executor_tests/Backwards"),
+        ("free", "", ""),
+        ("counter", "", ""),
+        ("second", "", ""),
+    ]
+    followed = _followed(outcome)
+    assert [report.to_core for report in followed.report] == [report.to_core for report in outcome.report]
+    assert all(report.phase_actual_ns != NOT_MEASURED for report in followed.report[:3])
+
+
+def test_changes_made_at_once_have_a_revision_each(runtime: Runtime, control: Control) -> None:
+    steps = [Step("stop", "free"), Step("start", "free")] * 20
+    steps += [Step("set_property", "counter", "step", f"{number / 10}") for number in range(20)]
+    outcomes: list[Outcome] = []
+    threads = [
+        threading.Thread(target=lambda part=part: outcomes.extend(_ask(control, step) for step in part))
+        for part in (steps[:40], steps[40:])
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(outcome.success for outcome in outcomes), [outcome.message for outcome in outcomes]
+    revisions = [outcome.revision for outcome in outcomes]
+    assert len(set(revisions)) == len(steps)
+    assert runtime.revision == max(revisions)

@@ -10,11 +10,13 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import (
+    NOT_MEASURED,
     Architecture,
     ComponentDescription,
     Deployer,
     MauveError,
     PluginRegistry,
+    Transaction,
     monotonic_ns,
 )
 from mauve_rt.model.plugins import PluginIndex
@@ -219,6 +221,24 @@ def test_a_core_is_replaced_in_flight_and_goes_on_counting(deployer: Deployer, a
     later = beats(deployer, 3)
     assert later == sorted(later)
     assert later[0] >= heard[-1], "take() carried the count over"
+
+
+def test_the_report_of_a_change_can_be_asked_for_later(deployer: Deployer, architecture: Architecture):
+    committed = deployer.make(Transaction().replace_core("metronome", ACCELERANDO))
+    assert describe(architecture).core == ACCELERANDO
+    known = committed.report().steps[0]
+    assert (known.to_core, known.phase_nominal_ns) == (ACCELERANDO, 0)
+    report = committed.report(100_000_000_000)
+    assert report.is_complete
+    assert report.steps[0].blackout_ns == known.blackout_ns
+    assert report.steps[0].phase_actual_ns != NOT_MEASURED
+    assert committed.report().steps[0].phase_actual_ns == report.steps[0].phase_actual_ns
+    # What comes of the components meanwhile is nobody's concern.
+    parting = deployer.make(Transaction().replace_core("metronome", METRONOME))
+    deployer.commit(Transaction().remove_component("metronome"))
+    assert parting.report().steps[0].to_core == METRONOME
+    deployer.shutdown()
+    del parting, committed
 
 
 def test_a_core_that_may_not_be_put_in_is_refused(deployer: Deployer, architecture: Architecture):

@@ -61,12 +61,16 @@ def test_replace_core_in_flight_takes_over_the_count(graph: Any) -> None:
     counts = graph.hear(Float64, "/robot_1/count")
     graph.voice(Float64, "/robot_1/set").publish(Float64(data=1e5))
     graph.spin_until(lambda: bool(counts) and counts[-1].data > 1e5, "a high count")
+    events = graph.hear_events(NODE)
     reply = graph.ask(
         ReplaceCore, f"{NODE}/replace_core", component="counter", core="executor_tests/Backwards"
     )
     assert reply.success, reply.message
-    (step,) = reply.report
+    graph.spin_until(lambda: bool(events), "the event")
+    (step,) = events[0].report
     assert (step.component, step.missed_releases, step.phase_nominal_ns) == ("counter", 0, 0)
+    assert (step.from_core, step.to_core) == ("executor_tests/Counter", "executor_tests/Backwards")
+    assert (step.blackout_ns, step.prepare_ns) == (reply.report[0].blackout_ns, reply.report[0].prepare_ns)
     assert step.blackout_ns > 0
     assert step.phase_actual_ns != NOT_MEASURED
     component = _component(graph, "counter")
@@ -225,7 +229,12 @@ def test_event_tells_who_what_and_why(graph: Any) -> None:
     )
     assert (event.from_core, event.to_core) == ("executor_tests/Counter", "executor_tests/Backwards")
     assert (event.success, event.revision) == (True, reply.revision)
-    assert event.report == reply.report
+    (told,), (replied,) = event.report, reply.report
+    assert (told.step, told.component, told.blackout_ns) == (
+        replied.step,
+        replied.component,
+        replied.blackout_ns,
+    )
 
 
 def test_the_reply_is_true_already_and_events_follow_in_order(graph: Any) -> None:

@@ -15,8 +15,10 @@ from mauve_msgs.msg import (
     ReconfigurationStep,
 )
 from mauve_msgs.srv import ListComponents, Reconfigure
+from mauve_rt.cli.main import main
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code
 from mauve_rt.trace.reader import open_trace
+from mauve_rt.trace.report.analysis import analyse
 
 NODE = "/robot_1/executor"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -105,7 +107,8 @@ def test_components_and_resources_come_and_go(graph: Any) -> None:
     assert events[2].request.startswith(
         "add_resource sum {kind: shared_data, type: std_msgs/msg/Float64}; add_"
     )
-    assert (events[2].cause, events[2].report) == ("more", done.report)
+    assert events[2].cause == "more"
+    assert [step.step for step in events[2].report] == [step.step for step in done.report]
     graph.spin_until(lambda: len(states[-1].components) == 3, "the state without it")
     assert (states[-1].revision, states[-1].instance_id) == (removed.revision, removed.instance_id)
 
@@ -169,3 +172,49 @@ def test_a_removed_component_keeps_its_number_in_the_bag(
     assert list(trace.components)[-2:] == ["second", "third"]
     assert len(trace.of("second")) > 0
     assert len(trace.of("third")) > 0
+
+
+OWN_CHANGES = [
+    _step("replace_core", "counter", FALLBACK),
+    _step("set_property", "counter", "step", "2.0"),
+    _step("set_property", "sleepy", "step", "3.0"),
+]
+
+
+def test_each_component_is_told_of_its_own_change(
+    architecture: Path,
+    start_executor: Callable[..., Any],
+    graph: Any,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bag = tmp_path / "bag"
+    executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
+    for steps in (OWN_CHANGES, [_step("remove_component", "sleepy"), *ADD[:3], ADD[-1]]):
+        reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps)
+        assert reply.success, reply.message
+    executor.process.terminate()
+    assert executor.wait() == 0
+    own = {
+        ("counter", f"set_property step, replace_core {FALLBACK}"),
+        ("sleepy", "set_property step"),
+        ("sleepy", "remove"),
+    }
+    trace = open_trace(bag)
+    swaps = analyse(trace, events=trace.messages("mauve_msgs/msg/ReconfigurationEvent")).swaps
+    assert {(swap.measured.component, swap.measured.what) for swap in swaps} == own
+    asked = [swap.request for swap in swaps if swap.request is not None]
+    cores = {
+        (swap.measured.component, swap.request.from_core, swap.request.to_core)
+        for swap in swaps
+        if swap.request is not None
+    }
+    assert len(asked) == len(swaps) == 3
+    assert cores == {("counter", "executor_tests/Counter", FALLBACK), ("sleepy", "", "")}
+    assert main(["trace", "stats", str(bag)]) == 0
+    rows = capsys.readouterr().out.partition("reconfigurations")[2].splitlines()
+    for component, what in own:
+        assert any(row.split("  ")[0].strip() == component and f" {what} " in row for row in rows), rows
+    page = tmp_path / "page.html"
+    assert main(["report", str(bag), "--out", str(page)]) == 0
+    assert page.read_text(encoding="utf-8").count("<td>Counter \N{RIGHTWARDS ARROW} Backwards</td>") == 1

@@ -7,8 +7,11 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import Simulation
+from mauve_rt.node.executor_requests import Request, Step
 from mauve_rt.node.simulated_executor import SimulatedExecutor
 from mauve_rt.node.simulated_topics import Sample, SimulatedTopics
+from mauve_rt.trace.reader import open_trace
+from mauve_rt.trace.report.analysis import analyse
 
 FALLBACK = "executor_tests/Backwards"
 S = 1_000_000_000
@@ -49,3 +52,34 @@ def test_a_fallback_core_that_took_over_is_an_event(guarded: Path, tmp_path: Pat
     assert "set to something unheard of (in state Count" in event.cause
     assert (event.from_core, event.to_core) == ("executor_tests/Counter", FALLBACK)
     executor.close()
+
+
+def test_each_component_is_told_of_its_own_change(architecture: Path, tmp_path: Path) -> None:
+    simulation, topics = Simulation(), SimulatedTopics()
+    executor = SimulatedExecutor(simulation, topics, architecture, tmp_path / "bag", complain=pytest.fail)
+    simulation.deploy()
+    executor.activate()
+    simulation.run_until(simulation.epoch_ns() + S)
+    steps = (
+        Step("replace_core", "counter", FALLBACK),
+        Step("set_property", "counter", "step", "2.0"),
+        Step("set_property", "sleepy", "step", "3.0"),
+    )
+    outcome = executor.handle(Request(steps=steps))
+    assert outcome.success, outcome.message
+    assert [(step.component, step.to_core) for step in outcome.report] == [
+        ("counter", FALLBACK),
+        ("counter", ""),
+        ("sleepy", ""),
+    ]
+    simulation.run_until(simulation.epoch_ns() + 6 * S)
+    executor.record()
+    executor.close()
+    trace = open_trace(tmp_path / "bag")
+    swaps = analyse(trace, events=trace.messages("mauve_msgs/msg/ReconfigurationEvent")).swaps
+    assert [
+        (swap.measured.component, swap.measured.what, swap.request and swap.request.to_core) for swap in swaps
+    ] == [
+        ("counter", f"set_property step, replace_core {FALLBACK}", FALLBACK),
+        ("sleepy", "set_property step", ""),
+    ]

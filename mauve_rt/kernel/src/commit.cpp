@@ -51,7 +51,7 @@ Commit::Commit(std::size_t participants, std::vector<CommitAction*> actions)
 Commit::~Commit() {
   for (Participant& place : participants_) {
     if (committed_ && place.in_flight && place.afterwards != Afterwards::stop)
-      place.task->wait_release(place, 0);
+      place.task->forget_release(place);
   }
 }
 

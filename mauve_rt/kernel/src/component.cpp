@@ -250,7 +250,7 @@ StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& tim
   return report_of(place, timeouts.phase_ns);
 }
 
-StepReport report_of(Participant& place, time_ns_t phase_timeout_ns) {
+StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
   report.component = place.task->name();
   report.blackout_ns = place.armed_ns - place.parked_ns;

@@ -148,12 +148,16 @@ TransactionHost Deployer::host() {
           .detach = [](Task& task) { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }};
 }
 
+std::unique_ptr<TransactionCommit> Deployer::make(Transaction transaction,
+                                                  const TransactionOptions& options) {
+  const std::lock_guard lock(structure_mutex_);
+  auto work = std::make_unique<TransactionCommit>(architecture_, host(), options);
+  work->make(std::move(transaction));
+  return work;
+}
+
 TransactionReport Deployer::commit(Transaction transaction, const TransactionOptions& options) {
-  std::unique_lock lock(structure_mutex_);
-  TransactionCommit work(architecture_, host(), options);
-  work.make(std::move(transaction));
-  lock.unlock();  // waiting for the releases that follow keeps nobody else from the deployer
-  return work.report();
+  return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
 }
 
 StepReport Deployer::commit_one(Transaction transaction, const CommitTimeouts& timeouts) {

@@ -36,6 +36,7 @@ PartsChange::PartsChange(Component& component, Parts fresh,
       make_fsm_(std::move(make_fsm)),
       restarts_(parts_.shell != nullptr || parts_.fsm != nullptr),
       trace_id_(TraceNames::intern(change_name(parts_))) {
+  task = &component.task();
   if (parts_.core != nullptr) core_name_ = TraceNames::intern(parts_.core->implementation());
   if (parts_.shell == nullptr) return;
   parts_.shell->set_context(&component_.task().context());

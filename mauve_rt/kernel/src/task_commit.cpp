@@ -67,19 +67,17 @@ void Task::visit(Participant& place) noexcept {
   left_gate_ = false;
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);
   exchange_state(ComponentState::held, ComponentState::running);
-  if (answer != Commit::Answer::closed) continue_after(place, answer == Commit::Answer::made_it);
+  if (answer != Commit::Answer::closed) continue_after(place);
 }
 
-void Task::continue_after(Participant& place, bool made_it) noexcept {
+void Task::continue_after(Participant& place) noexcept {
   const Commit& commit = *place.commit;
   const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
   if (ring_ != nullptr) ring_->push_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
-  if (made_it) {
-    for (const CommitAction* action : commit.actions()) {
-      if (action->trace_id() == 0) continue;  // a mere check
-      trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
-      if (commit.committed()) trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
-    }
+  for (const CommitAction* action : commit.actions()) {
+    if (action->task != this || action->trace_id() == 0) continue;  // another component's, or a mere check
+    trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
+    if (commit.committed()) trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
   }
   const bool committed = commit.committed();
   if (committed && place.afterwards != Afterwards::stop) {
@@ -101,7 +99,7 @@ void Task::hold_parked(Participant& place) const noexcept {
 
 void Task::finish_parked(Participant& place, bool committed) noexcept {
   if (place.in_flight) {
-    continue_after(place, place.commit->in_order().front() == &place);
+    continue_after(place);
   } else if (committed && place.afterwards == Afterwards::restart) {
     post_start(next_instant(place.start_clock_ns));
     wait_started();
@@ -117,18 +115,18 @@ void Task::refuse_commit() noexcept {
   futex_wake_all(at_commit_);
 }
 
-bool Task::wait_release(Participant& place, time_ns_t until_ns) noexcept {
+bool Task::wait_release(const Participant& place, time_ns_t until_ns) noexcept {
   while (place.released.load(std::memory_order_acquire) == 0) {
-    if (futex_wait_until(place.released, 0, until_ns)) continue;
-    Participant* mine = &place;
-    // Out of the slot the machine cannot reach it any more; not in the slot, it is writing it this moment.
-    if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) {
-      place.released.store(Participant::kSuperseded, std::memory_order_relaxed);  // relaxed: ours alone now
-      return false;
-    }
-    futex_wait_until(place.released, 0, kForever);
+    if (!futex_wait_until(place.released, 0, until_ns)) break;
   }
   return place.released.load(std::memory_order_acquire) == Participant::kReleased;
+}
+
+void Task::forget_release(Participant& place) noexcept {
+  Participant* mine = &place;
+  // Out of the slot the machine cannot reach it any more; not in the slot, it has written it, or does this moment.
+  if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) return;
+  wait_release(place, kForever);
 }
 
 void Task::write_outputs(bool commit) noexcept {

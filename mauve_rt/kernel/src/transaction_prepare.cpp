@@ -46,8 +46,9 @@ class Preview {
 }  // namespace
 
 template <typename Action>
-Action& TransactionCommit::Work::keep(std::unique_ptr<Action> action) {
+Action& TransactionCommit::Work::keep(const Component& component, std::unique_ptr<Action> action) {
   Action& kept = *action;
+  kept.task = &component.task();
   actions_.push_back(std::move(action));
   return kept;
 }
@@ -89,7 +90,7 @@ void TransactionCommit::Work::prepare_added(DraftComponent& added) {
 }
 
 void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
-  Retreat& retreat = keep(std::make_unique<Retreat>(removed.component->shell()));
+  Retreat& retreat = keep(*removed.component, std::make_unique<Retreat>(removed.component->shell()));
   changes_.push_back({.draft = &removed, .retreat = &retreat});
 }
 
@@ -118,7 +119,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     connect_all(change.parts->shell(), draft.wires);
     // The old ports let go in the commit, before the new ones are used.
     for (const auto& port : component.shell().ports()) {
-      if (port->is_connected()) keep(std::make_unique<WiringChange>(*port, PortConnection{}));
+      if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
     }
   }
   const Preview preview(change.parts->shell(), draft.properties);
@@ -127,15 +128,16 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
 
 void TransactionCommit::Work::prepare_wiring(Change& change) {
   const DraftComponent& draft = *change.draft;
+  Component& component = *draft.component;
   for (const auto& [name, before] : draft.wires_before) {
     if (draft.wires.contains(name)) continue;
-    keep(std::make_unique<WiringChange>(draft.component->require_port(name), PortConnection{}));
+    keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
   }
   for (const auto& [name, wire] : draft.wires) {
     const auto before = draft.wires_before.find(name);
     if (before != draft.wires_before.end() && before->second.service == wire.service) continue;
-    PortBase& port = draft.component->require_port(name);
-    keep(std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
+    PortBase& port = component.require_port(name);
+    keep(component, std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
     prepare_listening(change, port, *wire.service);
   }
 }
@@ -146,14 +148,15 @@ void TransactionCommit::Work::prepare_listening(const Change& change, const Port
   const FsmBase& fsm = change.parts != nullptr ? change.parts->fsm() : change.draft->component->fsm();
   for (const auto& state : fsm.states()) {
     if (state->event == nullptr || &state->event->port() != &port) continue;
-    listener_changes_.push_back(&keep(std::make_unique<ListenerChange>(*service.resource(), *state->event)));
+    listener_changes_.push_back(&keep(*change.draft->component,
+                                      std::make_unique<ListenerChange>(*service.resource(), *state->event)));
   }
 }
 
 void TransactionCommit::Work::prepare_properties(Change& change) {
-  const DraftComponent& draft = *change.draft;
-  for (const auto& [name, property] : draft.properties)
-    keep(std::make_unique<PropertyChange>(draft.component->require_property(name), property.value));
+  Component& component = *change.draft->component;
+  for (const auto& [name, property] : change.draft->properties)
+    keep(component, std::make_unique<PropertyChange>(component.require_property(name), property.value));
 }
 
 /// Takes a component off its thread and its resources. A thread that is kept from ending (by a more urgent one that

@@ -11,7 +11,9 @@ TransactionCommit::TransactionCommit(Architecture& architecture, TransactionHost
     : work_(std::make_unique<Work>(architecture, std::move(host), options)) {}
 TransactionCommit::~TransactionCommit() = default;
 void TransactionCommit::make(Transaction transaction) { work_->make(std::move(transaction)); }
-TransactionReport TransactionCommit::report() { return work_->report(); }
+TransactionReport TransactionCommit::report(time_ns_t phase_timeout_ns) {
+  return work_->report(phase_timeout_ns);
+}
 
 TransactionCommit::Work::Work(Architecture& architecture, TransactionHost host,
                               const TransactionOptions& options)
@@ -43,6 +45,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
   }
   publish();
   retire();
+  keep_for_report();
 }
 
 void TransactionCommit::Work::draft_steps() {
@@ -185,14 +188,28 @@ void TransactionCommit::Work::retire() {
   for (const auto& resource : draft_->removed_resources()) resource->cleanup();
 }
 
-TransactionReport TransactionCommit::Work::report() {
-  const time_ns_t until = monotonic_now_ns() + options_.timeouts.phase_ns;
+/// Whoever waits for the report keeps nothing that others may take away meanwhile.
+void TransactionCommit::Work::keep_for_report() {
+  for (const Change& change : changes_) touched_.push_back(change.draft->component);
+  changes_.clear();
+  listener_changes_.clear();
+  actions_.clear();
+  prepared_added_.clear();
+  prepared_resources_.clear();
+  draft_.reset();
+}
+
+TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
+  const time_ns_t until = monotonic_now_ns() + phase_timeout_ns;
   std::map<std::string, StepReport> measured;
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
   TransactionReport report{
       .steps = reports_, .revision = architecture_.revision(), .prepare_ns = prepare_ns_, .blackout_ns = 0};
+  for (const auto& [name, place] : places_) {
+    if (committed_ && place->awaits_release()) report.is_complete = false;
+  }
   for (StepReport& step : report.steps) {
     const auto found = measured.find(step.component);
     if (found == measured.end()) continue;

@@ -19,7 +19,7 @@ class TransactionCommit::Work {
   Work(Architecture& architecture, TransactionHost host, const TransactionOptions& options);
 
   void make(Transaction transaction);
-  TransactionReport report();
+  TransactionReport report(time_ns_t phase_timeout_ns);
 
  private:
   /// A component that takes part in the commit.
@@ -48,6 +48,7 @@ class TransactionCommit::Work {
   // after it
   void publish();
   void retire();
+  void keep_for_report();
   static void renew_fallback(Change& change);
   void discard() noexcept;
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
@@ -59,7 +60,7 @@ class TransactionCommit::Work {
   Afterwards afterwards_of(const Change& change) const;
   const std::string& text_of(int step) const;
   template <typename Action>
-  Action& keep(std::unique_ptr<Action> action);
+  Action& keep(const Component& component, std::unique_ptr<Action> action);
 
   Architecture& architecture_;
   TransactionHost host_;
@@ -77,6 +78,7 @@ class TransactionCommit::Work {
       actions_;                                    // in the order they are taken in; the new parts come after
   std::vector<ListenerChange*> listener_changes_;  // among the actions
   StateGuard guard_;
+  std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};

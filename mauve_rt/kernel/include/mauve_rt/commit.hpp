@@ -30,7 +30,8 @@ class CommitAction {
   /// What the trace calls it. [rt]
   virtual std::uint32_t trace_id() const noexcept { return 0; }
 
-  time_ns_t adopt_ns{0};  // measured
+  const Task* task{nullptr};  // of the component that it changes, whose trace tells of it
+  time_ns_t adopt_ns{0};      // measured
   time_ns_t take_ns{0};
 };
 
@@ -73,6 +74,12 @@ struct Participant {
   time_ns_t release_nominal_ns{0};  // of the release that follows
   time_ns_t release_actual_ns{0};
   std::atomic<std::uint32_t> released{0};
+
+  /// After the commit was made: whether a release is to follow, and has not come. [non-rt]
+  bool awaits_release() const noexcept {
+    return in_flight && pending_ns != 0 && afterwards != Afterwards::stop &&
+           released.load(std::memory_order_acquire) == 0;
+  }
 };
 
 /// One change under way: its participants, its actions and the gate where the participants meet.

@@ -268,6 +268,6 @@ class Component final : public Configurable {
 };
 
 /// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]
-StepReport report_of(Participant& place, time_ns_t phase_timeout_ns);
+StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns);
 
 }  // namespace mauve

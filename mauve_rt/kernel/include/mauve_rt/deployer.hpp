@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -24,7 +25,7 @@ struct DeployerOptions {
 ///
 /// | member       | written by           | read by  | under            |
 /// | ------------ | -------------------- | -------- | ---------------- |
-/// | conductor_   | deploy(), shutdown() | commit() | structure_mutex_ |
+/// | conductor_   | deploy(), shutdown() | make()   | structure_mutex_ |
 /// | architecture | these three          | anyone   | structure_mutex_ |
 ///
 /// start(), stop() and what only looks take no part in that: a long preparation keeps nobody from stopping a component.
@@ -50,6 +51,9 @@ class Deployer {
   /// Carries out a transaction, deployed or not; one at a time. [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
   TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
+  /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
+  /// The deployer must outlive what it returns.
+  std::unique_ptr<TransactionCommit> make(Transaction transaction, const TransactionOptions& options = {});
   /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
   StepReport replace_core(const std::string& component, const std::string& core,
                           const CommitTimeouts& timeouts = {});

@@ -171,8 +171,10 @@ class Task {
   /// Carries on after a commit, when parked or simulated. [non-rt], command mutex held.
   void finish_parked(Participant& place, bool committed) noexcept;
   /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
-  /// came first. [non-rt]
-  bool wait_release(Participant& place, time_ns_t until_ns) noexcept;
+  /// came first. May be called again. [non-rt]
+  static bool wait_release(const Participant& place, time_ns_t until_ns) noexcept;
+  /// After this the machine does not refer to the participant any more. [non-rt]
+  void forget_release(Participant& place) noexcept;
   ChangeSignal& changes() noexcept { return changes_; }
   std::mutex& command_mutex() noexcept { return command_mutex_; }
   [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
@@ -259,7 +261,7 @@ class Task {
   void come_to_commit() noexcept;
   void visit(Participant& place) noexcept;
   void exchange_state(ComponentState from, ComponentState to) noexcept;
-  void continue_after(Participant& place, bool made_it) noexcept;
+  void continue_after(Participant& place) noexcept;
   void refuse_commit() noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what) noexcept;

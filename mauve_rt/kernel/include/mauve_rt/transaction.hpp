@@ -108,6 +108,7 @@ struct TransactionReport {
   std::uint64_t revision{0};  // of the architecture, after
   time_ns_t prepare_ns{0};    // all of it
   time_ns_t blackout_ns{0};   // the longest of any component's
+  bool is_complete{true};     // false: a release that follows has not come yet
 };
 
 }  // namespace mauve

@@ -21,6 +21,7 @@ struct TransactionHost {
 };
 
 /// Carries out one transaction. Ordinary threads; between architecture changes by others: one make() at a time.
+/// report() takes no part in that: while it waits, others may change what this one did.
 class TransactionCommit {
  public:
   TransactionCommit(Architecture& architecture, TransactionHost host, const TransactionOptions& options);
@@ -31,8 +32,8 @@ class TransactionCommit {
   /// Drafts, prepares, commits, retires; a dry run stops after preparing. [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); the architecture is then as it was.
   void make(Transaction transaction);
-  /// What it cost, step by step; waits for the releases that follow as long as the options say. [non-rt]
-  TransactionReport report();
+  /// What it cost, step by step; waits up to so long for the releases that follow. May be called again. [non-rt]
+  TransactionReport report(time_ns_t phase_timeout_ns);
 
  private:
   class Work;
