@@ -13,7 +13,9 @@ from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_faults import FaultWatch
 from mauve_rt.node.executor_messages import (
     architecture_state,
+    component_infos,
     reconfiguration_event,
+    resource_infos,
     trace_architecture,
 )
 from mauve_rt.node.executor_requests import Outcome, Request
@@ -98,6 +100,10 @@ class SimulatedExecutor:
     def components(self) -> list[ComponentDescription]:
         """Every component as it is now."""
         return self._runtime.components()
+
+    def listed(self) -> tuple[str, list[Any], list[Any]]:
+        """As ~/list_components: instance, ComponentInfo and ResourceInfo of all, without ROS names."""
+        return self._runtime.instance_id, component_infos(self._runtime), resource_infos(self._runtime, {})
 
     def handle(self, request: Request) -> Outcome:
         """Do what is asked, or nothing at all, now; ~/state and ~/events tell of it."""

@@ -13,8 +13,9 @@ from mauve_rt.node.executor_requests import Step as ExecutorStep
 from mauve_rt.node.simulated_executor import SimulatedExecutor
 from mauve_rt.node.simulated_topics import Sample, SimulatedTopics, resolved, stamp
 from mauve_rt.node.supervisor_conditions import SilenceCondition
-from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
-from mauve_rt.node.supervisor_messages import architecture_view, decision_message
+from mauve_rt.node.supervisor_engine import Decision, RuleEngine
+from mauve_rt.node.supervisor_messages import architecture_view, decision_message, inventory
+from mauve_rt.node.supervisor_requests import Outcome, Request
 
 _DECISIONS_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -37,7 +38,7 @@ class SimulatedSupervisor:
         self.decisions = f"{self.name}/decisions"
         listed = RulesFile(rules).rules.rules
         pairs = [(rule, self._condition(rule)) for rule in listed]
-        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide)
+        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look)
         self._ended = False
         topics.listen(f"{executor.name}/state", self._on_state)
 
@@ -66,6 +67,9 @@ class SimulatedSupervisor:
     def _hearer(self, condition: SilenceCondition) -> Callable[[Sample], None]:
         return lambda _sample: condition.hear(self._now_s())
 
+    def _look(self) -> None:
+        self._engine.on_inventory(self._now_s(), inventory(*self._executor.listed()))
+
     def _act(self, request: Request) -> None:
         steps = tuple(ExecutorStep(step.kind, step.target, step.name, step.value) for step in request.steps)
         done = self._executor.handle(
@@ -75,6 +79,7 @@ class SimulatedSupervisor:
                 expected_revision=request.expected_revision,
                 requested_by=self.name,
                 cause=request.cause,
+                dry_run=request.dry_run,
             )
         )
         outcome = Outcome(
@@ -82,6 +87,7 @@ class SimulatedSupervisor:
             message=done.message,
             revision=done.revision,
             wrong_revision=done.code is Code.WRONG_REVISION,
+            inactive=done.code is Code.NOT_ACTIVE,
         )
         self._engine.on_outcome(self._now_s(), request.number, outcome)
 

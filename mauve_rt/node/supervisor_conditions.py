@@ -21,6 +21,9 @@ class Condition(Protocol):
     def arm(self, now_s: float) -> None:
         """Start watching: what happened before does not count."""
 
+    def assume(self) -> None:
+        """Take it to hold until something proves otherwise: it did when somebody acted on it."""
+
     def look(self, now_s: float) -> Look:
         """Whether the condition holds now. Called at every check of an armed rule."""
 
@@ -38,23 +41,30 @@ class SilenceCondition:
         self._since_s = 0.0
         self._heard = False
         self._suspected = False
+        self._assumed = False
 
     def arm(self, now_s: float) -> None:
         """Count silence from now on."""
         self._since_s = now_s
         self._heard = False
         self._suspected = False
+        self._assumed = False
+
+    def assume(self) -> None:
+        """Believe in a silence that began before, unless a sample came since arming."""
+        self._assumed = not self._heard
 
     def hear(self, now_s: float) -> None:
         """A sample arrived."""
         self._since_s = now_s
         self._heard = True
+        self._assumed = False
 
     def look(self, now_s: float) -> Look:
         """Whether the silence lasts longer than the limit."""
         silence_s = now_s - self._since_s
         silent = silence_s > self._longer_than_s
-        believed = silent and self._suspected
+        believed = self._assumed or (silent and self._suspected)
         self._suspected = silent
         if not believed:
             return Look(holds=False, reason=f"samples on {self._topic}", silence_s=silence_s)

@@ -1,18 +1,20 @@
 """The rule engine of a supervisor, without ROS and with injected time: one action in flight.
 
-The node calls `tick` at 20 Hz or more, `on_state` with every ~/state and `on_outcome` with the reply to the
-request in flight, all from one thread. What the engine decides goes to two callables.
+The node calls `tick` at 20 Hz or more, `on_state` with every ~/state, `on_outcome` with the reply to a
+request and `on_inventory` with that of ~/list_components, all from one thread. What the engine wants goes to
+three callables.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from mauve_rt.model.rules import Rule
-from mauve_rt.model.steps import Step
+from mauve_rt.node.supervisor_arming import Arming
 from mauve_rt.node.supervisor_conditions import Condition
+from mauve_rt.node.supervisor_inventory import Inventory
+from mauve_rt.node.supervisor_requests import ANSWER_TIMEOUT_S, Outcome, Request
 from mauve_rt.node.supervisor_rule import PRESENT, ArchitectureView, Kind, RuleLife
 
-ANSWER_TIMEOUT_S = 5.0
 STATE_TIMEOUT_S = 2.0
 
 
@@ -26,27 +28,6 @@ class Decision:
     silence_s: float
     revision: int
     message: str = ""
-
-
-@dataclass(frozen=True)
-class Request:
-    """A transaction for the executor. `number` names it in `on_outcome`."""
-
-    number: int
-    steps: Sequence[Step]
-    expected_revision: int
-    cause: str
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The executor's reply, or why there is none."""
-
-    success: bool
-    message: str
-    revision: int = 0
-    wrong_revision: bool = False
-    answered: bool = True  # False: the request did not reach the executor
 
 
 @dataclass
@@ -67,13 +48,16 @@ class RuleEngine:
         *,
         act: Callable[[Request], None],
         decide: Callable[[Decision], None],
+        look: Callable[[], None],
     ) -> None:
+        """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells."""
         self._lives = [RuleLife(rule, condition) for rule, condition in rules]
         self._act = act
         self._decide = decide
         self._view: ArchitectureView | None = None
         self._flight: _Flight | None = None
         self._requests = 0
+        self._arming = Arming(look=look, act=act, number=self._number, tell=self._say)
 
     def tick(self, now_s: float) -> None:
         """Check every condition and act on what is due."""
@@ -87,6 +71,7 @@ class RuleEngine:
             kind = life.wants(now_s)
             if kind is not None:
                 self._consider(life, kind, now_s)
+        self._arming.tick(now_s)
 
     def on_state(self, now_s: float, view: ArchitectureView) -> None:
         """~/state changed."""
@@ -97,12 +82,16 @@ class RuleEngine:
                 self._fail(self._flight, "the executor was started anew meanwhile", now_s)
             for life in self._lives:
                 life.forget()
+            self._arming.forget()
+        self._arming.on_state()
         self._verify(now_s)
         for life in self._lives:
             self._follow(life, view, now_s)
 
     def on_outcome(self, now_s: float, number: int, outcome: Outcome) -> None:
         """The reply to a request; one that is not in flight any more is ignored."""
+        if self._arming.on_outcome(now_s, number, outcome):
+            return
         flight = self._flight
         if flight is None or flight.request.number != number or flight.outcome is not None:
             return
@@ -113,6 +102,11 @@ class RuleEngine:
         flight.outcome = outcome
         flight.deadline_s = now_s + STATE_TIMEOUT_S
         self._verify(now_s)
+
+    def on_inventory(self, now_s: float, inventory: Inventory) -> None:
+        """What ~/list_components says; of another start of the executor than ~/state it is ignored."""
+        if self._view is not None and inventory.instance_id == self._view.instance_id:
+            self._arming.on_inventory(now_s, inventory)
 
     # ---- arming and following the state
 
@@ -128,6 +122,7 @@ class RuleEngine:
             life.arm(now_s)
             running = ", ".join(f"{name} is RUNNING" for name in sorted(life.rule.targets()))
             self._say(life, "armed", running or "the executor is there")
+            self._arming.begin(life, now_s)
         elif life.in_effect and not view.shows(life.rule.do, unknown=True):
             life.in_effect = False
             life.left_alone = True
@@ -161,12 +156,16 @@ class RuleEngine:
             self._send(life, kind, now_s, view)
 
     def _send(self, life: RuleLife, kind: Kind, now_s: float, view: ArchitectureView) -> None:
-        self._requests += 1
         cause = life.cause(kind, now_s)
-        request = Request(self._requests, tuple(life.steps(kind)), view.revision, cause)
+        request = Request(self._number(), tuple(life.steps(kind)), view.revision, cause)
+        life.untouched = False
         self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
         self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))
         self._act(request)
+
+    def _number(self) -> int:
+        self._requests += 1
+        return self._requests
 
     def _excuse(self, life: RuleLife, kind: Kind, reason: str) -> None:
         if life.excused != kind:
@@ -204,15 +203,15 @@ class RuleEngine:
             return
         self._flight = None
         flight.life.settle(flight.kind, now_s)
-        self._say(flight.life, "done", f"{flight.kind}: {present}", message=flight.outcome.message)
+        self._say(flight.life, "done", f"{flight.kind}: {present}", flight.outcome.message)
         self._follow(flight.life, view, now_s)
 
     def _fail(self, flight: _Flight, reason: str, now_s: float, outcome: Outcome | None = None) -> None:
         self._flight = None
         delay_s = flight.life.fail(now_s, wrong_revision=outcome is not None and outcome.wrong_revision)
         reason = f"{flight.kind} failed: {reason}; next try in {delay_s:.2f} s if still needed"
-        self._say(flight.life, "failed", reason, message=outcome.message if outcome else "")
+        self._say(flight.life, "failed", reason, outcome.message if outcome else "")
 
-    def _say(self, life: RuleLife, decision: str, reason: str, *, message: str = "") -> None:
+    def _say(self, life: RuleLife, decision: str, reason: str, message: str = "") -> None:
         revision = self._view.revision if self._view is not None else 0
         self._decide(Decision(life.rule.name, decision, reason, life.last_look.silence_s, revision, message))

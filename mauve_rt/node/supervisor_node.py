@@ -18,15 +18,16 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import Reconfigure
+from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.rule_types import heard_type
 from mauve_rt.model.rules import Rule, RulesFile
 from mauve_rt.node.process import BAD_INPUT, complain
 from mauve_rt.node.setting_parameters import declare_settings
 from mauve_rt.node.supervisor_conditions import Condition, SilenceCondition
-from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
-from mauve_rt.node.supervisor_messages import architecture_view, decision_message
+from mauve_rt.node.supervisor_engine import Decision, RuleEngine
+from mauve_rt.node.supervisor_messages import architecture_view, decision_message, inventory
+from mauve_rt.node.supervisor_requests import Outcome, Request
 from mauve_rt.node.supervisor_settings import PARAMETERS, check_arguments
 from mauve_rt.node.watch import Watch
 
@@ -47,11 +48,14 @@ class Supervisor:
         """
         self._node = node
         self.watch = watch = Watch(node.get_logger().error)
-        self._pending: Any = None
+        self._pending: dict[Any, Any] = {}  # by client, of which changes and dry runs have one each: the last call
         rules = rules_file.rules
         conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
         self._engine = RuleEngine(
-            list(zip(rules.rules, conditions, strict=True)), act=self._act, decide=self._decide
+            list(zip(rules.rules, conditions, strict=True)),
+            act=self._act,
+            decide=self._decide,
+            look=self._look,
         )
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         self._decisions = node.create_publisher(
@@ -59,7 +63,9 @@ class Supervisor:
         )
         executor = node.resolve_topic_name(rules.executor)  # so `-r executor:=boss` names another one
         self._service = node.resolve_service_name(f"{executor}/reconfigure")
-        self._client = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._change = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._try = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._list = node.create_client(ListComponents, f"{executor}/list_components")
         node.create_subscription(
             ArchitectureState,
             f"{executor}/state",
@@ -87,28 +93,45 @@ class Supervisor:
     def _on_state(self, state: Any) -> None:
         self._engine.on_state(time.monotonic(), architecture_view(state))
 
+    def _look(self) -> None:
+        if self._list.service_is_ready():  # if not, the engine looks again
+            on_list = self.watch.guarded("the executor's list", self._on_list)
+            self._call(self._list, ListComponents.Request()).add_done_callback(on_list)
+
+    def _on_list(self, future: Any) -> None:
+        if future.exception() is None:
+            reply = future.result()
+            listed = inventory(reply.instance_id, reply.components, reply.resources)
+            self._engine.on_inventory(time.monotonic(), listed)
+
     def _act(self, request: Request) -> None:
-        if self._pending is not None and not self._pending.done():
-            self._client.remove_pending_request(self._pending)
-        if not self._client.service_is_ready():
+        client = self._try if request.dry_run else self._change
+        if not client.service_is_ready():
             text = f"service {self._service} is not there"
             missing = Outcome(success=False, message=text, answered=False)
             self._engine.on_outcome(time.monotonic(), request.number, missing)
             return
-        self._pending = self._client.call_async(
-            Reconfigure.Request(
-                request_id=str(uuid.uuid4()),
-                expected_revision=request.expected_revision,
-                requested_by=self._node.get_fully_qualified_name(),
-                cause=request.cause,
-                steps=[
-                    ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
-                    for step in request.steps
-                ],
-            )
+        message = Reconfigure.Request(
+            request_id=str(uuid.uuid4()),
+            expected_revision=request.expected_revision,
+            requested_by=self._node.get_fully_qualified_name(),
+            cause=request.cause,
+            steps=[
+                ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
+                for step in request.steps
+            ],
+            dry_run=request.dry_run,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
-        self._pending.add_done_callback(lambda future: on_reply(request.number, future))
+        self._call(client, message).add_done_callback(lambda future: on_reply(request.number, future))
+
+    def _call(self, client: Any, message: Any) -> Any:
+        """Ask; a call before it that got no answer is given up."""
+        pending = self._pending.get(client)
+        if pending is not None and not pending.done():
+            client.remove_pending_request(pending)
+        future = self._pending[client] = client.call_async(message)
+        return future
 
     def _on_reply(self, number: int, future: Any) -> None:
         if future.exception() is not None:
@@ -120,13 +143,18 @@ class Supervisor:
                 message=reply.message,
                 revision=reply.revision,
                 wrong_revision=reply.code == Reconfigure.Response.WRONG_REVISION,
+                inactive=reply.code == Reconfigure.Response.NOT_ACTIVE,
             )
         self._engine.on_outcome(time.monotonic(), number, outcome)
 
     def _decide(self, decision: Decision) -> None:
-        self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
         reply = f" ({decision.message})" if decision.message else ""
-        self._node.get_logger().info(f"{decision.rule}: {decision.decision}: {decision.reason}{reply}")
+        text = f"{decision.rule}: {decision.decision}: {decision.reason}{reply}"
+        if decision.decision == "refused":
+            self._node.get_logger().error(text)
+        else:
+            self._node.get_logger().info(text)
+        self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
 
 
 def run_node(arguments: Sequence[str], stop: threading.Event) -> int:

@@ -72,6 +72,8 @@ class RuleLife:
         self.armed = False
         self.in_effect = False
         self.left_alone = False
+        self.checked = False  # the executor was asked about it, or is being asked
+        self.untouched = True  # nothing was done for it yet since the executor's start
         self.not_before_s = 0.0
         self.revision_floor = 0  # the view must have reached it before the next action
         self.failures = 0
@@ -79,15 +81,24 @@ class RuleLife:
         self._since_s = 0.0
 
     def arm(self, now_s: float) -> None:
-        """Start watching; what is in effect stays so."""
+        """Start watching; what is in effect stays so, until the condition is seen to be false."""
         self.armed = True
         self.condition.arm(now_s)
+        if self.in_effect:
+            self.condition.assume()
         self.last_look = Look(holds=False, reason="")
+        self._since_s = now_s
+
+    def adopt(self, now_s: float) -> None:
+        """What it does was done before it was armed: undo it once the condition has been seen to be false."""
+        self.in_effect = True
+        self.condition.assume()
         self._since_s = now_s
 
     def forget(self) -> None:
         """The executor was started anew: nothing of before counts."""
-        self.armed = self.in_effect = self.left_alone = False
+        self.armed = self.in_effect = self.left_alone = self.checked = False
+        self.untouched = True
         self.not_before_s, self.revision_floor, self.failures, self.excused = 0.0, 0, 0, ""
 
     def watch(self, now_s: float) -> bool:
@@ -129,6 +140,7 @@ class RuleLife:
     def settle(self, kind: Kind, now_s: float) -> None:
         """An action is in place."""
         self.in_effect = kind == "do"
+        self.untouched = False
         self.failures = 0
         self.excused = ""
         self.not_before_s = now_s + self.rule.cooldown_s

@@ -7,7 +7,9 @@ import pytest
 
 from mauve_rt.model.rules import Rule
 from mauve_rt.node.supervisor_conditions import SilenceCondition
-from mauve_rt.node.supervisor_engine import Decision, Outcome, Request, RuleEngine
+from mauve_rt.node.supervisor_engine import Decision, RuleEngine
+from mauve_rt.node.supervisor_inventory import Inventory, ListedComponent
+from mauve_rt.node.supervisor_requests import Outcome, Request
 from mauve_rt.node.supervisor_rule import ArchitectureView, ComponentView
 
 TICK_S = 0.05
@@ -16,7 +18,13 @@ USUAL = "mauve_examples/Exploration"
 
 
 def rule(
-    name: str = "link_lost", *, target: str = "exploration", undo: bool = True, **changes: object
+    name: str = "link_lost",
+    *,
+    target: str = "exploration",
+    undo: bool | list[dict[str, object]] = True,
+    undo_for_s: float = 3.0,
+    usual: str = USUAL,
+    **changes: object,
 ) -> Rule:
     content: dict[str, object] = {
         "name": name,
@@ -24,7 +32,8 @@ def rule(
         "do": [{"kind": "replace_core", "target": target, "name": LOCAL}],
     }
     if undo:
-        content["undo"] = {"for_s": 3.0, "do": [{"kind": "replace_core", "target": target, "name": USUAL}]}
+        back = [{"kind": "replace_core", "target": target, "name": usual}]
+        content["undo"] = {"for_s": undo_for_s, "do": back if undo is True else undo}
     return Rule(**content | changes)
 
 
@@ -37,6 +46,11 @@ class World:
     talking: bool = True
     answering: bool = True
     telling: bool = True  # the executor publishes ~/state
+    listing: bool = True  # the executor answers ~/list_components
+    inactive: bool = False
+    properties: dict[str, str] = field(default_factory=dict)  # of every component
+    known: set[str] = field(default_factory=lambda: {LOCAL, USUAL})  # cores it would take
+    trials: list[Request] = field(default_factory=list)  # dry runs
     refusals: list[Outcome] = field(default_factory=list)  # one for each of the next requests
     decisions: list[Decision] = field(default_factory=list)
     requests: list[Request] = field(default_factory=list)
@@ -48,7 +62,7 @@ class World:
     def __post_init__(self) -> None:
         self.conditions = [SilenceCondition("/in", longer_than_s=1.0) for _ in self.rules]
         pairs = list(zip(self.rules, self.conditions, strict=True))
-        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append)
+        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look)
         self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
         self._last_word_s = self.now_s
 
@@ -70,7 +84,27 @@ class World:
                     condition.hear(self.now_s)
             self.engine.tick(self.now_s)
 
+    def _look(self) -> None:
+        if not self.listing:
+            return
+        components = {
+            name: ListedComponent(state=view.state, core=view.core, properties=self.properties)
+            for name, view in self.components.items()
+        }
+        self.engine.on_inventory(self.now_s, Inventory(self.instance_id, components))
+
+    def _try(self, request: Request) -> None:
+        self.trials.append(request)
+        cores = [step.name for step in request.steps if step.kind == "replace_core"]
+        strange = [core for core in cores if core not in self.known]
+        words = "not active" if self.inactive else f"no core {strange[0]}" if strange else ""
+        outcome = Outcome(success=not words, message=words, inactive=self.inactive)
+        self.engine.on_outcome(self.now_s, request.number, outcome)
+
     def _act(self, request: Request) -> None:
+        if request.dry_run:
+            self._try(request)
+            return
         self.requests.append(request)
         self.asked_at_s.append(self.now_s)
         if not self.answering:
@@ -316,7 +350,11 @@ def test_one_action_at_a_time():
     assert [d.rule for d in world.decisions if d.decision == "suppressed"] == ["two"]
     world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
     world.answering = True
-    world.engine.on_outcome(world.now_s, 1, Outcome(success=True, message="", revision=world.revision))
+    world.engine.on_outcome(
+        world.now_s,
+        world.requests[0].number,
+        Outcome(success=True, message="", revision=world.revision),
+    )
     world.run(0.1)
     assert [request.steps[0].target for request in world.requests] == ["exploration", "mapping"]
 
@@ -358,3 +396,142 @@ def test_an_executor_that_dies_with_an_action_in_flight():
     assert world.said()[-2:] == ["failed", "armed"]
     world.run(1.5)
     assert world.said()[-1] == "done"
+
+
+def after_a_restart(*rules: Rule, **world: object) -> World:
+    """A supervisor that starts when an executor runs the other core already."""
+    later = World(list(rules) or [rule()], **world)  # type: ignore[arg-type]
+    later.talking = False
+    later.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    return later
+
+
+def test_what_a_supervisor_before_did_is_adopted_and_undone_when_the_link_has_been_back_long_enough():
+    world = after_a_restart()
+    assert world.said() == ["armed", "adopted"]
+    world.run(5.0)
+    assert world.requests == []  # nobody was heard yet: the link may still be lost
+    world.talking = True
+    back_s = world.now_s
+    world.run(4.0)
+    assert world.cores() == [USUAL]
+    assert world.asked_at_s[0] - back_s >= 3.0
+    assert world.said()[-3:] == ["condition_false", "undo", "done"]
+    world.talking = False
+    world.run(2.0)
+    assert world.cores() == [USUAL, LOCAL]
+
+
+def test_an_undo_that_dwells_shorter_than_the_silence_lasts_does_not_flap_after_a_restart():
+    world = after_a_restart(rule(undo_for_s=0.2))
+    world.run(5.0)
+    assert world.requests == []
+    world.tell({"exploration": ComponentView("FAULTED", LOCAL)})
+    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    assert world.said()[-2:] == ["suppressed", "armed"]
+    world.run(5.0)
+    assert world.requests == []
+    world.talking = True
+    world.run(1.0)
+    assert world.cores() == [USUAL]
+
+
+def test_what_has_no_undo_or_is_undone_already_is_not_adopted():
+    assert after_a_restart(rule(undo=False)).said() == ["armed"]
+    assert after_a_restart(rule(usual=LOCAL)).said() == ["armed"]
+
+
+def test_what_only_the_list_of_components_shows_is_adopted():
+    def gain(value: float) -> dict[str, object]:
+        return {"kind": "set_property", "target": "exploration", "name": "gain", "value": value}
+
+    careful = rule(do=[gain(0.5)], undo=[gain(2.0)])
+    assert after_a_restart(careful, properties={"gain": "0.50"}).said() == ["armed", "adopted"]
+    assert after_a_restart(careful, properties={"gain": "0.51"}).said() == ["armed"]
+
+
+def test_a_list_that_comes_late_is_asked_for_again_and_one_of_another_start_is_ignored():
+    world = after_a_restart(listing=False)
+    other = Inventory("zeroth", {"exploration": ListedComponent(state="RUNNING", core=LOCAL)})
+    world.engine.on_inventory(world.now_s, other)
+    world.run(0.5)
+    assert world.said() == ["armed"]
+    world.listing = True
+    world.run(1.1)
+    assert world.said()[1] == "adopted"
+
+
+def test_a_person_s_swap_while_the_supervisor_runs_is_not_adopted():
+    world = started()
+    world.run(1.0)
+    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    world.tell({"exploration": ComponentView("STOPPED", LOCAL)})
+    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    world.run(8.0)
+    assert world.requests == []
+    assert "adopted" not in world.said()
+
+
+def test_an_executor_started_anew_in_its_first_state_owes_the_rule_nothing():
+    world = after_a_restart()
+    world.instance_id = "second"
+    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.talking = True
+    world.run(5.0)
+    assert world.requests == []
+    assert world.said() == ["armed", "adopted", "armed"]
+
+
+def test_what_the_executor_would_refuse_is_told_at_arming():
+    world = World([rule()], known={USUAL})
+    world.tell()
+    world.run(1.0)
+    assert world.said() == ["armed", "refused"]
+    assert world.decisions[1].message == f"no core {LOCAL}"
+    assert f"do: replace_core exploration {LOCAL}" in world.decisions[1].reason
+    assert world.requests == []
+
+
+def test_an_undo_is_tried_after_its_do_and_told_too():
+    world = World([rule()], known={LOCAL})
+    world.tell()
+    world.run(1.0)
+    assert [[step.name for step in trial.steps] for trial in world.trials] == [[LOCAL], [LOCAL, USUAL]]
+    assert [trial.dry_run for trial in world.trials] == [True, True]
+    assert world.said() == ["armed", "refused"]
+    assert "to undo: replace_core" in world.decisions[1].reason
+
+
+def test_an_undo_of_what_is_in_effect_is_tried_alone():
+    world = after_a_restart(known={LOCAL})
+    world.run(0.5)
+    assert [[step.name for step in trial.steps] for trial in world.trials] == [[USUAL]]
+    assert world.said()[:3] == ["armed", "adopted", "condition_true"]
+    assert "refused" in world.said()
+
+
+def test_rules_are_checked_once_for_each_start_of_the_executor():
+    world = started(rule("one"), rule("two", target="mapping"))
+    world.run(2.0)
+    assert len(world.trials) == 4
+    world.tell({"exploration": ComponentView("STOPPED", USUAL)})
+    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.run(2.0)
+    assert len(world.trials) == 4
+    world.instance_id = "second"
+    world.tell()
+    world.run(2.0)
+    assert len(world.trials) == 8
+
+
+def test_an_executor_that_is_not_active_is_asked_again_when_its_state_changes():
+    start = [{"kind": "start", "target": "exploration"}]
+    world = World([rule(undo=False, do=start)], inactive=True)
+    world.tell({"exploration": ComponentView("STOPPED", USUAL)})
+    world.run(5.0)
+    assert len(world.trials) == 1
+    assert "refused" not in world.said()
+    world.inactive = False
+    world.tell()
+    world.run(0.2)
+    assert len(world.trials) == 2

@@ -38,11 +38,11 @@ class Band:
     def __init__(self, folder: Path) -> None:
         self.domain = random.randint(1, 50)  # noqa: S311
         self.playing = True
+        self.folder = folder
         self.decisions: list[Any] = []
         self.states: list[Any] = []
-        (folder / "rules.yaml").write_text(RULES, encoding="utf-8")
         self.start_executor()
-        self.supervisor_process = self._start("supervisor", f"rules:={folder / 'rules.yaml'}")
+        self.start_supervisor()
         self.context = Context()
         rclpy.init(context=self.context, domain_id=self.domain)
         self.node = Node("peer", context=self.context)
@@ -60,6 +60,16 @@ class Band:
         assert share is not None
         architecture = share / "architecture" / "metronome.yaml"
         self.executor_process = self._start("executor", f"architecture:={architecture}")
+
+    def start_supervisor(self, rules: str = RULES) -> None:
+        path = self.folder / "rules.yaml"
+        path.write_text(rules, encoding="utf-8")
+        self.supervisor_process = self._start("supervisor", f"rules:={path}")
+
+    def kill_supervisor(self) -> str:
+        """What it had written to stderr."""
+        self.supervisor_process.kill()
+        return self.supervisor_process.communicate()[1]
 
     def _start(self, node: str, parameter: str) -> subprocess.Popen[str]:
         return subprocess.Popen(
@@ -94,7 +104,7 @@ class Band:
     def close(self) -> None:
         for process in (self.executor_process, self.supervisor_process):
             process.kill()
-            process.communicate()
+            process.wait()
         self.spinner.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self.context)
@@ -129,6 +139,53 @@ def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: B
     band.playing = False
     band.until(lambda: band.said()[-1:] == ["done"])
     band.until(lambda: band.core() == "mauve_examples/Accelerando")
+
+
+def degraded(band: Band) -> None:
+    """The rule acted, and its supervisor is gone."""
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.until(lambda: band.core() == "mauve_examples/Accelerando" and "done" in band.said())
+    band.kill_supervisor()
+    band.decisions.clear()
+
+
+def test_a_supervisor_started_anew_undoes_what_the_one_before_did(band: Band):
+    degraded(band)
+    band.start_supervisor()
+    band.until(lambda: band.said()[:3] == ["armed", "adopted", "condition_true"])
+    assert band.core() == "mauve_examples/Accelerando"  # nobody plays yet
+    band.playing = True
+    band.until(lambda: band.said()[3:] == ["condition_false", "undo", "done"])
+    band.until(lambda: band.core() == "mauve_examples/Metronome")
+    assert "quiet: adopted: " in band.kill_supervisor()
+
+
+def test_an_executor_started_anew_while_degraded_is_as_its_file_says(band: Band):
+    degraded(band)
+    band.start_supervisor()
+    band.until(lambda: "adopted" in band.said())
+    band.executor_process.kill()
+    band.executor_process.communicate()
+    band.start_executor()
+    band.until(lambda: band.said().count("armed") == 2)
+    band.until(lambda: band.said()[-2:] == ["do", "done"])
+    band.until(lambda: band.core() == "mauve_examples/Accelerando")
+    assert band.said().count("adopted") == 1
+    assert "undo" not in band.said()
+
+
+def test_rules_that_the_executor_would_refuse_are_told_at_arming(band: Band):
+    band.kill_supervisor()
+    band.decisions.clear()
+    band.start_supervisor(RULES.replace("Accelerando", "NoSuchCore"))
+    band.until(lambda: "refused" in band.said())
+    refused = next(decision for decision in band.decisions if decision.decision == "refused")
+    assert "would refuse to do: replace_core metronome mauve_examples/NoSuchCore" in refused.reason
+    assert refused.message.startswith("core 'mauve_examples/NoSuchCore' is not installed")
+    errors = band.kill_supervisor()
+    assert "[ERROR]" in errors
+    assert "quiet: refused: " in errors
 
 
 def test_both_end_cleanly_on_ctrl_c(band: Band):

@@ -1,0 +1,93 @@
+"""A supervisor in virtual time: what it tells when it is armed."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float64
+
+from mauve_rt._kernel import Simulation
+from mauve_rt.model.ament_index import share_folder
+from mauve_rt.node.simulated_executor import SimulatedExecutor
+from mauve_rt.node.simulated_supervisor import SimulatedSupervisor
+from mauve_rt.node.simulated_topics import SimulatedTopics
+
+RULES = """\
+mauve: 1
+rules:
+  - name: quiet
+    when: {silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}
+    do: [{kind: replace_core, target: metronome, name: mauve_examples/DO}]
+    undo: {for_s: 0.5, do: [{kind: replace_core, target: metronome, name: mauve_examples/UNDO}]}
+"""
+
+
+class Stage:
+    """The metronome and its supervisor."""
+
+    def __init__(self, folder: Path, *, do: str, undo: str) -> None:
+        share = share_folder("mauve_examples")
+        assert share is not None
+        rules = folder / "rules.yaml"
+        rules.write_text(RULES.replace("UNDO", undo).replace("DO", do), encoding="utf-8")
+        self.time = Simulation()
+        self.topics = SimulatedTopics()
+        architecture = share / "architecture" / "metronome.yaml"
+        self.executor = SimulatedExecutor(
+            self.time, self.topics, architecture, folder / "bag", complain=pytest.fail
+        )
+        self.supervisor = SimulatedSupervisor(self.time, self.topics, self.executor, rules)
+        self.decisions: list[Any] = []
+        self.topics.listen(self.supervisor.decisions, lambda sample: self.decisions.append(sample.message()))
+        self.executor.activate()
+        self.time.every(self.time.now_ns(), 20_000_000, self.supervisor.tick)
+
+    def run(self, seconds: float, *, playing: bool = False) -> None:
+        for _ in range(round(seconds * 10)):
+            if playing:
+                now_ns = self.time.now_ns()
+                self.topics.say(
+                    "/peer", "std_msgs/msg/Float64", Float64(), time_ns=now_ns, qos=QoSProfile(depth=1)
+                )
+            self.time.run_until(self.time.now_ns() + 100_000_000)
+
+    def said(self) -> list[str]:
+        return [decision.decision for decision in self.decisions]
+
+    def core(self) -> str:
+        return self.executor.components()[0].core.removeprefix("mauve_examples/")
+
+
+@pytest.fixture
+def stage(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Stage]:
+    stage = Stage(tmp_path, **request.param)
+    yield stage
+    stage.supervisor.close()
+    stage.executor.close()
+    stage.time.shutdown()
+
+
+@pytest.mark.parametrize("stage", [{"do": "Metronome", "undo": "Accelerando"}], indirect=True)
+def test_what_is_in_effect_when_it_is_armed_is_adopted_and_undone(stage: Stage):
+    stage.run(5.0)
+    assert stage.said() == ["armed", "adopted", "condition_true"]
+    assert stage.core() == "Metronome"
+    stage.run(1.0, playing=True)
+    assert stage.said()[3:] == ["condition_false", "undo", "done"]
+    assert stage.core() == "Accelerando"
+
+
+@pytest.mark.parametrize("stage", [{"do": "NoSuchCore", "undo": "Metronome"}], indirect=True)
+def test_what_the_executor_would_refuse_is_told_when_it_is_armed(stage: Stage):
+    stage.run(1.0, playing=True)
+    assert stage.said() == ["armed", "refused"]
+    assert stage.decisions[1].message.startswith("core 'mauve_examples/NoSuchCore' is not installed")
+
+
+@pytest.mark.parametrize("stage", [{"do": "Accelerando", "undo": "Metronome"}], indirect=True)
+def test_rules_that_the_executor_takes_are_armed_and_no_more(stage: Stage):
+    stage.run(1.0, playing=True)
+    assert stage.said() == ["armed"]
+    assert stage.core() == "Metronome"
