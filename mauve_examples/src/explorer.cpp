@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "mauve_examples/tile_runs.hpp"
+
 namespace mauve_examples {
 
 void Explorer::configure(const GridGeometry& geometry, std::string_view name,
@@ -46,7 +48,8 @@ void Explorer::receive(const PeerMessage& message) noexcept {
   // Tiles of another grid mean nothing here, but its sender shall not wait for them for ever.
   peer.merged_batch = message.map_batch;
   if (!same_grid) return;
-  for (const MapTile& tile : message.tiles) map_.merge(tile);
+  MapTile tile;
+  for (std::size_t position = 0; read_tile(message.map_runs, position, tile);) map_.merge(tile);
 }
 
 void Explorer::look(const Pose2D& robot, std::int64_t now_ns) noexcept {
@@ -124,7 +127,8 @@ void Explorer::compose(PeerMessage& message) noexcept {
   message.resolution_m = geometry().resolution_m;
   message.origin_x_m = geometry().origin_x_m;
   message.origin_y_m = geometry().origin_y_m;
-  message.tiles = sender_.tiles();
+  message.tiles.clear();
+  message.map_runs = sender_.runs();
 }
 
 }  // namespace mauve_examples

@@ -43,7 +43,12 @@ void MappingCore::integrate() {
   shell().map_update([&](OccupancyGrid& map) {
     if (has_scan) integrate_scan(*scan_, pose_, map);
     update_->tiles.clear();
-    changes_.collect(map, update_->tiles);
+    changes_.collect(map, [&](std::size_t tile) {
+      TileList& tiles = update_->tiles;
+      if (!tiles.resize(tiles.size() + 1)) return false;
+      map.copy_tile(tile, tiles[tiles.size() - 1]);
+      return true;
+    });
   });
   if (update_->tiles.empty()) return;
   update_->stamp_ns = clock_ns();

@@ -2,9 +2,14 @@
 // Who takes which frontier, and what is said about it: peers, batches of tiles, bids, rounds.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "mauve_examples/explorer.hpp"
+#include "mauve_examples/tile_runs.hpp"
 #include "test_maps.hpp"
 
 namespace mauve_examples {
@@ -62,27 +67,83 @@ TEST(PeerTable, AloneEverybodyHasAnswered) {
   EXPECT_TRUE(peers.all_answered(1));
 }
 
+std::vector<MapTile> tiles_of(const TileRuns& runs) {
+  std::vector<MapTile> tiles;
+  MapTile tile;
+  for (std::size_t position = 0; read_tile(runs, position, tile);) tiles.push_back(tile);
+  return tiles;
+}
+
+TEST(TileRuns, HoldTilesAsTheyAre) {
+  TileRuns runs;
+  MapTile uniform;
+  uniform.column = 300;
+  uniform.row = 7;
+  uniform.cells.fill(kFree);
+  ASSERT_TRUE(append_tile(uniform, runs));
+  EXPECT_EQ(runs.size(), 8U) << "a tile without walls costs next to nothing";
+  MapTile mixed;
+  for (std::size_t i = 0; i < kTileCells; ++i)
+    mixed.cells[i] = std::array{kFree, kOccupied, kUnknown}[i / 5 % 3];
+  ASSERT_TRUE(append_tile(mixed, runs));
+  const std::vector<MapTile> read = tiles_of(runs);
+  ASSERT_EQ(read.size(), 2U);
+  EXPECT_EQ(read[0].column, 300);
+  EXPECT_EQ(read[0].row, 7);
+  EXPECT_EQ(read[0].cells, uniform.cells);
+  EXPECT_EQ(read[1].cells, mixed.cells);
+}
+
+TEST(TileRuns, ATileWithoutRoomIsNotBegun) {
+  MapTile worst;
+  for (std::size_t i = 0; i < kTileCells; ++i) worst.cells[i] = i % 2 == 0 ? kFree : kUnknown;
+  TileRuns runs;
+  while (append_tile(worst, runs)) {
+  }
+  EXPECT_EQ(runs.size(), TileRuns::capacity() / 260 * 260);
+  EXPECT_EQ(tiles_of(runs).size(), TileRuns::capacity() / 260);
+}
+
+TEST(TileRuns, WhatIsNoTileEndsThem) {
+  MapTile tile;
+  tile.cells.fill(kOccupied);
+  TileRuns whole;
+  append_tile(tile, whole);
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    TileRuns cut = whole;
+    cut.resize(size);
+    EXPECT_TRUE(tiles_of(cut).empty()) << size;
+  }
+  TileRuns no_state = whole;
+  no_state[4] = 0xFF;
+  EXPECT_TRUE(tiles_of(no_state).empty());
+  TileRuns too_long = whole;
+  too_long[4] = 0x40;
+  EXPECT_TRUE(tiles_of(too_long).empty());
+}
+
 TEST(TileSender, ABatchStaysUnderWayUnchangedUntilAllHaveIt) {
   OccupancyGrid own;
   own.configure({160, 160, 1.0, 0.0, 0.0});
   MergedMap map;
   map.configure(own.geometry());
-  for (int i = 0; i < 100; ++i) own.observe_free({i % 10 * 16, i / 10 * 16});
+  // Every second cell of 100 tiles: nothing is dearer.
+  for (int i = 0; i < 160 * 160; i += 2) own.observe_free({i % 160, i / 160});
   map.refresh(own);
   TileSender sender;
   sender.configure(map.tile_count());
   sender.start(map);
   EXPECT_EQ(sender.batch(), 1U);
-  ASSERT_EQ(sender.tiles().size(), kMaxTilesPerMessage);
-  const MapTile first = sender.tiles()[0];
-  own.observe_free({first.column * 16 + 1, first.row * 16});
+  const std::vector<MapTile> sent = tiles_of(sender.runs());
+  ASSERT_EQ(sent.size(), 63U);
+  own.observe_free({sent[0].column * 16 + 1, sent[0].row * 16});
   map.refresh(own);
   sender.start(map);
-  EXPECT_EQ(sender.tiles()[0].revision, first.revision);
+  EXPECT_EQ(tiles_of(sender.runs())[0].cells, sent[0].cells);
   sender.confirm();
   sender.start(map);
   EXPECT_EQ(sender.batch(), 2U);
-  EXPECT_EQ(sender.tiles().size(), 37U);  // the other 36 and the one that changed meanwhile
+  EXPECT_EQ(tiles_of(sender.runs()).size(), 38U);  // the other 37 and the one that changed meanwhile
   sender.confirm();
   sender.start(map);
   EXPECT_EQ(sender.batch(), 0U);
@@ -90,6 +151,75 @@ TEST(TileSender, ABatchStaysUnderWayUnchangedUntilAllHaveIt) {
   sender.start(map);
   EXPECT_EQ(sender.batch(), 3U);
 }
+
+/// The same world in finer cells.
+GridMap refined(const GridMap& coarse, double resolution_m) {
+  GridMap fine;
+  fine.resolution_m = resolution_m;
+  fine.origin_x_m = coarse.origin_x_m;
+  fine.origin_y_m = coarse.origin_y_m;
+  fine.width = static_cast<int>(coarse.width * coarse.resolution_m / resolution_m);
+  fine.height = static_cast<int>(coarse.height * coarse.resolution_m / resolution_m);
+  fine.cells.resize(fine.cell_count());
+  for (std::size_t i = 0; i < fine.cells.size(); ++i) {
+    const Point at = fine.centre(fine.cell(i));
+    fine.cells[i] = coarse.cells[coarse.index(coarse.cell_at(at.x, at.y))];
+  }
+  return fine;
+}
+
+class LateLinks : public ::testing::TestWithParam<double> {};
+
+TEST_P(LateLinks, FourRobotsKnowTheSameWithin20Seconds) {
+  // While the link was down the first has explored the whole office, 48 m x 32 m, the others a quarter each.
+  const GridMap world = refined(load_map(testing::own_map("office")), GetParam());
+  constexpr std::size_t kRobots = 4;
+  constexpr std::array kNames{"robot_1", "robot_2", "robot_3", "robot_4"};
+  std::vector<std::unique_ptr<Explorer>> robots;
+  for (std::size_t i = 0; i < kRobots; ++i) {
+    OccupancyGrid own;
+    own.configure(world);
+    for (std::size_t cell = 0; cell < world.cells.size(); ++cell) {
+      const Cell at = world.cell(cell);
+      const int quarter = at.column * 2 / world.width + 2 * (at.row * 2 / world.height);
+      if (i != 0 && quarter != static_cast<int>(i)) continue;
+      if (world.cells[cell] == kFree) own.observe_free(at);
+      if (world.cells[cell] == kOccupied) own.observe_hit(at);
+    }
+    std::vector<std::string> peers;
+    for (std::size_t j = 0; j < kRobots; ++j) {
+      if (j != i) peers.emplace_back(kNames[j]);
+    }
+    robots.push_back(std::make_unique<Explorer>());
+    robots[i]->configure(world, kNames[i], peers, {});
+    robots[i]->refresh(own);
+  }
+
+  // The exploration's period is 500 ms; the robots' are out of step.
+  constexpr int kTicksOf20s = 40;
+  auto message = std::make_unique<PeerMessage>();
+  int ticks = 0;
+  const auto agree = [&] {
+    return std::all_of(robots.begin(), robots.end(), [&](const auto& robot) {
+      return std::equal(robot->map().cells().begin(), robot->map().cells().end(), world.cells.begin());
+    });
+  };
+  while (!agree() && ticks < 200) {
+    ++ticks;
+    for (std::size_t i = 0; i < kRobots; ++i) {
+      robots[i]->compose(*message);
+      EXPECT_LE(message->tiles.size() * sizeof(MapTile) + message->map_runs.size(), 16384U)
+          << "what a robot sends is bounded";
+      for (std::size_t j = 0; j < kRobots; ++j) {
+        if (j != i) robots[j]->receive(*message);
+      }
+    }
+  }
+  EXPECT_LE(ticks, kTicksOf20s);
+  RecordProperty("seconds", std::to_string(0.5 * ticks));
+}
+
+INSTANTIATE_TEST_SUITE_P(Resolutions, LateLinks, ::testing::Values(0.1, 0.05, 0.03));
 
 FrontierList frontiers(std::initializer_list<Frontier> list) {
   FrontierList result;

@@ -21,18 +21,18 @@ class ChangedTiles {
     next_ = 0;
   }
 
-  /// Fills the list with changed tiles until it is full; `map` offers revision(tile) and copy_tile(tile,
-  /// MapTile&). [rt]
-  template <typename Map>
-  void collect(const Map& map, TileList& tiles) noexcept {
+  /// Calls take(tile) for changed tiles until it returns false, which leaves that tile for the next time; `map`
+  /// offers revision(tile). [rt]
+  template <typename Map, typename Take>
+  void collect(const Map& map, Take&& take) noexcept {
     const std::size_t count = seen_.size();
-    for (std::size_t looked = 0; looked < count && !tiles.full(); ++looked) {
+    for (std::size_t looked = 0; looked < count; ++looked) {
       const std::size_t tile = next_;
+      if (map.revision(tile) != seen_[tile]) {
+        if (!take(tile)) return;
+        seen_[tile] = map.revision(tile);
+      }
       next_ = (next_ + 1) % count;  // goes on here next time: tiles that change all the time starve none
-      if (map.revision(tile) == seen_[tile]) continue;
-      seen_[tile] = map.revision(tile);
-      tiles.resize(tiles.size() + 1);
-      map.copy_tile(tile, tiles[tiles.size() - 1]);
     }
   }
 

@@ -18,11 +18,11 @@ class TileSender {
   void configure(std::size_t tile_count);
 
   /// Number of the batch under way; 0: none. [rt]
-  std::uint32_t batch() const noexcept { return tiles_.empty() ? 0 : batch_; }
-  const TileList& tiles() const noexcept { return tiles_; }
+  std::uint32_t batch() const noexcept { return runs_.empty() ? 0 : batch_; }
+  const TileRuns& runs() const noexcept { return runs_; }
 
   /// Every peer has the batch under way. [rt]
-  void confirm() noexcept { tiles_.clear(); }
+  void confirm() noexcept { runs_.clear(); }
   /// Starts the next batch if none is under way and tiles have changed since they were sent. [rt]
   void start(const MergedMap& map) noexcept;
   /// A peer lost its memory: everything is sent again. [rt]
@@ -30,7 +30,7 @@ class TileSender {
 
  private:
   ChangedTiles changes_;
-  TileList tiles_;
+  TileRuns runs_;  // of the batch under way
   std::uint32_t batch_{0};
 };
 

@@ -25,6 +25,16 @@ inline constexpr std::size_t kBeamCount = 360;
 struct Scan {
   float max_range_m{0.0F};
   std::array<float, kBeamCount> ranges_m{};  // infinity: nothing within max_range_m
+  std::array<std::uint8_t, kBeamCount>
+      robots{};  // number of the robot the beam ended at; 0: at something else
+};
+
+/// Where a robot's body is.
+struct RobotBody {
+  std::uint8_t number{0};  // what is written on it; from 1
+  double x{0.0};
+  double y{0.0};
+  double radius_m{0.0};
 };
 
 inline constexpr int kTileSide = 16;
@@ -41,6 +51,9 @@ struct MapTile {
 inline constexpr std::size_t kMaxTilesPerMessage = 64;
 
 using TileList = mauve::BoundedVector<MapTile, kMaxTilesPerMessage>;
+
+/// Tiles as runs of equal cells, one tile after the other; see PeerMessage.msg and tile_runs.hpp.
+using TileRuns = mauve::BoundedVector<std::uint8_t, 16384>;
 
 /// Tiles of a robot's own map that changed.
 struct MapUpdate {
@@ -88,16 +101,18 @@ struct PeerMessage {
   double resolution_m{0.0};
   double origin_x_m{0.0};
   double origin_y_m{0.0};
-  TileList tiles;
+  TileList tiles;  // none any more: see map_runs
+  TileRuns map_runs;
 };
 
 }  // namespace mauve_examples
 
-MAUVE_TYPE(mauve_examples::Scan, "mauve_examples/Scan", max_range_m, ranges_m)
+MAUVE_TYPE(mauve_examples::Scan, "mauve_examples/Scan", max_range_m, ranges_m, robots)
+MAUVE_TYPE(mauve_examples::RobotBody, "mauve_msgs/msg/RobotBody", number, x, y, radius_m)
 MAUVE_TYPE(mauve_examples::MapTile, "mauve_msgs/msg/MapTile", column, row, revision, cells)
 MAUVE_TYPE(mauve_examples::MapUpdate, "mauve_msgs/msg/MapUpdate", stamp_ns, resolution_m, origin_x_m,
            origin_y_m, columns, rows, tiles)
 MAUVE_TYPE(mauve_examples::Bid, "mauve_msgs/msg/Bid", x, y, cost_m)
 MAUVE_TYPE(mauve_examples::PeerAck, "mauve_msgs/msg/PeerAck", peer, sequence, round, map_batch)
 MAUVE_TYPE(mauve_examples::PeerMessage, "mauve_msgs/msg/PeerMessage", sender, sequence, round, bids,
-           has_claim, claim, acks, x, y, map_batch, resolution_m, origin_x_m, origin_y_m, tiles)
+           has_claim, claim, acks, x, y, map_batch, resolution_m, origin_x_m, origin_y_m, tiles, map_runs)
