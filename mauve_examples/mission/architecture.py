@@ -82,7 +82,7 @@ def write_setups(world: World, folder: Path, *, seed: int, supervisor: bool) -> 
     setups = []
     for index, (name, pose) in enumerate(world.starts.items()):
         architecture = folder / "architecture" / f"{name}.yaml"
-        changes = {"map": str(world.map_file), "seed": seed + index}
+        changes = {"map": str(world.map_file), "seed": seed + index, "number": index + 1}
         changes |= dict(zip(("start_x", "start_y", "start_yaw"), pose, strict=True))
         peers = [peer for peer in world.starts if peer != name]
         cpu = cpus[index % len(cpus)]

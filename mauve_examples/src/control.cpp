@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_examples/control.hpp"
 
+#include "mauve_examples/robots_in_sight.hpp"
+
 namespace mauve_examples {
 
 bool ControlCore::configure_hook() {
   controller_.reset();
+  scan_ = std::make_unique<Scan>();
   return true;
 }
 
@@ -20,7 +23,9 @@ void ControlCore::control() {
     shell().command.write({});
     return;
   }
-  shell().command.write(controller_.step(pose.value, target.value, static_cast<double>(period_ns()) * 1e-9));
+  shell().scan.read(*scan_);
+  const Twist wanted = controller_.step(pose.value, target.value, static_cast<double>(period_ns()) * 1e-9);
+  shell().command.write(keep_apart(wanted, *scan_, ApartOptions{}));
 }
 
 void ControlFsm::define() {

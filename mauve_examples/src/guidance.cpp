@@ -1,56 +1,45 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_examples/guidance.hpp"
 
-#include <algorithm>
-
 #include "mauve_examples/map_file.hpp"
+#include "mauve_examples/ray_caster.hpp"
 
 namespace mauve_examples {
 
-namespace {
-
-constexpr double kLookAhead_m = 4.0;
-constexpr std::int64_t kPatience_ns = mauve::s_to_ns(2);
-
-}  // namespace
-
 bool GuidanceCore::configure_hook() {
   const GridMap world = load_map(shell().map.value());
-  navigator_.configure(world, PlanOptions{});
-  cells_.assign(world.cell_count(), kUnknown);
-  has_goal_ = needs_path_ = false;
+  pilot_.configure(world, static_cast<std::uint8_t>(shell().number.value()));
+  scan_ = std::make_unique<Scan>();
+  (void)beam_table();  // computed at its first use, which is not to be in real time
   return true;
 }
 
 void GuidanceCore::read_inputs() {
-  position_ = shell().pose.read().value;
-  const mauve::Sample<Point> goal = shell().goal.read();
-  if (goal.status == mauve::DataStatus::none) return;
-  if (!has_goal_ || distance_m(goal.value, planned_goal_) > 0.0) needs_path_ = true;
-  has_goal_ = true;
-  goal_ = goal.value;
-  shell().map_get([this](const OccupancyGrid& map) { std::ranges::copy(map.cells(), cells_.begin()); });
-  const bool blocked = has_path() && navigator_.blocked(cells_, position_, kLookAhead_m);
-  if (navigator_.stalled(position_, clock_ns(), kPatience_ns) || blocked) needs_path_ = true;
+  const mauve::Sample<Pose2D> pose = shell().pose.read();
+  if (pose.status == mauve::DataStatus::none) return;
+  shell().scan.read(*scan_);
+  if (const mauve::Sample<Point> goal = shell().goal.read(); goal.status != mauve::DataStatus::none)
+    pilot_.set_goal(goal.value);
+  shell().map_get([this](const OccupancyGrid& map) { pilot_.read_map(map.cells()); });
+  pilot_.look(*scan_, pose.value, clock_ns());
 }
 
-bool GuidanceCore::has_new_goal() const { return has_goal_ && needs_path_; }
+bool GuidanceCore::has_new_goal() const { return pilot_.wants_path(); }
 
-bool GuidanceCore::has_path() const { return !navigator_.path().finished(); }
+bool GuidanceCore::has_path() const { return pilot_.has_path(); }
 
 void GuidanceCore::compute_path() {
-  planned_goal_ = goal_;
-  needs_path_ = navigator_.plan(cells_, position_, goal_, shell().path_step) != PlanStatus::found;
+  pilot_.plan(shell().path_step);
   write_target();
 }
 
 void GuidanceCore::follow_path() {
-  navigator_.follow(cells_, position_, shell().target_threshold);
+  pilot_.follow(shell().target_threshold);
   write_target();
 }
 
 void GuidanceCore::write_target() {
-  if (has_path()) shell().target.write(navigator_.path().target());
+  if (has_path()) shell().target.write(pilot_.target());
 }
 
 void GuidanceFsm::define() {

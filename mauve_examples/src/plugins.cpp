@@ -13,6 +13,7 @@ MAUVE_PLUGINS(registry) {
   registry.type<Twist>();
   registry.type<Bool>();
   registry.type<Scan>();
+  registry.type<RobotBody>();
   registry.type<MapUpdate>();
   registry.type<PeerMessage>();
   registry.resource<OccupancyMap>("mauve_examples/OccupancyMap");

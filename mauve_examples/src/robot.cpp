@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_examples/robot.hpp"
 
+#include <algorithm>
+
 #include "mauve_examples/disc_collision.hpp"
 #include "mauve_examples/ray_caster.hpp"
 
@@ -22,6 +24,8 @@ bool RobotCore::configure_hook() {
   }
   scan_ = std::make_unique<Scan>();
   (void)beam_table();  // computed at its first use, which is not to be in real time
+  others_.clear();
+  steps_ = 0;
   collisions_ = 0;
   collision_mark_ = mauve::TraceNames::intern("collision");
   return true;
@@ -47,8 +51,27 @@ void RobotCore::move() {
   body_ = next;
 }
 
+void RobotCore::meet_others() {
+  constexpr std::int64_t kStepsPerTelling = 5;  // 20 Hz
+  const auto number = static_cast<std::uint8_t>(shell().number.value());
+  RobotBody body;
+  while (shell().bodies.read(body) == mauve::DataStatus::new_data) {
+    if (body.number == number) continue;
+    const auto known = std::ranges::find(others_, body.number, &RobotBody::number);
+    if (known != others_.end()) {
+      *known = body;
+    } else {
+      others_.push_back(body);
+    }
+  }
+  if (steps_++ % kStepsPerTelling == 0)
+    shell().body.write({number, body_.pose.x, body_.pose.y, shell().radius.value()});
+}
+
 void RobotCore::sense() {
+  meet_others();
   range_scan(world_, body_.pose, static_cast<float>(shell().max_range.value()), *scan_);
+  scan_robots(others_, body_.pose, *scan_);
   // One right after the other: who reads both on another CPU seldom gets one of them without the other.
   shell().pose.write(body_.pose);
   shell().scan.write(*scan_);
@@ -57,6 +80,7 @@ void RobotCore::sense() {
 void RobotCore::take(mauve::CoreBase& old) noexcept {
   if (const auto* robot = dynamic_cast<const RobotCore*>(&old)) {
     body_ = robot->body_;
+    others_ = robot->others_;
     collisions_ = robot->collisions_;
   }
 }

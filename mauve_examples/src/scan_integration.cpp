@@ -16,8 +16,9 @@ void integrate_scan(const Scan& scan, const Pose2D& pose, OccupancyGrid& map) no
   for (std::size_t i = 0; i < kBeamCount; ++i) {
     const Direction direction = beam_table().direction(i, heading);
     const auto range_m = static_cast<double>(scan.ranges_m[i]);
-    const bool hit = std::isfinite(range_m);
-    const double length_m = hit ? range_m : static_cast<double>(scan.max_range_m);
+    const bool ended = std::isfinite(range_m);
+    const bool hit = ended && scan.robots[i] == 0;  // a robot will not stay where it is
+    const double length_m = ended ? range_m : static_cast<double>(scan.max_range_m);
     const Cell end = grid.cell_at(from.x + (length_m + into_cell_m) * direction.x,
                                   from.y + (length_m + into_cell_m) * direction.y);
     traverse(grid, from, direction, length_m, [&](Cell cell, double) {

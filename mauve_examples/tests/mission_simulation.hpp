@@ -12,7 +12,7 @@
 
 #include "mauve_examples/disc_collision.hpp"
 #include "mauve_examples/explorer.hpp"
-#include "mauve_examples/navigator.hpp"
+#include "mauve_examples/pilot.hpp"
 #include "mauve_examples/point_controller.hpp"
 #include "mauve_examples/ray_caster.hpp"
 #include "mauve_examples/reachability.hpp"
@@ -31,6 +31,9 @@ struct SimulationOptions {
       false};  // swap to deciding alone a second after the loss, and back 3 s after the return
   double drop_share{0.0};
   double duration_s{300.0};
+  std::vector<Pose2D> starts{};  // none: by the seed
+  std::vector<Point>
+      goals{};  // of robots that know the map and are sent somewhere; the others stay where they are
 };
 
 /// One robot: the five components' algorithms and what they hand on to each other.
@@ -38,17 +41,13 @@ struct SimulatedRobot {
   std::string name;
   Unicycle body;
   OccupancyGrid map;
-  Navigator navigator;
+  Pilot pilot;
   PointController controller;
   Explorer explorer;
   Scan scan;
   Twist command;
   Point target;
   bool has_target{false};
-  Point goal;
-  Point planned_goal;
-  bool has_goal{false};
-  bool needs_path{false};
   std::int64_t guidance_at_ns{0};
   int collisions{0};
   int plans{0};
@@ -63,27 +62,33 @@ class MissionSimulation {
   MissionSimulation(const GridMap& map, const SimulationOptions& options,
                     const ExplorerOptions& explorer = {})
       : map_(map), options_(options) {
-    const std::vector<Pose2D> starts = start_poses(map, options.robots, options.seed);
+    const std::vector<Pose2D> starts =
+        options.starts.empty() ? start_poses(map, options.robots, options.seed) : options.starts;
     reachable_ = reachable_cells(map, starts, kRobotRadius_m);
     reachable_count_ = static_cast<std::size_t>(std::count(reachable_.begin(), reachable_.end(), 1));
     for (std::size_t i = 0; i < options.robots; ++i) {
       auto robot = std::make_unique<SimulatedRobot>();
       robot->name = "robot_" + std::to_string(i + 1);
       robot->body.pose = starts[i];
+      told_.push_back(starts[i]);
+      tell_.push_back(starts[i]);
       robot->map.configure(map);
-      robot->navigator.configure(map, PlanOptions{});
+      robot->pilot.configure(map, static_cast<std::uint8_t>(i + 1));
       robot->controller.set_options({});
       std::vector<std::string> peers;
       for (std::size_t j = 0; j < options.robots; ++j) {
         if (j != i) peers.push_back("robot_" + std::to_string(j + 1));
       }
       robot->explorer.configure(map, robot->name, peers, explorer);
+      if (!options.starts.empty()) know(*robot);
+      if (i < options.goals.size()) robot->pilot.set_goal(options.goals[i]);
       robots_.push_back(std::move(robot));
     }
   }
 
   /// Runs 10 ms.
   void step() {
+    count_contacts();
     for (std::size_t i = 0; i < robots_.size(); ++i) step_robot(*robots_[i], i);
     now_ns_ += kStep_ns;
   }
@@ -98,12 +103,29 @@ class MissionSimulation {
   }
   bool run() { return run_until(options_.duration_s); }
 
+  /// Runs until every robot that was sent somewhere has been there; true when they all have.
+  bool run_to_goals() {
+    std::vector<bool> been(options_.goals.size(), false);
+    while (now_s() < options_.duration_s) {
+      step();
+      for (std::size_t i = 0; i < been.size(); ++i) {
+        if (distance_m(robots_[i]->body.pose, options_.goals[i]) < 0.6) been[i] = true;
+      }
+      if (std::all_of(been.begin(), been.end(), [](bool there) { return there; })) return true;
+    }
+    return false;
+  }
+
   bool all_done() const {
     return now_s() > 1.0 && std::all_of(robots_.begin(), robots_.end(),
                                         [](const auto& robot) { return robot->explorer.done(); });
   }
   double now_s() const { return static_cast<double>(now_ns_) * 1e-9; }
   const std::vector<std::unique_ptr<SimulatedRobot>>& robots() const { return robots_; }
+  /// For how long the discs of two robots overlapped, over all pairs.
+  double contact_s() const { return contact_s_; }
+  /// The least distance there ever was between the centres of two robots.
+  double nearest_m() const { return nearest_m_; }
   std::size_t messages_lost() const { return messages_lost_; }
 
   /// Share of the reachable cells that the robot has seen to be free.
@@ -151,18 +173,50 @@ class MissionSimulation {
     return (now_ns_ - offset_ns) % period_ns == 0;
   }
 
+  void know(SimulatedRobot& robot) const {
+    for (std::size_t i = 0; i < map_.cells.size(); ++i) {
+      if (map_.cells[i] == kFree) robot.map.observe_free(map_.cell(i));
+      if (map_.cells[i] == kOccupied) robot.map.observe_hit(map_.cell(i));
+    }
+  }
+
   void step_robot(SimulatedRobot& robot, std::size_t number) {
     // The robots' grids are out of phase, as those of processes started one after the other.
     const std::int64_t phase_ns = static_cast<std::int64_t>(number) * 130'000'000 % 500'000'000;
     move(robot);
+    if (every(20'000'000)) sense(robot, number);
     if (every(kUnit_ns)) {
-      range_scan(map_, robot.body.pose, 5.0F, robot.scan);
       integrate_scan(robot.scan, robot.body.pose, robot.map);
     }
-    if (now_ns_ >= phase_ns && every(500'000'000, phase_ns)) explore(robot);
+    if (options_.starts.empty() && now_ns_ >= phase_ns && every(500'000'000, phase_ns)) explore(robot);
     if (now_ns_ >= robot.guidance_at_ns) guide(robot);
     if (every(20'000'000)) {
-      robot.command = robot.has_target ? robot.controller.step(robot.body.pose, robot.target, 0.02) : Twist{};
+      const Twist wanted =
+          robot.has_target ? robot.controller.step(robot.body.pose, robot.target, 0.02) : Twist{};
+      robot.command = keep_apart(wanted, robot.scan, ApartOptions{});
+    }
+  }
+
+  void sense(SimulatedRobot& robot, std::size_t number) {
+    mauve::BoundedVector<RobotBody, kMaxSightings> others;
+    for (std::size_t i = 0; i < robots_.size(); ++i) {
+      const Pose2D& told = told_[i];
+      if (i != number) others.push_back({static_cast<std::uint8_t>(i + 1), told.x, told.y, kRobotRadius_m});
+    }
+    range_scan(map_, robot.body.pose, 5.0F, robot.scan);
+    scan_robots(std::span(others.data(), others.size()), robot.body.pose, robot.scan);
+  }
+
+  /// Robots hear of each other's places 20 times a second, and 10 ms late.
+  void count_contacts() {
+    if (every(50'000'000)) told_ = tell_;
+    for (std::size_t i = 0; i < robots_.size(); ++i) {
+      if (every(50'000'000, 40'000'000)) tell_[i] = robots_[i]->body.pose;
+      for (std::size_t j = i + 1; j < robots_.size(); ++j) {
+        const double apart_m = distance_m(robots_[i]->body.pose, robots_[j]->body.pose);
+        nearest_m_ = std::min(nearest_m_, apart_m);
+        if (apart_m < 2.0 * kRobotRadius_m) contact_s_ += 0.01;
+      }
     }
   }
 
@@ -182,30 +236,20 @@ class MissionSimulation {
   }
 
   void guide(SimulatedRobot& robot) {
-    const bool blocked = !robot.navigator.path().finished() &&
-                         robot.navigator.blocked(robot.map.cells(), robot.body.pose, 4.0);
-    const bool stalled = robot.navigator.stalled(robot.body.pose, now_ns_, 2'000'000'000);
-    const bool moved = robot.has_goal && distance_m(robot.goal, robot.planned_goal) > 0.0;
-    if (robot.has_goal && (moved || blocked || stalled || robot.needs_path)) {
-      robot.planned_goal = robot.goal;
+    robot.pilot.read_map(robot.map.cells());
+    robot.pilot.look(robot.scan, robot.body.pose, now_ns_);
+    if (robot.pilot.wants_path()) {
       ++robot.plans;
-      const PlanStatus status = robot.navigator.plan(robot.map.cells(), robot.body.pose, robot.goal, 1.0);
-      robot.needs_path = status != PlanStatus::found;
-      if (robot.needs_path) ++robot.failed_plans;
-      set_target(robot);
+      if (robot.pilot.plan(1.0) != PlanStatus::found) ++robot.failed_plans;
       robot.guidance_at_ns = now_ns_ + 5 * kUnit_ns;
-    } else if (!robot.navigator.path().finished()) {
-      robot.navigator.follow(robot.map.cells(), robot.body.pose, 0.5);
-      set_target(robot);
+    } else if (robot.pilot.has_path()) {
+      robot.pilot.follow(0.5);
       robot.guidance_at_ns = now_ns_ + 2 * kUnit_ns;
     } else {
       robot.guidance_at_ns = now_ns_ + kUnit_ns;
     }
-  }
-
-  static void set_target(SimulatedRobot& robot) {
-    if (robot.navigator.path().finished()) return;
-    robot.target = robot.navigator.path().target();
+    if (!robot.pilot.has_path()) return;
+    robot.target = robot.pilot.target();
     robot.has_target = true;
   }
 
@@ -218,10 +262,7 @@ class MissionSimulation {
     robot.explorer.look(robot.body.pose, now_ns_);
     const bool chosen =
         local() ? robot.explorer.decide_alone(now_ns_) : robot.explorer.decide_together(now_ns_);
-    if (chosen) {
-      robot.goal = robot.explorer.destination();
-      robot.has_goal = true;
-    }
+    if (chosen) robot.pilot.set_goal(robot.explorer.destination());
     auto message = std::make_shared<PeerMessage>();
     robot.explorer.compose(*message);
     for (const auto& other : robots_) {
@@ -247,6 +288,10 @@ class MissionSimulation {
   std::int64_t now_ns_{0};
   std::uint64_t random_{42};
   std::size_t messages_lost_{0};
+  std::vector<Pose2D> tell_;  // the robots' places that are under way to the others
+  std::vector<Pose2D> told_;
+  double contact_s_{0.0};
+  double nearest_m_{1e9};
 };
 
 }  // namespace mauve_examples::testing

@@ -3,12 +3,15 @@
 // counted.
 #include <gtest/gtest.h>
 
+#include <span>
+
 #include "mauve_rt/thread_counters.hpp"
 
 #include "mauve_examples/explorer.hpp"
-#include "mauve_examples/navigator.hpp"
+#include "mauve_examples/pilot.hpp"
 #include "mauve_examples/point_controller.hpp"
 #include "mauve_examples/ray_caster.hpp"
+#include "mauve_examples/robots_in_sight.hpp"
 #include "mauve_examples/scan_integration.hpp"
 #include "mauve_examples/start_poses.hpp"
 #include "mauve_examples/unicycle.hpp"
@@ -24,8 +27,9 @@ TEST(Allocation, TheAlgorithmsDoNone) {
   const GridMap world = load_map(testing::own_map("office"));
   Unicycle body{.pose = start_poses(world, 1, 1)[0]};
   PointController controller;
-  Navigator navigator;
-  navigator.configure(world, {});
+  Pilot pilot;
+  pilot.configure(world, 2);
+  RobotBody other{1, body.pose.x + 0.7, body.pose.y, 0.2};  // in the way: there is room to be made
   OccupancyGrid map;
   map.configure(world);
   Explorer explorer;
@@ -41,25 +45,27 @@ TEST(Allocation, TheAlgorithmsDoNone) {
   counters.attach();
   for (std::int64_t tick = 0; tick < 30; ++tick) {
     range_scan(world, body.pose, 5.0F, scan);
+    scan_robots(std::span(&other, 1), body.pose, scan);
     integrate_scan(scan, body.pose, map);
     explorer.refresh(map);
     explorer.look(body.pose, tick);
     if (tick % 2 == 0 ? explorer.decide_together(tick) : explorer.decide_alone(tick)) {
-      navigator.plan(map.cells(), body.pose, explorer.destination(), 1.0);
+      pilot.set_goal(explorer.destination());
     }
+    pilot.read_map(map.cells());
+    pilot.look(scan, body.pose, tick * 1'500'000'000);
+    if (pilot.wants_path()) pilot.plan(1.0);
     explorer.compose(*message);
     peer.receive(*message);
     peer.look(body.pose, tick);
     peer.decide_together(tick);
     peer.compose(*answer);
     explorer.receive(*answer);
-    for (int step = 0; step < 20 && !navigator.path().finished(); ++step) {
-      navigator.follow(map.cells(), body.pose, 0.5);
-      navigator.blocked(map.cells(), body.pose, 4.0);
-      navigator.stalled(body.pose, tick, 100);
-      if (navigator.path().finished()) break;
+    for (int step = 0; step < 20 && pilot.has_path(); ++step) {
+      pilot.follow(0.5);
+      if (!pilot.has_path()) break;
       controller.set_options({});
-      body.step(controller.step(body.pose, navigator.path().target(), 0.02), {}, 0.02);
+      body.step(keep_apart(controller.step(body.pose, pilot.target(), 0.02), scan, {}), {}, 0.02);
     }
   }
   EXPECT_EQ(counters.allocations(), 0U);

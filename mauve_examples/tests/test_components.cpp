@@ -48,6 +48,9 @@ class RobotArchitecture {
     auto& pose = architecture_.add_resource<SharedData<Pose2D>>("pose");
     auto& command = architecture_.add_resource<SharedData<Twist>>("command");
     auto& scan = architecture_.add_resource<SharedData<Scan>>("scan");
+    auto& body = architecture_.add_resource<SharedData<RobotBody>>("body");
+    auto& bodies =
+        architecture_.add_resource<RingBuffer<RobotBody>>("bodies", 64U, mauve::WhenFull::overwrite);
     auto& target = architecture_.add_resource<SharedData<Point>>("target");
     auto& goal = architecture_.add_resource<SharedData<Point>>("goal");
     auto& done = architecture_.add_resource<SharedData<Bool>>("done");
@@ -64,6 +67,10 @@ class RobotArchitecture {
     connect(robot, "command", command, "read");
     connect(robot, "pose", pose, "write");
     connect(robot, "scan", scan, "write");
+    connect(robot, "body", body, "write");
+    connect(robot, "bodies", bodies, "read");
+    connect(control, "scan", scan, "read");
+    connect(guidance, "scan", scan, "read");
     connect(control, "pose", pose, "read");
     connect(control, "target", target, "read");
     connect(control, "command", command, "write");

@@ -70,6 +70,26 @@ TEST_P(Teams, FinishWithoutDeadlock) {
 }
 INSTANTIATE_TEST_SUITE_P(Sizes, Teams, ::testing::Values(1, 2, 3, 5, 9));
 
+class Crowds : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(Crowds, MeetAndDoNotTouch) {
+  const GridMap map = load_map(testing::own_map("office"));
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    MissionSimulation mission(map, {.robots = GetParam(),
+                                    .seed = seed,
+                                    .link_lost_s = 20.0,
+                                    .link_back_s = 45.0,
+                                    .local_while_lost = true});
+    EXPECT_TRUE(mission.run()) << seed;
+    EXPECT_EQ(mission.contact_s(), 0.0) << seed;
+    EXPECT_GT(mission.union_coverage(), 0.99) << seed;
+    const std::string run = std::to_string(GetParam()) + "_robots_seed_" + std::to_string(seed);
+    RecordProperty(run + "_seconds", std::to_string(mission.now_s()));
+    RecordProperty(run + "_nearest_m", std::to_string(mission.nearest_m()));
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Sizes, Crowds, ::testing::Values(2, 4, 9));
+
 class RealMaps : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(RealMaps, AreExplored) {

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "mauve_examples/disc_collision.hpp"
 #include "mauve_examples/point_controller.hpp"
+#include "mauve_examples/ray_caster.hpp"
+#include "mauve_examples/robots_in_sight.hpp"
 #include "mauve_examples/unicycle.hpp"
 #include "test_maps.hpp"
 
@@ -101,6 +104,50 @@ TEST(PointController, TurnsOnTheSpotForWhatLiesBehind) {
   const Twist command = controller.step({0.0, 0.0, 0.0}, {-2.0, 0.1, 0.0}, 0.02);
   EXPECT_EQ(command.linear.x, 0.0);
   EXPECT_GT(command.angular.z, 1.0);
+}
+
+Scan scan_of(const GridMap& map, const Pose2D& pose, std::initializer_list<RobotBody> robots) {
+  Scan scan;
+  range_scan(map, pose, 5.0F, scan);
+  scan_robots(std::span(robots.begin(), robots.size()), pose, scan);
+  return scan;
+}
+
+TEST(RobotsInSight, AreSeenWhereTheyStand) {
+  const GridMap map = testing::drawn({"......", "......", "......", "......"});
+  const Pose2D pose{1.0, 2.0, 0.7};
+  Sightings found;
+  robots_in_sight(scan_of(map, pose, {{2, 3.0, 2.5, 0.2}, {5, 1.0, 1.3, 0.2}}), pose, found);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].number, 2);
+  EXPECT_LT(std::hypot(found[0].at.x - 3.0, found[0].at.y - 2.5), 0.02);
+  EXPECT_EQ(found[1].number, 5);
+  EXPECT_LT(std::hypot(found[1].at.x - 1.0, found[1].at.y - 1.3), 0.02);
+}
+
+TEST(RobotsInSight, NotBehindAWallNorTooFarAway) {
+  const GridMap map = testing::drawn({"..#...", "..#...", "..#...", "..#..."});
+  const Pose2D pose{1.0, 2.0, 0.0};
+  Sightings found;
+  robots_in_sight(scan_of(map, pose, {{2, 4.0, 2.0, 0.2}}), pose, found);
+  EXPECT_TRUE(found.empty());
+  const GridMap hall = testing::drawn({"............", "............"});
+  robots_in_sight(scan_of(hall, {1.0, 1.0, 0.0}, {{2, 7.0, 1.0, 0.2}}), {1.0, 1.0, 0.0}, found);
+  EXPECT_TRUE(found.empty());
+}
+
+TEST(KeepApart, SlowsTowardsARobotAndNotAwayFromIt) {
+  const GridMap map = testing::drawn({"......", "......", "......", "......"});
+  const Pose2D pose{1.0, 2.0, 0.0};
+  const auto speed_mps = [&](double x_m, double y_m) {
+    return keep_apart(velocity(1.0, 0.5), scan_of(map, pose, {{2, x_m, y_m, 0.2}}), {}).linear.x;
+  };
+  EXPECT_EQ(speed_mps(1.45, 2.0), 0.0);
+  EXPECT_GT(speed_mps(1.9, 2.0), 0.1);
+  EXPECT_LT(speed_mps(1.9, 2.0), speed_mps(2.4, 2.0));
+  EXPECT_EQ(speed_mps(4.5, 2.0), 1.0);
+  EXPECT_EQ(speed_mps(0.55, 2.0), 1.0);
+  EXPECT_EQ(keep_apart(velocity(1.0, 0.5), scan_of(map, pose, {{2, 1.45, 2.0, 0.2}}), {}).angular.z, 0.5);
 }
 
 TEST(Pid, TheIntegralDoesNotWindUp) {

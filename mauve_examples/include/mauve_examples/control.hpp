@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Control: a PID controller that drives the robot to a target, 50 Hz.
+// Control: a PID controller that drives the robot to a target and into no other robot, 50 Hz.
 #pragma once
+
+#include <memory>
 
 #include "mauve_rt/mauve_rt.hpp"
 
@@ -19,6 +21,7 @@ struct ControlShell : mauve::Shell {
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::ReadPort<Point>& target = read_port<Point>("target");
+  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
   mauve::WritePort<Twist>& command =
       write_port<Twist>("command");  // zero when stopped: the robot stands still
 };
@@ -33,6 +36,7 @@ class ControlCore : public mauve::Core<ControlShell> {
 
  private:
   PointController controller_;
+  std::unique_ptr<Scan> scan_;
 };
 
 struct ControlFsm : mauve::Fsm<ControlShell, ControlCore> {

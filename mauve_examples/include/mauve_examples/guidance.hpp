@@ -3,10 +3,10 @@
 // paper's Fig. 4.
 #pragma once
 
-#include <vector>
+#include <memory>
 
-#include "mauve_examples/navigator.hpp"
 #include "mauve_examples/occupancy_map.hpp"
+#include "mauve_examples/pilot.hpp"
 
 namespace mauve_examples {
 
@@ -27,7 +27,12 @@ struct GuidanceShell : mauve::Shell {
                                                      .maximum = 10000,
                                                      .structural = mauve::ReadBy::fsm});
 
+  mauve::Property<std::int64_t>& number = property(
+      "number", 1,
+      {.unit = "", .description = "of this robot: lower ones go first", .minimum = 1, .maximum = 16});
+
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
+  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
   mauve::ReadPort<Point>& goal = read_port<Point>("goal");
   mauve::WritePort<Point>& target = write_port<Point>(
       "target", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
@@ -37,9 +42,9 @@ struct GuidanceShell : mauve::Shell {
 /// Listing 2 of the paper.
 class GuidanceCore : public mauve::Core<GuidanceShell> {
  public:
-  /// Idle: reads position and goal, and looks at the map. [rt]
+  /// Idle: reads position and goal, and looks at the map and at who is in sight. [rt]
   void read_inputs();
-  /// A goal that no path was planned to yet, or whose path has become impassable. [rt]
+  /// A goal that no path was planned to yet, or whose path has become impassable, or room to be made. [rt]
   bool has_new_goal() const;
   bool has_path() const;
   /// Planning. [rt]
@@ -53,13 +58,8 @@ class GuidanceCore : public mauve::Core<GuidanceShell> {
  private:
   void write_target();
 
-  Navigator navigator_;
-  std::vector<std::int8_t> cells_;  // the map as of read_inputs: planning does not keep the others from it
-  Pose2D position_;
-  Point goal_;
-  Point planned_goal_;
-  bool has_goal_{false};
-  bool needs_path_{false};
+  Pilot pilot_;
+  std::unique_ptr<Scan> scan_;
 };
 
 /// Idle, Planning and Following; the waits make I-P-I, I-F-I and I-I take 5, 2 and 1 units.

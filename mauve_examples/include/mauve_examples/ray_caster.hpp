@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "mauve_examples/grid_traversal.hpp"
 #include "mauve_examples/map_file.hpp"
@@ -33,7 +34,10 @@ const BeamTable& beam_table() noexcept;
 double cast_ray(const GridMap& map, const Point& from, const Direction& direction,
                 double max_range_m) noexcept;
 
-/// One turn of the range finder at the pose. [rt]
+/// One turn of the range finder at the pose, in a world without robots. [rt]
 void range_scan(const GridMap& map, const Pose2D& pose, float max_range_m, Scan& scan) noexcept;
+
+/// Ends the beams of a scan taken at the pose at the robots they meet first, and notes whose beams they are. [rt]
+void scan_robots(std::span<const RobotBody> robots, const Pose2D& pose, Scan& scan) noexcept;
 
 }  // namespace mauve_examples

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Robot: the simulated body. Velocity commands in, pose and scan out, 100 Hz.
+// Robot: the simulated body. Velocity commands in, pose and scan out, 100 Hz; tells the other bodies where it is.
 #pragma once
 
 #include <memory>
@@ -11,6 +11,8 @@
 #include "mauve_examples/unicycle.hpp"
 
 namespace mauve_examples {
+
+inline constexpr std::size_t kMaxOthers = 15;
 
 struct RobotShell : mauve::Shell {
   mauve::Property<std::string>& map = property(
@@ -24,6 +26,8 @@ struct RobotShell : mauve::Shell {
       property("start_yaw", 0.0, {.unit = "rad", .structural = mauve::ReadBy::core});
   mauve::Property<double>& radius =
       property("radius", 0.2, {.unit = "m", .description = "", .minimum = 0.05, .maximum = 1.0});
+  mauve::Property<std::int64_t>& number = property(
+      "number", 1, {.unit = "", .description = "by which other robots know it", .minimum = 1, .maximum = 16});
   mauve::Property<double>& max_speed =
       property("max_speed", 1.0, {.unit = "m/s", .description = "", .minimum = 0.0, .maximum = 5.0});
   mauve::Property<double>& max_range = property(
@@ -36,6 +40,9 @@ struct RobotShell : mauve::Shell {
                 .maximum = 5.0});
 
   mauve::ReadPort<Twist>& command = read_port<Twist>("command");
+  mauve::ReadPort<RobotBody>& bodies = read_port<RobotBody>("bodies");
+  mauve::WritePort<RobotBody>& body = write_port<RobotBody>(
+      "body", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
   mauve::WritePort<Pose2D>& pose = write_port<Pose2D>(
       "pose", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
   mauve::WritePort<Scan>& scan = write_port<Scan>(
@@ -57,11 +64,14 @@ class RobotCore : public mauve::Core<RobotShell> {
 
  private:
   Twist command_in_force() const;
+  void meet_others();
 
   GridMap world_;
   Unicycle body_;
   UnicycleLimits limits_;
   std::unique_ptr<Scan> scan_;
+  mauve::BoundedVector<RobotBody, kMaxOthers> others_;  // where they were when they last said so
+  std::int64_t steps_{0};
   std::int64_t collisions_{0};
   std::uint32_t collision_mark_{0};
 };
