@@ -43,6 +43,7 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
     together = shares.pop("union")
     explored = ", ".join(f"{robot} {share:.0%}" for robot, share in shares.items())
     yield f"\nExplored: {explored}, together {together:.0%}."
+    yield from _encounters(summary["collisions"])
     yield from _realtime(summary["realtime"]) if summary["simulation"] is None else [_speed(summary)]
     if summary["success"]:
         yield "SUCCESS."
@@ -62,6 +63,13 @@ def _closer_look(bags: Path) -> Iterator[str]:
     yield "To look closer:"
     verbs = (f"mauve report {shlex.quote(str(bags))}", f"mauve trace stats {shlex.quote(str(robots[0]))}")
     yield from (f"  {command}" for command in (*sourcing(), *verbs))
+
+
+def _encounters(found: dict[str, Any]) -> Iterator[str]:
+    if found["events"]:
+        yield f"Collisions: {found['events']}, for {found['pair_seconds']:.2f} s in all."
+    elif found["nearest_m"] is not None:
+        yield f"Collisions: none; no two robots' centres were nearer than {found['nearest_m']:.2f} m."
 
 
 def _swap(swap: dict[str, Any]) -> str:

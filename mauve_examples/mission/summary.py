@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from mauve_examples.mission.collisions import find_encounters
 from mauve_examples.mission.evidence import CoverageHistory, RobotEvidence
 from mauve_examples.mission.facts import MissionFacts
 from mauve_examples.mission.swaps import Swap, find_swaps, swap_problems
@@ -20,7 +21,9 @@ def build_summary(
 ) -> dict[str, Any]:
     """Return the summary. "reasons" says why success is false, "warnings" what makes figures doubtful."""
     swaps = {one.robot: find_swaps(one) for one in evidence}
+    encounters = find_encounters(facts, evidence)
     reasons = failure_reasons(facts, evidence, coverage, swaps)
+    reasons += [str(collision) for collision in encounters.collisions]
     shares = dict.fromkeys(facts.robots, 0.0)
     shares |= {robot: float(values[-1]) for robot, values in coverage.robots.items() if len(values)}
     union = float(coverage.union[-1]) if len(coverage.union) else 0.0
@@ -31,6 +34,7 @@ def build_summary(
         "reasons": reasons,
         "warnings": _warnings(evidence, swaps),
         "coverage": {**shares, "union": union},
+        "collisions": encounters.as_json(),
         "robots": robots,
         "realtime": {"granted": facts.realtime["granted"], "missing": list(facts.realtime["missing"])},
         "simulation": None if facts.simulation is None else dict(facts.simulation),

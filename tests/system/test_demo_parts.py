@@ -153,6 +153,7 @@ def test_the_ending_of_a_failure_says_why_and_what_is_missing():
         "robots": {
             "robot_1": {"reconfigurations": [swap | figures, swap | {"from": None, "to": None} | figures]}
         },
+        "collisions": {"events": 2, "pair_seconds": 1.234, "nearest_m": 0.1},
         "realtime": {"granted": False, "missing": ["rtprio is 0"]},
         "simulation": None,
     }
@@ -164,3 +165,4 @@ def test_the_ending_of_a_failure_says_why_and_what_is_missing():
     assert "robot_1  exploration: changed, prepared" in text
     for words in ("FAILED:\n  it rained", "  rtprio is 0", "robot_1 50%, together 50%", "out/summary.json"):
         assert words in text
+    assert "Collisions: 2, for 1.23 s in all." in text

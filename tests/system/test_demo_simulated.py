@@ -146,6 +146,13 @@ def test_without_supervisors_it_fails(start: Starter):
     assert "exploration was not replaced while the link was down" in "\n".join(demo.lines)
 
 
+def test_it_says_whether_robots_ran_into_each_other(mission: Demo):
+    found = figures(mission)["collisions"]
+    assert (found["events"], found["pair_seconds"]) == (0, 0)
+    assert found["nearest_m"] > 0.4
+    assert any(line.startswith("Collisions: none; ") for line in mission.lines)
+
+
 def test_it_refuses_what_makes_no_sense(start: Starter, tmp_path: Path):
     for arguments in (("--simulated-time=yes",), ("--simulated-time", "--link-back-at", "1")):
         demo = start(*arguments, out=tmp_path / "refused")
