@@ -54,6 +54,9 @@ def configure(model: ArchitectureModel, architecture: Architecture) -> None:
         architecture.configure()
 
 
+_ANY_CORE = "*"  # to the kernel; what is installed may be another thing every day
+
+
 def allowed_parts(component: ComponentModel, kind: str, loader: PluginLoader) -> list[str]:
     """The cores, fsms or shells (`kind`) that a component takes: its own first, then its alternatives."""
     own = {"core": component.core, "fsm": component.fsm, "shell": component.shell}[kind]
@@ -129,7 +132,9 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
         "stack_bytes": component.stack_bytes,
         "trace_records": component.trace_records or 0,
         "hung_after_ns": component.hung_after_ns,
-        "alternatives": [core for core in allowed_parts(component, "core", loader) if core != component.core],
+        "alternatives": [_ANY_CORE]
+        if installed
+        else [core for core in allowed_parts(component, "core", loader) if core != component.core],
         "reconfigurable": component.reconfigurable,
     }
 

@@ -20,6 +20,7 @@ from typing import Any, Self
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
 from mauve_rt.model import ament_index
+from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp, module_files
 from mauve_rt.model.words import did_you_mean
 
 INDEX_RESOURCE = "mauve_rt_plugins"
@@ -36,6 +37,11 @@ class Plugin:
     shell: str  # of cores and fsms: the shell they were written for
     target: str  # name of a library (PREFIX/lib/lib<target>.so), or module:Class
     prefix: Path
+
+    @property
+    def source(self) -> str:
+        """What is loaded for it: a module, or a library's file."""
+        return self.target.partition(":")[0] if self.is_python else str(self.library)
 
     @property
     def is_python(self) -> bool:
@@ -74,6 +80,9 @@ def parse_index(text: str, *, prefix: Path, origin: str) -> tuple[list[Plugin], 
     return plugins, complaints
 
 
+_Files = list[tuple[Path, Path, Stamp | None]]  # prefix, file, and what tells whether it was written since
+
+
 class PluginIndex:
     """Everything that is installed, by kind and name; nothing of it is loaded."""
 
@@ -82,13 +91,15 @@ class PluginIndex:
         for plugin in plugins:
             self._plugins.setdefault((plugin.kind, plugin.name), plugin)
         self.complaints = list(complaints)
+        self._read: _Files | None = None
 
     @classmethod
     def installed(cls) -> Self:
         """What the ament index lists now."""
         plugins: list[Plugin] = []
         complaints: list[str] = []
-        for _, prefix, file in ament_index.resources(INDEX_RESOURCE):
+        read = _index_files()  # first: what is installed while it is read is found the next time
+        for prefix, file, _ in read:
             try:
                 text = file.read_text(encoding="utf-8")
             except (OSError, UnicodeDecodeError) as error:
@@ -97,7 +108,14 @@ class PluginIndex:
             found, wrong = parse_index(text, prefix=prefix, origin=str(file))
             plugins += found
             complaints += wrong
-        return cls(plugins, complaints)
+        index = cls(plugins, complaints)
+        index._read = read
+        return index
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the ament index lists something else by now; never, of one that was not read from there."""
+        return self._read is not None and self._read != _index_files()
 
     def find(self, kind: str, name: str) -> Plugin | None:
         """The plug-in of that kind and name."""
@@ -111,8 +129,15 @@ class PluginIndex:
         return iter(self._plugins.values())
 
 
+def _index_files() -> _Files:
+    resources = ament_index.resources(INDEX_RESOURCE)
+    return [(prefix, file, Stamp.of(file)) for _, prefix, file in resources]
+
+
 class PluginLoader:
     """Loads plug-ins into a registry the first time somebody needs them. Not thread-safe: for setting up."""
+
+    _loaded = LoadedCode()  # one for the process, as libraries and modules are
 
     def __init__(self, registry: PluginRegistry, index: PluginIndex) -> None:
         self.registry = registry
@@ -140,11 +165,14 @@ class PluginLoader:
         """Make sure that the registry knows a plug-in, loading its library or module if it does not.
 
         Raises:
-            PluginError: not installed, cannot be loaded, or the library does not have it.
+            PluginError: not installed, cannot be loaded, the library does not have it, or it was loaded and
+                is another one on the disk by now.
         """
+        plugin = self.index.find(kind, name)
+        if plugin is not None and (change := self._loaded.change_of(plugin.source)):
+            raise PluginError(f"{kind} '{name}': {change}", element=name, remedy=REMEDY)
         if name in self.registry.names(kind):
             return
-        plugin = self.index.find(kind, name)
         if plugin is None:
             remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
             raise PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
@@ -165,6 +193,7 @@ class PluginLoader:
         if not plugin.library.is_file():
             remedy = "build and install the package again"
             raise PluginError(f"{plugin.kind} '{plugin.name}': no library {plugin.library}", remedy=remedy)
+        self._loaded.note(plugin.source, [plugin.library])
         try:
             self.registry.load_library(str(plugin.library))
         except MauveError as error:
@@ -172,7 +201,9 @@ class PluginLoader:
 
     def _add_python_core(self, plugin: Plugin) -> None:
         self.require("shell", plugin.shell)
-        self.registry.add_python_core(plugin.name, plugin.shell, _factory(plugin))
+        factory = _factory(plugin)
+        self._loaded.note(plugin.source, module_files(plugin.source))
+        self.registry.add_python_core(plugin.name, plugin.shell, factory)
 
 
 def _factory(plugin: Plugin) -> Callable[[Any], object]:

@@ -58,8 +58,8 @@ class Runtime:
     | member        | written by                                 | guarded by      |
     | ------------- | ------------------------------------------ | --------------- |
     | `_revision` ...  | observe(): any thread                      | `_lock`         |
-    | `_declared`   | configure(), declare(): one at a time      | exchanged whole |
-    | `registry`    | who is in loading()                        | `_loading`      |
+    | `_declared`   | configure(), and who is in loading()       | exchanged whole |
+    | `registry`, `index` | configure(), and who is in loading() | `_loading`; exchanged whole |
     | the others    | configure() ... cleanup(): one at a time   |                 |
     """
 
@@ -120,7 +120,8 @@ class Runtime:
         except BaseException:
             architecture.cleanup()
             raise
-        self._declared = self._with_cores(model.components)
+        with self.loading() as loader:
+            self._declared = self._with_cores(model.components, loader)
         self._architecture, self._deployer = architecture, deployer
         self.observe()
 
@@ -226,8 +227,12 @@ class Runtime:
 
     @contextmanager
     def loading(self) -> Iterator[PluginLoader]:
-        """The installed plug-ins, for one at a time: loading changes the registry."""
+        """The plug-ins installed by now, for one at a time: loading changes the registry."""
         with self._loading:
+            if self.index.is_stale:
+                self.index = PluginIndex.installed()
+                declared = {name: known.model for name, known in self._declared.items()}
+                self._declared = self._with_cores(declared, PluginLoader(self.registry, self.index))
             yield PluginLoader(self.registry, self.index)
 
     def declared(self, component: str) -> ComponentModel | None:
@@ -246,8 +251,9 @@ class Runtime:
         if not added and not removed:
             return
         gone = set(removed)
-        kept = {name: declared for name, declared in self._declared.items() if name not in gone}
-        self._declared = {**kept, **self._with_cores(added)}
+        with self.loading() as loader:
+            kept = {name: declared for name, declared in self._declared.items() if name not in gone}
+            self._declared = {**kept, **self._with_cores(added, loader)}
 
     def cores_of(self, part: ComponentDescription) -> list[str]:
         """Cores that replace_core accepts for a component, beside the one it has."""
@@ -255,12 +261,13 @@ class Runtime:
         cores = declared.cores if declared is not None else {}  # none: being added at this moment
         return [core for core, shell in cores.items() if shell == part.shell and core != part.core]
 
-    def _with_cores(self, models: Mapping[str, ComponentModel]) -> dict[str, "_Declared"]:
+    def _with_cores(
+        self, models: Mapping[str, ComponentModel], loader: PluginLoader
+    ) -> dict[str, "_Declared"]:
         declared = {}
-        with self.loading() as loader:
-            for name, model in models.items():
-                cores = {core: loader.shell_of(core) for core in allowed_parts(model, "core", loader)}
-                declared[name] = _Declared(model, cores)
+        for name, model in models.items():
+            cores = {core: loader.shell_of(core) for core in allowed_parts(model, "core", loader)}
+            declared[name] = _Declared(model, cores)
         return declared
 
     @property

@@ -234,6 +234,9 @@ TEST_F(Rule9Replace, OnlyDeclaredCoresByName) {
   EXPECT_EQ(ErrorCode::undeclared_core, code("t/Stranger"));
   EXPECT_EQ(ErrorCode::unknown_core, code("t/Nobody"));
   EXPECT_EQ(ErrorCode::internal, code("t/Core")) << "the one it was declared with";
+  component.allow({Component::any_core}, true);
+  EXPECT_EQ(ErrorCode::internal, code("t/Stranger")) << "whatever there is";
+  EXPECT_EQ(ErrorCode::unknown_core, code("t/Nobody"));
   component.allow({}, false);
   EXPECT_EQ(ErrorCode::not_reconfigurable, code("t/Core"));
 }

@@ -105,10 +105,10 @@ void Component::check_reconfigurable() const {
 
 void Component::check_allowed(const std::string& core_implementation) const {
   check_reconfigurable();
-  if (core_implementation == declared_core_ ||
-      std::find(alternatives_.begin(), alternatives_.end(), core_implementation) != alternatives_.end()) {
-    return;
-  }
+  const auto is_it = [&core_implementation](const std::string& name) {
+    return name == core_implementation || name == any_core;
+  };
+  if (is_it(declared_core_) || std::any_of(alternatives_.begin(), alternatives_.end(), is_it)) return;
   std::vector<std::string> allowed{declared_core_};
   allowed.insert(allowed.end(), alternatives_.begin(), alternatives_.end());
   throw Error(ErrorCode::undeclared_core, "the core is not one that the component declares",

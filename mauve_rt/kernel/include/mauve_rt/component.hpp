@@ -178,6 +178,9 @@ class Component final : public Configurable {
   /// The fallback's name; empty when none was declared. [non-rt]
   const std::string& fallback_implementation() const noexcept { return fallback_name_; }
 
+  /// As an alternative: whatever core there is.
+  static constexpr const char* any_core = "*";
+
   /// Cores it takes beside the one it was declared with, and whether it may be changed at all. [setup]
   void allow(std::vector<std::string> alternatives, bool reconfigurable);
   const std::vector<std::string>& alternatives() const noexcept { return alternatives_; }
