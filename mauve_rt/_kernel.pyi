@@ -251,6 +251,8 @@ class PluginRegistry:
         """`name` is its kind in architecture files."""
     def names(self, kind: str) -> list[str]:
         """kind: 'shell', 'core', 'fsm', 'resource', 'type'."""
+    def value_bytes(self, type: str) -> int:
+        """What a value of a registered data type takes, in bytes; 0 when it is none."""
     def describe_shell(self, name: str) -> ShellDescription: ...
     @overload
     def describe_resource(self, kind: str, type: str) -> ResourceDescription: ...

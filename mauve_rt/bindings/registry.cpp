@@ -157,6 +157,7 @@ void bind_registry(py::module_& module) {
           },
           py::arg("name"), py::arg("resource_class"))
       .def("names", &PluginRegistry::names, py::arg("kind"))
+      .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"))
       .def(
           "describe_shell",
           [](const PluginRegistry& self, const std::string& name) {

@@ -29,6 +29,11 @@ def shown(value: object, limit: int = _SHORT) -> str:
         text = f"a list of {len(value)}"
     else:
         text = repr(value) if isinstance(value, str) else str(value)
+    return cut(text, limit)
+
+
+def cut(text: str, limit: int) -> str:
+    """Text of at most so many characters."""
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 

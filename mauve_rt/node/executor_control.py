@@ -31,6 +31,7 @@ from mauve_rt.node.executor_requests import (
 )
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_steps import Bound, Plan
+from mauve_rt.node.request_limits import RequestLimits
 
 DEFAULT_TIMEOUT_S = 1.0
 _STOP_SLICE_NS = 100_000_000
@@ -80,6 +81,7 @@ class Control:
     | ------------ | ----------------------------- | ----------------------------------------------- |
     | `_log`       | every request                 | `_answered`, for a moment                       |
     | `_under_way` | every request with an id      | `_answered`; who repeats an id waits in it      |
+    | `_taken`     | changes                       | `_changing`                                     |
     | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
     | the bag      | orders, in `_recordings`      | `_changing`                                     |
     """
@@ -91,6 +93,7 @@ class Control:
         phase_timeout_s: float = 1.0,
         outside: Outside | None = None,
         recordings: Recordings | None = None,
+        limits: RequestLimits | None = None,
     ) -> None:
         """The report of a commit is pending up to `phase_timeout_s`, until the next release tells its phase.
 
@@ -100,6 +103,8 @@ class Control:
         self._runtime = runtime
         self._outside = outside
         self._recordings = recordings
+        self._limits = limits or RequestLimits()
+        self._taken: dict[str, int] = {}  # bytes, by name of what requests added and nobody removed
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
         self._under_way: set[str] = set()
@@ -132,6 +137,7 @@ class Control:
         revision, parts = self._runtime.observe()
         from_core, to_core = _replaced_core(request, parts)
         try:
+            self._limits.check_size(request)
             check_form(request)
             if request.recording is not None:
                 outcome = self._order(request, request.recording)
@@ -147,13 +153,14 @@ class Control:
         after = self._runtime.observe(
             changed_since=revision if outcome.success and request.steps and not request.dry_run else None
         )
-        return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core)
+        return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core).cut()
 
     def _carry_out(
         self, request: Request, parts: Sequence[ComponentDescription], *, kernel_revision: int
     ) -> Outcome:
         check_time(request, self._runtime)
-        plan = Plan(request.steps, self._runtime, parts)
+        taken = {} if _is_direct(request) else self._still_taken(parts)
+        plan = Plan(request.steps, self._runtime, parts, limits=self._limits, taken=taken)
         if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):
             step = request.steps[0]
             for part in self._runtime.components():  # of this moment: a stop may just have begun
@@ -172,12 +179,17 @@ class Control:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
         self._runtime.declare(added=plan.added, removed=plan.removed)
+        self._taken = plan.taken
         measured = committed.report()
         report, pending = _reports(request.steps, measured), None
         if not measured.is_complete and (timeout_ns := self._phase_timeout_of(request)) > 0:
             pending = _Following(committed, request.steps, monotonic_ns() + timeout_ns)
         message = _message(request.steps, measured)
         return Outcome(code=Code.OK, message=message, report=report, pending=pending)
+
+    def _still_taken(self, parts: Sequence[ComponentDescription]) -> dict[str, int]:
+        there = {*self._runtime.resources(), *(part.name for part in parts)}
+        return {name: taken for name, taken in self._taken.items() if name in there}
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
         check_revision(request, self._runtime)

@@ -16,7 +16,8 @@ from mauve_msgs.msg import (
 )
 from mauve_rt._kernel import ComponentDescription, PortDescription
 from mauve_rt.model.schema import PropertyValue
-from mauve_rt.model.words import shown
+from mauve_rt.model.words import cut, shown
+from mauve_rt.node.executor_checks import MAX_TEXT
 from mauve_rt.node.executor_requests import Outcome, Report, Request
 from mauve_rt.node.executor_runtime import Observed, Runtime
 
@@ -129,10 +130,10 @@ def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, ins
         stamp=stamp,
         instance_id=instance_id,
         revision=outcome.revision,
-        requested_by=request.requested_by,
-        request_id=request.request_id,
+        requested_by=cut(request.requested_by, MAX_TEXT),
+        request_id=cut(request.request_id, MAX_TEXT),
         request=str(request),
-        cause=request.cause,
+        cause=cut(request.cause, MAX_TEXT),
         success=outcome.success,
         code=int(outcome.code),
         message=outcome.message,

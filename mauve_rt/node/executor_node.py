@@ -1,7 +1,8 @@
 """The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
+from mauve_rt.node.request_limits import RequestLimits
 from mauve_rt.node.service_thread import refusal as refused_reply
 from mauve_rt.node.setting_parameters import declare_settings
 from mauve_rt.node.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
@@ -68,6 +70,7 @@ class ExecutorNode(LifecycleNode):
             phase_timeout_s=self._settings["report_phase_timeout_s"],
             outside=self._bound,
             recordings=RecordingOrders(self._recording, runtime, folder=Path(self._settings["bags"])),
+            limits=_limits(self._settings),
         )
         services = Services(
             self,
@@ -263,3 +266,7 @@ class ExecutorNode(LifecycleNode):
     def _refusal(self, parameter: str) -> str:
         setting = PARAMETERS.get(parameter) or OF_RCLPY.get(parameter)
         return "" if setting is None else refusal(parameter, setting, configured=self._runtime.configured)
+
+
+def _limits(settings: Mapping[str, Any]) -> RequestLimits:
+    return RequestLimits(**{item.name: settings[item.name] for item in fields(RequestLimits)})

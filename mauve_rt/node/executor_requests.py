@@ -1,12 +1,15 @@
 """Requests to an executor and their outcomes, as plain values, and the memory of those already answered."""
 
+import hashlib
 from collections import OrderedDict
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Protocol
 
 from mauve_rt._kernel import NOT_MEASURED
 from mauve_rt.errors import error_code
+from mauve_rt.model.words import cut
 
 __all__ = [
     "NOT_MEASURED",
@@ -23,6 +26,8 @@ __all__ = [
 
 KEPT_REQUESTS = 1024
 _SHOWN_VALUE = 60
+_SHOWN_STEP = 300
+_LONGEST_WORDS = 4000
 
 
 class Code(IntEnum):
@@ -101,8 +106,8 @@ class Step:
 
     def __str__(self) -> str:
         value = " ".join(self.value.split())
-        short = value if len(value) <= _SHOWN_VALUE else f"{value[: _SHOWN_VALUE - 3]}..."
-        return " ".join(word for word in (self.kind, self.target, self.name, short) if word)
+        short = cut(value, _SHOWN_VALUE)
+        return cut(" ".join(word for word in (self.kind, self.target, self.name, short) if word), _SHOWN_STEP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,9 +121,8 @@ class RecordingOrder:
     split_bytes: int = 0
 
     def __str__(self) -> str:
-        return (
-            " ".join(("start_recording", self.bag, *self.topics)).strip() if self.start else "stop_recording"
-        )
+        words = " ".join(("start_recording", self.bag, *self.topics)) if self.start else "stop_recording"
+        return cut(words.strip(), _LONGEST_WORDS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,8 +142,20 @@ class Request:
     def __str__(self) -> str:
         if self.recording is not None:
             return str(self.recording)
-        words = "; ".join(str(step) for step in self.steps)
+        words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
         return f"{words} (dry run)" if self.dry_run else words
+
+    def texts(self) -> Iterator[str]:
+        """All that is of no fixed size."""
+        yield from (self.request_id, self.requested_by, self.cause)
+        for step in self.steps:
+            yield from (step.kind, step.target, step.name, step.value)
+        if self.recording is not None:
+            yield from (self.recording.bag, *self.recording.topics)
+
+    def digest(self) -> bytes:
+        """Of its contents: equal where two requests are, for all that anybody will ever see."""
+        return hashlib.sha256(repr(self).encode("utf-8", "surrogatepass")).digest()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,6 +192,16 @@ class Outcome:
         """Whether it was done."""
         return self.code is Code.OK
 
+    def cut(self) -> "Outcome":
+        """The same, no text of it longer than people read."""
+        return replace(
+            self,
+            message=cut(self.message, _LONGEST_WORDS),
+            report=tuple(replace(step, step=cut(step.step, _SHOWN_STEP)) for step in self.report),
+            from_core=cut(self.from_core, _SHOWN_STEP),
+            to_core=cut(self.to_core, _SHOWN_STEP),
+        )
+
 
 class Pending(Protocol):
     """A change that is in force, and what the releases after it will tell."""
@@ -185,26 +211,34 @@ class Pending(Protocol):
 
 
 class RequestLog:
-    """The last outcomes by request_id. Not thread-safe: the caller serialises requests."""
+    """The last outcomes by request_id. Not thread-safe: the caller serialises requests.
+
+    Of a request it keeps a digest and the beginning of its words: requests own no memory, however large.
+    """
 
     def __init__(self, kept: int = KEPT_REQUESTS) -> None:
         self._kept = kept
-        self._entries: OrderedDict[str, tuple[Request, Outcome]] = OrderedDict()
+        self._entries: OrderedDict[bytes, tuple[bytes, str, Outcome]] = OrderedDict()
 
     def find(self, request: Request) -> Outcome | None:
         """The first outcome of a repeated request; a refusal for the id of another one; None: not seen."""
-        known = self._entries.get(request.request_id) if request.request_id else None
+        known = self._entries.get(_key(request)) if request.request_id else None
         if known is None:
             return None
-        first, outcome = known
-        if first == request:
+        digest, first, outcome = known
+        if digest == request.digest():
             return outcome
-        message = f"request_id '{request.request_id}' was used before, for: {first}; take a new id"
+        shown_id = cut(request.request_id, _SHOWN_STEP)
+        message = f"request_id '{shown_id}' was used before, for: {first}; take a new id"
         return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
 
     def add(self, request: Request, outcome: Outcome) -> None:
         """Remember an outcome; the oldest one is forgotten when there are too many."""
         if request.request_id:
-            self._entries[request.request_id] = (request, outcome)
+            self._entries[_key(request)] = (request.digest(), cut(str(request), _SHOWN_STEP), outcome)
             while len(self._entries) > self._kept:
                 self._entries.popitem(last=False)
+
+
+def _key(request: Request) -> bytes:
+    return hashlib.sha256(request.request_id.encode("utf-8", "surrogatepass")).digest()

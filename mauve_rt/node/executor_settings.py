@@ -7,11 +7,14 @@ from typing import Any, Self
 
 from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
+from mauve_rt.model.schema import MAX_PRIORITY
 from mauve_rt.model.words import shown
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.request_limits import RequestLimits
 from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.settings import Setting, check_given, usage
 
+_LIMITS = RequestLimits()
 MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
 _CONFIGURED: Any = "when configured"
 
@@ -38,6 +41,20 @@ PARAMETERS: dict[str, Setting] = {
         "how long an event may wait to tell the next release after a commit",
         minimum=0,
         maximum=MAX_PHASE_TIMEOUT_S,
+    ),
+    "max_request_bytes": Setting(
+        _LIMITS.max_request_bytes, "size of one request, all its texts together", minimum=1
+    ),
+    "max_requested_bytes": Setting(
+        _LIMITS.max_requested_bytes,
+        "memory of all that requests added: stacks, traces, buffers",
+        minimum=1,
+    ),
+    "max_requested_priority": Setting(
+        _LIMITS.max_requested_priority,
+        "highest priority that a request may give a component",
+        minimum=1,
+        maximum=MAX_PRIORITY,
     ),
 }
 # Not declared: without a value the file's peers count, which are no default that could be told.

@@ -5,15 +5,16 @@ the kernel to tell (states, wiring, whether parts fit), the kernel tells at the 
 
 What is loaded for a name that comes by request, and where the name has to be listed before:
 
-| name                               | listed in                                | loaded                       |
-| ---------------------------------- | ---------------------------------------- | ---------------------------- |
-| core, fsm, shell, kind of resource | `mauve_rt_plugins` of the ament index    | its library, its module      |
-| type of a resource                 | the same; else `rosidl_interfaces` of it | its library; package.msg     |
-| type of a topic to record          | `rosidl_interfaces`                      | package.msg                  |
-| type of an offered or called srv   | `rosidl_interfaces`                      | package.srv, type supports   |
+| name                               | listed in the ament index as        | loaded                     |
+| ---------------------------------- | ----------------------------------- | -------------------------- |
+| core, fsm, shell, kind of resource | mauve_rt_plugins                    | its library, its module    |
+| type of a resource                 | the same, else in rosidl_interfaces | its library, package.msg   |
+| type of a topic to record          | rosidl_interfaces                   | package.msg                |
+| type of a service                  | rosidl_interfaces                   | package.srv, type supports |
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from mauve_rt._kernel import ComponentDescription, PropertyDescription, ResourceDescription, Transaction
@@ -27,7 +28,10 @@ from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_requests import Code, RefusalError, Step, code_of
 from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.request_limits import RequestLimits, bytes_of_component, bytes_of_resource
 from mauve_rt.yaml_text import YamlError, read_yaml
+
+_TOLD_PROBLEMS = 10
 
 
 @dataclass
@@ -53,9 +57,17 @@ class Plan:
     """The transaction that a request asks for, and what it will have added and removed."""
 
     def __init__(
-        self, steps: Iterable[Step], runtime: Runtime, parts: Iterable[ComponentDescription]
+        self,
+        steps: Iterable[Step],
+        runtime: Runtime,
+        parts: Iterable[ComponentDescription],
+        *,
+        limits: RequestLimits,
+        taken: Mapping[str, int],
     ) -> None:
         """Check and translate every step for the present components; loads the plug-ins that they name.
+
+        `taken`: bytes that requests took before, by name of what they added; `self.taken`, those afterwards.
 
         Raises:
             RefusalError: naming the step, where there are several.
@@ -64,6 +76,8 @@ class Plan:
         self.added: dict[str, ComponentModel] = {}
         self.removed: set[str] = set()
         self.bound = Bound()
+        self.taken = {**taken}
+        self._limits = limits
         self._runtime = runtime
         self._sketches: dict[str, _Sketch] = {}
         for part in parts:
@@ -94,6 +108,7 @@ class Plan:
                 transaction.remove_component(name)
                 del self._sketches[name]
                 self.removed.add(name)
+                self.taken.pop(name, None)
                 self.added.pop(name, None)
             case "start":
                 self._component(step)
@@ -160,6 +175,8 @@ class Plan:
         name = step.target
         self._check_name(step)
         model = self._fragment(step, "components")
+        self._limits.check_priority(name, model.components[name])
+        self._take_bytes(name, bytes_of_component(model.components[name]))
         with self._runtime.loading() as loader:
             if problems := Checks(model, loader).problems():
                 raise ArchitectureFileError(model.path, problems)
@@ -176,6 +193,9 @@ class Plan:
         model = self._fragment(step, "resources")
         resource = model.resources[name]
         with self._runtime.loading() as loader:
+            with suppress(MauveError):  # which the checks tell in their words
+                loader.require_type(resource.type)
+            self._take_bytes(name, bytes_of_resource(resource, loader.registry))  # before there is any of it
             if problems := Checks(model, loader).problems():
                 raise ArchitectureFileError(model.path, problems)
             add_resource_step(self.transaction, model, name, loader.registry)
@@ -187,8 +207,13 @@ class Plan:
     def _remove_resource(self, step: Step) -> None:
         self.transaction.remove_resource(step.target)
         self._resources.discard(step.target)
+        self.taken.pop(step.target, None)
         if self.bound.added.pop(step.target, None) is None:
             self.bound.removed.add(step.target)
+
+    def _take_bytes(self, name: str, wanted: int) -> None:
+        self._limits.check_bytes(name, wanted, sum(self.taken.values()))
+        self.taken[name] = wanted
 
     def _check_name(self, step: Step) -> None:
         if step.target in self._sketches or step.target in self._resources:
@@ -218,7 +243,9 @@ def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -
 def _words(error: MauveError) -> str:
     """An error without the place in a file, where it is about a step's own text."""
     if isinstance(error, ArchitectureFileError):
-        return "; ".join(problem.text() for problem in error.problems)
+        told = [problem.text() for problem in error.problems[:_TOLD_PROBLEMS]]
+        more = len(error.problems) - len(told)
+        return "; ".join([*told, f"and {more:,} more"] if more else told)
     return str(error)
 
 

@@ -48,7 +48,9 @@ class Supervisor:
         """
         self._node = node
         self.watch = watch = Watch(node.get_logger().error)
-        self._pending: dict[Any, Any] = {}  # by client, of which changes and dry runs have one each: the last call
+        self._pending: dict[
+            Any, Any
+        ] = {}  # by client, of which changes and dry runs have one each: the last call
         rules = rules_file.rules
         conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
         self._engine = RuleEngine(

@@ -92,7 +92,8 @@ def test_a_core_that_leaves_or_babbles_is_a_refusal(graph: Any, core: str, words
 
 @pytest.mark.usefixtures("executor")
 def test_a_module_that_leaves_while_it_is_loaded_is_a_refusal(graph: Any) -> None:
-    part = "{shell: executor_tests/CounterShell, core: executor_tests/PyLeftMissing, fsm: executor_tests/CounterFsm}"
+    names = ("CounterShell", "PyLeftMissing", "CounterFsm")
+    part = "{{shell: executor_tests/{}, core: executor_tests/{}, fsm: executor_tests/{}}}".format(*names)
     step = ReconfigurationStep(kind="add_component", target="late", value=part)
     reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step])
     assert (reply.success, reply.code) == (False, Code.UNKNOWN_CORE)

@@ -156,6 +156,11 @@ const std::string& PluginRegistry::fsm_shell(const std::string& name) const {
   return require_entry(fsms_, name, ErrorCode::unknown_fsm, "fsm").shell;
 }
 
+std::size_t PluginRegistry::value_bytes(const std::string& type) const {
+  const auto found = ports_.find(type);
+  return found != ports_.end() ? found->second.value_bytes : 0;
+}
+
 std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
   std::set<std::string> found;
   const auto add_keys = [&found](const auto& entries) {

@@ -109,6 +109,8 @@ class PluginRegistry {
 
   const std::string& core_shell(const std::string& name) const;
   const std::string& fsm_shell(const std::string& name) const;
+  /// What a value of a registered data type takes, in bytes; 0 when it is none.
+  std::size_t value_bytes(const std::string& type) const;
   /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
   /// (invalid_argument).
   std::vector<std::string> names(const std::string& kind) const;
@@ -122,6 +124,7 @@ class PluginRegistry {
   struct PortFactories {
     std::unique_ptr<PortBase> (*read)(const std::string& name);
     std::unique_ptr<PortBase> (*write)(const std::string& name, const OutputOptions& output);
+    std::size_t value_bytes;
   };
   template <Described T>
   static PortFactories data_ports() {
@@ -130,7 +133,8 @@ class PluginRegistry {
             },
             [](const std::string& name, const OutputOptions& output) -> std::unique_ptr<PortBase> {
               return std::make_unique<WritePort<T>>(name, output);
-            }};
+            },
+            sizeof(T)};
   }
 
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
