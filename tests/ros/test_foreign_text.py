@@ -1,5 +1,8 @@
 """What users' code says when it fails may be no text at all: the executor tells it, and goes on answering."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,18 +10,31 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_processes import PATIENCE_S
 from std_msgs.msg import Float64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
 from mauve_rt.node.executor_requests import Code
+from mauve_rt.trace.bag_repair import examine_bag
 
 NODE = "/robot_1/executor"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MORE_CORES = """\
             alternatives: [executor_tests/Unspeakable, executor_tests/PyLeaving, executor_tests/PyGarbled,
                            """
+BROKEN_THREAD = """\
+import sys
+from mauve_rt.node import executor, executor_state, watch
+
+def fail(self, *arguments):
+    raise SystemExit("the eyes are gone")
+
+watch._PATIENCE, watch._PAUSE_S = 3, 0.0
+executor_state.StatePublisher._look = fail
+executor.main(sys.argv)
+"""
 
 
 @pytest.fixture
@@ -99,3 +115,23 @@ def test_a_module_that_leaves_while_it_is_loaded_is_a_refusal(graph: Any) -> Non
     assert (reply.success, reply.code) == (False, Code.UNKNOWN_CORE)
     assert "cannot load executor_tests_gone:PyLeftMissing: SystemExit: this module is gone" in reply.message
     assert graph.ask(Stop, f"{NODE}/stop", component="sleepy").success
+
+
+def test_a_thread_that_cannot_go_on_ends_the_process_in_order(
+    architecture: Path, domain: int, tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    arguments = ["--ros-args", "-p", f"architecture:={architecture}", "-p", f"bag:={bag}"]
+    ended = subprocess.run(
+        [sys.executable, "-c", BROKEN_THREAD, *arguments],
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        stderr=subprocess.STDOUT,
+        stdout=subprocess.PIPE,
+        check=False,
+        encoding="utf-8",
+        timeout=PATIENCE_S,
+    )
+    assert ended.returncode == 1
+    assert ended.stdout.count("thread 'state' failed and goes on: SystemExit: the eyes are gone") == 1
+    assert "thread 'state' failed 3 times in a row: the executor ends" in ended.stdout
+    assert examine_bag(bag).is_finished
