@@ -137,6 +137,13 @@ struct Reluctant : Counter {
   bool adopt(const mauve::CoreBase&) override { return false; }
 };
 
+/// Fails in bytes that are no text.
+struct UnspeakableResource : mauve::Resource {
+  UnspeakableResource() : Resource("executor_tests/UnspeakableResource", "") {
+    throw std::out_of_range("\xc3\x28 is no text");
+  }
+};
+
 /// Says no in bytes that are no text.
 struct Unspeakable : Counter {
  protected:
@@ -427,6 +434,7 @@ MAUVE_PLUGINS(registry) {
   registry.core<Reluctant>("executor_tests/Reluctant", shell);
   registry.core<Unready>("executor_tests/Unready", shell);
   registry.core<Unspeakable>("executor_tests/Unspeakable", shell);
+  registry.resource<UnspeakableResource>("executor_tests/UnspeakableResource");
   registry.core<Wasteful>("executor_tests/Wasteful", shell);
   registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);

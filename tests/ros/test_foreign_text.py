@@ -53,6 +53,11 @@ def _replace(graph: Any, core: str) -> Any:
     return graph.ask(ReplaceCore, f"{NODE}/replace_core", component="counter", core=f"executor_tests/{core}")
 
 
+def _add(graph: Any, kind: str, value: str) -> Any:
+    step = ReconfigurationStep(kind=kind, target="late", value=value)
+    return graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step])
+
+
 @pytest.mark.parametrize(
     ("number", "words"),
     [(-2e7, "bytes \ufffd\ufffd, no text"), (-2e8, "an exception that is no std::exception")],
@@ -107,13 +112,15 @@ def test_a_core_that_leaves_or_babbles_is_a_refusal(graph: Any, core: str, words
 
 
 @pytest.mark.usefixtures("executor")
-def test_a_module_that_leaves_while_it_is_loaded_is_a_refusal(graph: Any) -> None:
+def test_what_fails_while_it_is_loaded_or_made_is_a_refusal(graph: Any) -> None:
     names = ("CounterShell", "PyLeftMissing", "CounterFsm")
     part = "{{shell: executor_tests/{}, core: executor_tests/{}, fsm: executor_tests/{}}}".format(*names)
-    step = ReconfigurationStep(kind="add_component", target="late", value=part)
-    reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step])
+    reply = _add(graph, "add_component", part)
     assert (reply.success, reply.code) == (False, Code.UNKNOWN_CORE)
     assert "cannot load executor_tests_gone:PyLeftMissing: SystemExit: this module is gone" in reply.message
+    reply = _add(graph, "add_resource", "{kind: executor_tests/UnspeakableResource}")
+    assert (reply.success, reply.code) == (False, Code.PREPARE_FAILED)
+    assert reply.message == "internal error: IndexError: \ufffd( is no text"
     assert graph.ask(Stop, f"{NODE}/stop", component="sleepy").success
 
 

@@ -13,7 +13,7 @@ from mauve_rt.node.executor_requests import Code
 NODE = "/robot_1/executor"
 MB = 1_000_000
 REQUESTS = 500
-ROOM_MB = 100  # of the 500 that were sent; what the middleware and the allocator keep has room in it
+ROOM_MB = 30  # of the 500 that were sent; the middleware and the allocator keep some
 COUNTER = (
     "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm, %s}"
 )
