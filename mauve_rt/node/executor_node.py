@@ -205,7 +205,7 @@ class ExecutorNode(LifecycleNode):
         with self._starting_or_ending:
             if self._runtime.active:
                 self._runtime.deactivate()
-                self._state.refresh()
+                self.watch.guarded("~/state", self._state.refresh)()
             self._state.stop()
             self._bound.stop()
 

@@ -27,7 +27,6 @@ class ServiceThread:
     def __init__(self, node: Node, group: CallbackGroup, watch: Watch, *, name: str) -> None:
         """Of the services that the group has now; no executor may serve it (`OtherGroupsExecutor`)."""
         self._node = node
-        self._watch = watch
         self._services = [service for service in node.services if service.callback_group is group]
         self._wakeup = node.create_guard_condition(lambda: None, callback_group=group)
         self._ending = threading.Event()
@@ -83,7 +82,7 @@ def refusal(request: Any, filled: Any, error: BaseException) -> Any:
     no = SetParametersResult(successful=False, reason=text)
     if hasattr(response, "results"):
         response.results = [no for _ in request.parameters]
-    elif hasattr(response, "result"):
+    elif isinstance(getattr(response, "result", None), SetParametersResult):
         response.result = no
     return response
 

@@ -50,7 +50,7 @@ class Supervisor:
         self.watch = watch = Watch(node.get_logger().error)
         self._pending: dict[
             Any, Any
-        ] = {}  # by client, of which changes and dry runs have one each: the last call
+        ] = {}  # by client (changes, dry runs): the last call
         rules = rules_file.rules
         conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
         self._engine = RuleEngine(

@@ -22,10 +22,10 @@ _KEPT = 100  # failures that are remembered as told
 class Watch:
     """Of one node. Its methods may be called from any thread, and never raise.
 
-    | member   | written by           | guarded by |
-    | -------- | -------------------- | ---------- |
-    | `_told`  | tell(): any thread   | `_lock`    |
-    | `broken` | a thread that gave up | itself    |
+    | member   | written by            | guarded by |
+    | -------- | --------------------- | ---------- |
+    | `_told`  | tell(): any thread    | `_lock`    |
+    | `broken` | a thread that gave up | itself     |
     """
 
     def __init__(self, log: Callable[[str], Any]) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Parameter
+from rcl_interfaces.srv import ListParameters, SetParameters, SetParametersAtomically
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import PATIENCE_S
 from std_msgs.msg import Float64
@@ -17,6 +19,7 @@ import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
 from mauve_rt.node.executor_requests import Code
+from mauve_rt.node.service_thread import refusal
 from mauve_rt.trace.bag_repair import examine_bag
 
 NODE = "/robot_1/executor"
@@ -142,3 +145,17 @@ def test_a_thread_that_cannot_go_on_ends_the_process_in_order(
     assert ended.stdout.count("thread 'state' failed and goes on: SystemExit: the eyes are gone") == 1
     assert "thread 'state' failed 3 times in a row: the executor ends" in ended.stdout
     assert examine_bag(bag).is_finished
+
+
+def test_a_handler_that_raises_is_a_refusal_of_every_service() -> None:
+    gone = SystemExit("gone")
+    reply = refusal(ReplaceCore.Request(), ReplaceCore.Response(success=True), gone)
+    assert (reply.success, reply.code) == (False, Code.PREPARE_FAILED)
+    assert reply.message == "internal error: SystemExit: gone"
+    two = SetParameters.Request(parameters=[Parameter(), Parameter()])
+    results = refusal(two, SetParameters.Response(), gone).results
+    assert [(result.successful, result.reason) for result in results] == [(False, reply.message)] * 2
+    result = refusal(SetParametersAtomically.Request(), SetParametersAtomically.Response(), gone).result
+    assert (result.successful, result.reason) == (False, reply.message)
+    for service in (ListComponents, ListParameters):  # without words for it
+        assert refusal(service.Request(), service.Response(), gone) == service.Response()
