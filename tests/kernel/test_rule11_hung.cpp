@@ -112,21 +112,11 @@ TEST_F(Rule11Hung, AWaitForEventsIsNotHungHoweverLongItLasts) {
   EXPECT_TRUE(age.is_wait);
 }
 
-struct BoundedFsm : TestFsm {
-  void define() override {
-    State& run = execution("Run", "act", &TestCore::act, ms_to_ns(20));
-    State& pause = wait("Pause", ms_to_ns(5));
-    set_initial(run);
-    next(run, pause);
-    next(pause, run);
-  }
-};
-
 TEST_F(Rule11Hung, AStateThatIsCondemnedButStillExecutesIsToldToo) {
   std::atomic<bool> go_on{false};
   const ComponentsEndFirst ended(deployer);
-  Component& component = architecture.add_component<TestShell, TestCore, BoundedFsm>(
-      "c", {.cpus = {kComponentsCpu}, .hung_after_ns = kHungAfter});
+  Component& component =
+      add_free(architecture, "c", varying({ms_to_ns(20)}, ms_to_ns(5)), {.hung_after_ns = kHungAfter});
   core(component).work = [&] {
     while (!go_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   };
