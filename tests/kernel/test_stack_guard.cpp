@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What is too large for a component's stack ends the process at that place: it reaches nobody else's memory.
 #include <sys/mman.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 
 #include "fixtures.hpp"
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr bool kOwnStacks =
-    false;  // AddressSanitizer reports an overflow itself, and ends the process its own way
-#else
-constexpr bool kOwnStacks = true;
-#endif
-
 namespace mauve::testing {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1024} * 1024;
-constexpr std::size_t kNeighbour = 16 * kMiB;
-constexpr int kJumpedOver = 3;  // the exit status of a test that reached memory beyond the guard
+constexpr std::size_t kPage = 4096;
+constexpr int kJumpedOver = 3;  // the exit status of a process that reached memory beyond the guard
 
 /// The lowest byte of this thread's stack.
 char* stack_begin() {
@@ -32,12 +27,26 @@ char* stack_begin() {
   return static_cast<char*>(begin);
 }
 
-/// Memory of somebody else right below this address, as far as there is none yet.
-void put_neighbour_below(char* address) {
-  constexpr std::size_t kPage = 4096;
-  for (std::size_t below = kPage; below <= kNeighbour; below += kPage)
-    mmap(address - below, kPage, PROT_READ | PROT_WRITE,
-         MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE | MAP_NORESERVE, -1, 0);
+/// Maps a page where there is none yet.
+bool map_free(char* page) {
+  return mmap(page, kPage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1,
+              0) == page;
+}
+
+/// How many bytes nobody can read right below this thread's stack, when all that was free there is in use.
+std::size_t guarded_bytes() {
+  char* const begin = stack_begin();
+  int ends[2]{-1, -1};
+  if (pipe(ends) != 0) return 0;
+  std::size_t guarded = 0;
+  for (; guarded < 2 * kMiB; guarded += kPage) {
+    char* const page = begin - guarded - kPage;
+    if (map_free(page)) break;
+    if (write(ends[1], page, 1) == 1 || errno != EFAULT) break;
+  }
+  close(ends[0]);
+  close(ends[1]);
+  return guarded;
 }
 
 /// Uses the far end of a frame of 4 MB, and nothing in between.
@@ -47,15 +56,20 @@ void put_neighbour_below(char* address) {
   static_cast<void>(frame[0]);
 }
 
-/// Ends the process from the state of a component: by the signal, or with kJumpedOver.
-void run_in_a_state(const std::function<void()>& work) {
+/// Uses such a frame in a component's state, where all memory from 2 MiB below its stack on is somebody's. Ends the
+/// process: by the signal, or with kJumpedOver.
+void overflow() {
   Architecture architecture;
   Deployer deployer{architecture};
   Component& component =
       architecture.add_component<TestShell, TestCore, TestFsm>("c", {.cpus = {kComponentsCpu}});
-  component.core_as<TestCore>().work = [&work] {
-    put_neighbour_below(stack_begin());
-    work();
+  component.core_as<TestCore>().work = [] {
+    char* const begin = stack_begin();
+    for (std::size_t below = 2 * kMiB; below <= 8 * kMiB; below += kPage) {
+      // Whatever it is, it can be written: nothing but the guard is to end the process.
+      if (!map_free(begin - below)) mprotect(begin - below, kPage, PROT_READ | PROT_WRITE | PROT_EXEC);
+    }
+    use_a_large_frame();
     std::_Exit(kJumpedOver);
   };
   architecture.configure();
@@ -63,27 +77,27 @@ void run_in_a_state(const std::function<void()>& work) {
   wait_until([] { return false; }, "the end of the process");
 }
 
-class StackGuard : public Deployed {
- protected:
-  void SetUp() override {
-    if (!kOwnStacks) GTEST_SKIP() << "AddressSanitizer has its own answer to a stack that overflows";
-    GTEST_FLAG_SET(death_test_style, "threadsafe");
-  }
-};
+class StackGuard : public Deployed {};
 
 TEST_F(StackGuard, IsAMegabyteWide) {
   Component& component = add("c");
+  std::atomic<std::size_t> guarded{0};
+  const ComponentsEndFirst ended(deployer);
+  core(component).work = [&] {
+    if (core(component).runs == 1) guarded = guarded_bytes();
+  };
   deploy();
   EXPECT_GE(component.task().facts().guard_bytes, kMiB);
+  wait_runs(component, 2);
+  EXPECT_GE(guarded, kMiB);
 }
 
 TEST_F(StackGuard, ALargeFrameDiesAtItsPlace) {
-  EXPECT_EXIT(run_in_a_state(use_a_large_frame), ::testing::KilledBySignal(SIGSEGV), "");
-}
-
-TEST_F(StackGuard, CodeThatWasCompiledWithoutProtectionMeetsItToo) {
-  const auto reach = [] { *static_cast<volatile char*>(stack_begin() - kMiB + 4096) = 1; };
-  EXPECT_EXIT(run_in_a_state(reach), ::testing::KilledBySignal(SIGSEGV), "");
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer has its own answer to a stack that overflows";
+#endif
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(overflow(), ::testing::KilledBySignal(SIGSEGV), "");
 }
 
 }  // namespace
