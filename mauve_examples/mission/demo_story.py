@@ -76,15 +76,16 @@ class MissionStory:
         if not event.success:
             self.tell(f"{robot}: refused: {event.request}: {event.message}{who}")
             return
-        if not event.to_core:
+        changes = [report for report in event.report if report.to_core]
+        if not changes:
             self.tell(f"{robot}: {event.request}{who}")
             return
         story = self.robots[robot]
-        for report in event.report:
+        for report in changes:
             swap = Swap(
                 component=report.component,
-                from_core=event.from_core.rsplit("/", 1)[-1],
-                to_core=event.to_core.rsplit("/", 1)[-1],
+                from_core=report.from_core.rsplit("/", 1)[-1],
+                to_core=report.to_core.rsplit("/", 1)[-1],
                 blackout_ns=report.blackout_ns,
                 missed_releases=report.missed_releases,
             )
@@ -152,6 +153,8 @@ def describe(swap: Swap) -> str:
     if swap.blackout_ns != StepReport.NOT_MEASURED:
         blackout = f"blackout {swap.blackout_ns / 1e3:.0f} us"
     missed = f"{swap.missed_releases} releases missed" if swap.missed_releases else "no release missed"
+    if swap.missed_releases == StepReport.NOT_MEASURED:
+        missed = "releases missed not measured"
     return f"{swap.component}: {swap.from_core} -> {swap.to_core}, {blackout}, {missed}"
 
 

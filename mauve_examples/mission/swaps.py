@@ -6,9 +6,10 @@ from typing import Any
 from mauve_examples.mission.evidence import RobotEvidence, Timed
 from mauve_examples.mission.facts import MissionFacts
 from mauve_rt.trace.reconfigurations import Reconfiguration, reconfigurations
+from mauve_rt.trace.report.requests import Request, join_requests
+from mauve_rt.trace.trace import Message
 
 EXPLORATION = "exploration"
-_REPLY_WITHIN_NS = 5_000_000_000  # the executor publishes its event after the reply
 _ACTED = ("do", "undo")
 
 
@@ -19,7 +20,7 @@ class Swap:
     robot: str
     measured: Reconfiguration
     from_core: str | None
-    """None where the executor's event is not in the bag, or it was no replacement of a core."""
+    """None where the executor's event is not in the bag, or this component kept its core."""
     to_core: str | None
     cause: str
     silence_ms: float | None
@@ -48,15 +49,12 @@ def find_swaps(evidence: RobotEvidence) -> list[Swap]:
 
     A connection or a property changed under a hold is one too; its cores are None.
     """
-    unused = [(time_ns, event) for time_ns, event in evidence.events if event.success]
-    swaps = []
-    for one in reconfigurations(evidence.trace):
-        if one.committed:
-            match = next((pair for pair in unused if _tells_of(pair, one)), None)
-            if match is not None:
-                unused.remove(match)
-            swaps.append(_joined(evidence, one, None if match is None else match[1]))
-    return swaps
+    measured = [one for one in reconfigurations(evidence.trace) if one.committed]
+    events = [Message("", 0, time_ns, event) for time_ns, event in evidence.events]
+    return [
+        _joined(evidence, one, request)
+        for one, request in zip(measured, join_requests(measured, events), strict=True)
+    ]
 
 
 def swap_problems(facts: MissionFacts, robot: str, swaps: list[Swap]) -> list[str]:
@@ -72,26 +70,16 @@ def swap_problems(facts: MissionFacts, robot: str, swaps: list[Swap]) -> list[st
     return []
 
 
-def _tells_of(event: tuple[int, Any], one: Reconfiguration) -> bool:
-    time_ns, message = event
-    components = [step.component for step in message.report]
-    return one.component in components and 0 <= time_ns - one.armed_ns <= _REPLY_WITHIN_NS
-
-
-def _joined(evidence: RobotEvidence, one: Reconfiguration, event: Any) -> Swap:
-    step, cause = None, ""
-    if event is not None:
-        cause = event.cause
-        step = next(step for step in event.report if step.component == one.component)
-    replaced = event is not None and bool(event.to_core)
+def _joined(evidence: RobotEvidence, one: Reconfiguration, request: Request | None) -> Swap:
+    cause = "" if request is None else request.cause
     return Swap(
         robot=evidence.robot,
         measured=one,
-        from_core=event.from_core if replaced else None,
-        to_core=event.to_core if replaced else None,
+        from_core=(request.from_core or None) if request is not None else None,
+        to_core=(request.to_core or None) if request is not None else None,
         cause=cause,
         silence_ms=_silence_ms(evidence.decisions, cause),
-        prepare_us=None if step is None else step.prepare_ns / 1e3,
+        prepare_us=None if request is None else (request.prepare_ns or 0) / 1e3,
     )
 
 

@@ -21,7 +21,7 @@ class Reconfiguration:
 
     component: str
     what: str
-    """What was committed, as the component recorded it; empty when it did not."""
+    """What was committed of this component, as it recorded it; empty when it did not."""
     committed: bool
     """False: refused by adopt, everything went on as before."""
     parked_ns: int
@@ -80,7 +80,7 @@ def _measure(trace: Trace, component: str, parked: int, armed: int) -> Reconfigu
         missed_releases = (nominal_ns - pending_ns) // grid.period_ns
     return Reconfiguration(
         component=component,
-        what=trace.name(int(phases["name"][0])) if len(phases) else "",
+        what=", ".join(dict.fromkeys(trace.name(int(name)) for name in phases["name"])),
         committed=bool(records["b"][armed]),
         parked_ns=int(records["time_ns"][parked]),
         armed_ns=int(records["time_ns"][armed]),

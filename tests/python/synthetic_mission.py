@@ -212,6 +212,8 @@ class FakeRobot:
             missed_releases=0,
             phase_nominal_ns=0,
             phase_actual_ns=WAKEUP_NS,
+            from_core=self.core,
+            to_core=core,
         )
         event = self.messages.cdr(
             "mauve_msgs/msg/ReconfigurationEvent",

@@ -138,10 +138,11 @@ def test_names_cannot_write_html(tmp_path: Path):
     names = tuple(f"{name}{HOSTILE}" for name in trace.names)
     info = replace(architecture(1)[0], name=HOSTILE, core=HOSTILE)
     info = replace(info, ports=(PortInfo(HOSTILE, "read", HOSTILE, HOSTILE, HOSTILE),))
-    event = SimpleNamespace(
-        success=True, requested_by=HOSTILE, cause=HOSTILE, request=HOSTILE, from_core=HOSTILE,
-        to_core=HOSTILE, report=[SimpleNamespace(component=HOSTILE.rpartition("/")[2], prepare_ns=1)],
+    step = SimpleNamespace(
+        step=HOSTILE, component=HOSTILE.rpartition("/")[2], prepare_ns=1, blackout_ns=1, from_core=HOSTILE,
+        to_core=HOSTILE,
     )  # fmt: skip
+    event = SimpleNamespace(success=True, requested_by=HOSTILE, cause=HOSTILE, report=[step])
     message = Message("/a/executor/events", 0, EPOCH_NS + 30 * PERIOD_NS, event)
     page = page_of(
         replace(trace, names=names, architecture=(info,)),
@@ -240,10 +241,8 @@ def test_the_command_says_what_is_wrong(
 
 
 def event(topic: str, time_ns: int, component: str, by: str) -> Message:
-    step = SimpleNamespace(component=component, prepare_ns=7)
-    told = SimpleNamespace(
-        success=True, requested_by=by, cause="", request="", from_core="", to_core="", report=[step]
-    )
+    step = SimpleNamespace(step="", component=component, prepare_ns=7, blackout_ns=-1)
+    told = SimpleNamespace(success=True, requested_by=by, cause="", report=[step])
     return Message(topic, 0, time_ns, told)
 
 

@@ -16,8 +16,10 @@ class Request:
 
     requested_by: str
     cause: str
-    request: str
+    steps: str
+    """Those about this component."""
     from_core: str
+    """Of this component; empty when it kept its core."""
     to_core: str
     prepare_ns: int | None
 
@@ -32,7 +34,7 @@ def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) ->
 
 
 def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> Request | None:
-    """Return the first that tells of it soon after.
+    """Return the one that tells of it, by its blackout; where that is not measured, the first soon after.
 
     Components of merged traces are named <bag>/<component>. Where the executor's topics do not have the name
     of the bag, an event is taken only when no other one could be meant.
@@ -46,6 +48,7 @@ def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> Request | None
     if owner:
         own = [event for event in found if f"/{owner}/" in event.topic]
         found = own or (found if len(found) == 1 else [])
+    found.sort(key=lambda event: not _has_measured(event.msg, component, one.blackout_ns))
     return _request(found[0].msg, component) if found else None
 
 
@@ -57,13 +60,20 @@ def _tells_of(event: Any, component: str) -> bool:
     return any(step.component == component for step in event.msg.report)
 
 
+def _has_measured(event: Any, component: str, blackout_ns: int) -> bool:
+    return any(step.component == component and step.blackout_ns == blackout_ns for step in event.report)
+
+
 def _request(event: Any, component: str) -> Request:
-    step = next(step for step in event.report if step.component == component)
+    steps = [step for step in event.report if step.component == component]
+    prepare_ns = sum(step.prepare_ns for step in steps)
+    # A bag may be of a time when reports did not name the cores.
+    replacing = next((step for step in reversed(steps) if getattr(step, "to_core", "")), None)
     return Request(
         requested_by=event.requested_by,
         cause=event.cause,
-        request=event.request,
-        from_core=event.from_core,
-        to_core=event.to_core,
-        prepare_ns=step.prepare_ns if step.prepare_ns > 0 else None,
+        steps=", ".join(step.step for step in steps),
+        from_core="" if replacing is None else replacing.from_core,
+        to_core="" if replacing is None else replacing.to_core,
+        prepare_ns=prepare_ns if prepare_ns > 0 else None,
     )

@@ -192,7 +192,7 @@ def _time(value: int, found: Distribution) -> Cell:
 
 def _swap_row(analysis: Analysis, swap: Swap) -> tuple[object, ...]:
     one, request, _ = swap
-    change = one.what if request is None else request.request or one.what
+    change = one.what if request is None else request.steps or one.what
     if request is not None and request.to_core:
         change = " \N{RIGHTWARDS ARROW} ".join(
             core.rsplit("/", 1)[-1] for core in (request.from_core, request.to_core)

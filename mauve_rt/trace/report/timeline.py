@@ -144,8 +144,10 @@ def swap_title(what: str, to_core: str = "") -> str:
     """Return what was changed, short: `replace_core Local` of `replace_core mauve_examples/Local`."""
     if to_core:
         return to_core.rsplit("/", 1)[-1]
-    verb, _, name = what.partition(" ")
-    return f"{verb} {name.rsplit('/', 1)[-1]}".strip() or "reconfigured"
+    changes = (change.partition(" ") for change in what.split(", "))
+    return (
+        ", ".join(f"{verb} {name.rsplit('/', 1)[-1]}".strip() for verb, _, name in changes) or "reconfigured"
+    )
 
 
 def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, list[list[int]]]:
