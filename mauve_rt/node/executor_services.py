@@ -33,8 +33,8 @@ class Services:
     """The services of a node.
 
     Requests for changes wait for each other in `control_group`, those to stop or start in `direct_group`, and
-    lists in `query_group`. Who asked is answered first; then ~/state tells of it, and ~/events will, before
-    the next request of the group is looked at.
+    lists in `query_group`. Who asked is answered first; then another thread tells of it on ~/state and
+    ~/events.
 
     | member    | written by              | guarded by               |
     | --------- | ----------------------- | ------------------------ |
@@ -107,7 +107,6 @@ class Services:
 
     def _tell(self, group: CallbackGroup) -> None:
         while self._untold[group]:
-            self._state.refresh()
             self._state.tell(self._untold[group].popleft())
 
     def _list(self, _request: Any, response: Any) -> Any:

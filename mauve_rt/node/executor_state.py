@@ -20,6 +20,7 @@ from mauve_rt.node.state_age import HangWatch
 from mauve_rt.node.watch import Watch
 
 _WAIT_NS = 200_000_000  # how long a watching thread that should end may go on waiting
+_SETTLED_S = 0.002  # what a request changed its own thread tells by then, who asked being answered first
 _EVENT_DEPTH = 100
 
 
@@ -79,7 +80,7 @@ class StatePublisher:
         return event
 
     def tell(self, event: Event) -> None:
-        """Who asked has the answer: publish it now."""
+        """Who asked has the answer: publish the state, if that is not done yet, and then the event."""
         self._queue.tell(event)
 
     def flush(self) -> None:
@@ -110,6 +111,7 @@ class StatePublisher:
         """Wait for a change, and tell of it; one that could not be told is told with the next look."""
         if not deployer.wait_change(_WAIT_NS) and not self._behind:
             return
+        self._ending.wait(_SETTLED_S)
         self._behind = True
         observed = self.refresh()
         for fault in faults.look(observed.components):
@@ -119,6 +121,7 @@ class StatePublisher:
         self._behind = False
 
     def _publish_event(self, event: Event) -> None:
+        self.refresh()
         instance_id = self._runtime.instance_id
         message = reconfiguration_event(
             event.request, event.outcome, stamp=event.stamp, instance_id=instance_id

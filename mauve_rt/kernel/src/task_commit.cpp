@@ -117,7 +117,7 @@ void Task::refuse_commit() noexcept {
 
 bool Task::wait_release(const Participant& place, time_ns_t until_ns) noexcept {
   while (place.released.load(std::memory_order_acquire) == 0) {
-    if (!futex_wait_until(place.released, 0, until_ns)) break;
+    if (until_ns <= monotonic_now_ns() || !futex_wait_until(place.released, 0, until_ns)) break;
   }
   return place.released.load(std::memory_order_acquire) == Participant::kReleased;
 }
