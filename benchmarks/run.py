@@ -23,7 +23,7 @@ from recording import recording_rows
 from recording_killed import kill_rows
 from rows import Row, markdown, not_available
 from scale import scale_rows
-from service_calls import service_rows
+from service_calls import service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
 from start import start_rows
 from topics import topic_rows
@@ -47,6 +47,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "scale": scale_rows,
     "soak": soak_rows,
     "service": service_rows,
+    "service-stop": service_stop_rows,
     "topics": topic_rows,
     "start": start_rows,
     "command": command_rows,

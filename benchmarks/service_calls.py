@@ -1,10 +1,9 @@
-"""replace_core asked for over its ROS service, beside a bare Trigger call of the same client."""
+"""An executor's services: replace_core beside a bare Trigger call, and stop beside a preparation."""
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,12 +19,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rows import Row, compared
 from settings import Settings
 from std_srvs.srv import Trigger
+from talkers import Talkers, plugin_prefix
 
-from mauve_msgs.srv import ReplaceCore
+from mauve_msgs.srv import ReplaceCore, Start, Stop
 
 _CORES = ("mauve_examples/Accelerando", "mauve_examples/Metronome")
 _REPLY_S = 10.0
 _DISCOVERY_S = 20.0
+_UNDER_WAY_S = 0.02  # after which a preparation, which takes 0.1 s, is under way
 
 
 def service_rows(settings: Settings) -> Iterator[Row]:
@@ -33,41 +34,82 @@ def service_rows(settings: Settings) -> Iterator[Row]:
     with ExitStack() as stack:
         processes = stack.enter_context(Processes())
         executor = ExecutorProcess(processes, ARCHITECTURE)
-        brief = ExecutorProcess(processes, ARCHITECTURE, "report_phase_timeout_s:=0.0", name="brief")
         trigger_name = f"{executor.namespace}/trigger"
         processes.spawn("trigger", str(Path(__file__).with_name("trigger_server.py")), trigger_name)
         processes.await_output("trigger", "ready")
         calls = stack.enter_context(_SpunClient())
         trigger = calls.client(Trigger, trigger_name)
         replace = calls.client(ReplaceCore, f"{executor.namespace}/executor/replace_core")
-        replace_briefly = calls.client(ReplaceCore, f"{brief.namespace}/executor/replace_core")
 
-        def replacements(client: Any, number: int) -> list[float]:
+        def replacements(number: int) -> list[float]:
             cores = (_CORES[(number + index) % 2] for index in range(settings.service_calls))
             requests = (ReplaceCore.Request(component=COMPONENT, core=core) for core in cores)
-            return [calls.duration_ns(client, request) for request in requests]
+            return [calls.duration_ns(replace, request) for request in requests]
 
         def triggers(_: int) -> list[float]:
             return [calls.duration_ns(trigger, Trigger.Request()) for _ in range(settings.service_calls)]
 
-        rounds = native.interleaved(
-            settings.rounds, partial(replacements, replace), triggers, partial(replacements, replace_briefly)
+        rounds = native.interleaved(settings.rounds, replacements, triggers)
+    yield from _compared(
+        "replace_core of a 1 kHz component over its service",
+        rounds,
+        beside="a bare std_srvs/Trigger call",
+        ratio_limit=1.5,
+    )
+
+
+def service_stop_rows(settings: Settings) -> Iterator[Row]:
+    """Rounds of stops of a 1 kHz component, beside another one's core that is prepared, and alone."""
+    with ExitStack() as stack:
+        processes = stack.enter_context(Processes())
+        path = processes.folder / "talkers.yaml"
+        talkers = Talkers(path, count=2, priority=settings.priority, cpu=settings.cpu)
+        executor = ExecutorProcess(processes, talkers.architecture, plugins=plugin_prefix(processes.folder))
+        calls = stack.enter_context(_SpunClient())
+        stop, start, replace = (
+            calls.client(kind, f"{executor.namespace}/executor/{name}")
+            for kind, name in ((Stop, "stop"), (Start, "start"), (ReplaceCore, "replace_core"))
         )
+        changed, stopped = talkers.names
+
+        def stop_once() -> float:
+            time.sleep(_UNDER_WAY_S)
+            duration_ns = calls.duration_ns(stop, Stop.Request(component=stopped))
+            calls.duration_ns(start, Start.Request(component=stopped))
+            return duration_ns
+
+        def stop_beside_once() -> float:
+            preparing = replace.call_async(ReplaceCore.Request(component=changed, core="bench/Sluggish"))
+            duration_ns = stop_once()
+            if preparing.done():
+                raise BenchmarkError(f"the preparation was over too soon: {preparing.result().message}")
+            calls.result(replace, preparing)
+            return duration_ns
+
+        def stops(_: int) -> list[float]:
+            return [stop_once() for _ in range(settings.busy_stops)]
+
+        def stops_beside(_: int) -> list[float]:
+            return [stop_beside_once() for _ in range(settings.busy_stops)]
+
+        rounds = native.interleaved(settings.rounds, stops_beside, stops)
+    yield from _compared(
+        "stop of a 1 kHz component over its service while another one's new core is prepared",
+        rounds,
+        beside="the same alone",
+        ratio_limit=2.0,
+    )
+
+
+def _compared(what: str, rounds: Sequence[Any], *, beside: str, ratio_limit: float) -> Iterator[Row]:
     for percent in (50, 99):
         pairs = [tuple(float(np.percentile(part, percent)) / 1e3 for part in found) for found in rounds]
         yield compared(
-            f"replace_core of a 1 kHz component over its service, p{percent}",
+            f"{what}, p{percent}",
             [(pair[0], pair[1]) for pair in pairs],
             unit="us",
-            beside="a bare std_srvs/Trigger call",
-            ratio_limit=2.0,
-            note="the reply tells the phase of the release after the commit, for which it waits",
-        )
-        yield compared(
-            f"the same with report_phase_timeout_s 0, p{percent}",
-            [(pair[2], pair[1]) for pair in pairs],
-            unit="us",
-            beside="a bare std_srvs/Trigger call",
+            beside=beside,
+            ratio_limit=ratio_limit,
         )
 
 
@@ -111,14 +153,19 @@ class _SpunClient:
 
     def duration_ns(self, client: Any, request: Any) -> float:
         """How long a call takes that succeeds."""
-        answered = threading.Event()
         begin_ns = time.monotonic_ns()
         future = client.call_async(request)
+        answered_ns = self.result(client, future)
+        return float(answered_ns - begin_ns)
+
+    def result(self, client: Any, future: Any) -> int:
+        """When the answer to a call was there; it is yes."""
+        answered = threading.Event()
         future.add_done_callback(lambda _: answered.set())
         if not answered.wait(_REPLY_S):
             raise BenchmarkError(f"no reply of {client.srv_name} within {_REPLY_S:g} s")
-        duration_ns = time.monotonic_ns() - begin_ns
+        now_ns = time.monotonic_ns()
         reply = future.result()
         if not reply.success:
             raise BenchmarkError(f"{client.srv_name} refused: {reply.message}")
-        return float(duration_ns)
+        return now_ns

@@ -9,7 +9,12 @@ from native import ROOT, BenchmarkError
 
 _BUILT = ROOT / "build" / "benchmarks"
 _SOURCES = Path(__file__).with_name("ros")
-_COMPONENT = {"shell": "bench/TalkerShell", "core": "bench/Talker", "fsm": "bench/TalkerFsm"}
+_COMPONENT = {
+    "shell": "bench/TalkerShell",
+    "core": "bench/Talker",
+    "fsm": "bench/TalkerFsm",
+    "alternatives": ["bench/Sluggish"],
+}
 _TYPE = "geometry_msgs/msg/Point"
 
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A plug-in for benchmarks: a 1 kHz component that writes stamped points and trace records of its own, and remembers
 // when it was released.
+#include <chrono>
 #include <fstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "mauve_rt/elements/types.hpp"
@@ -74,6 +76,15 @@ class Talker : public mauve::Core<TalkerShell> {
   std::int64_t number_{0};
 };
 
+/// Takes its time to be prepared.
+class Sluggish : public Talker {
+ protected:
+  bool configure_hook() override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    return Talker::configure_hook();
+  }
+};
+
 struct TalkerFsm : mauve::Fsm<TalkerShell, Talker> {
   void define() override {
     mauve::State& talk = execution("Talk", "talk", &Talker::talk);
@@ -90,5 +101,6 @@ MAUVE_PLUGINS(registry) {
   registry.type<bench::Point>();
   registry.shell<bench::TalkerShell>("bench/TalkerShell");
   registry.core<bench::Talker>("bench/Talker", "bench/TalkerShell");
+  registry.core<bench::Sluggish>("bench/Sluggish", "bench/TalkerShell");
   registry.fsm<bench::TalkerFsm>("bench/TalkerFsm", "bench/TalkerShell");
 }

@@ -556,10 +556,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: wake-up latency of the 1 kHz component that writes these ",
     ),
     "| `replace_core` of a 1 kHz component over its service": (
-        "bench: replace_core of a 1 kHz component over its service, p",
+        "bench: replace_core of a 1 kHz component over its service",
     ),
-    "| the same without waiting for the next release to report its phase": (
-        "bench: the same with report_phase_timeout_s 0, p",
+    "| `stop` of a 1 kHz component over its service while another one's new core is prepared": (
+        "bench: stop of a 1 kHz component over its service while another one's new core is prepared",
     ),
     "| executor with 5 components, from its process to the first release": (
         "bench:  components, from its process to the first release",
@@ -626,6 +626,7 @@ PROMISE_NOTHING = (
     "(*) From a later run",
     "(**) Of the same day",
     "(***) Of the evening",
+    "(****) Of the night after",
     "| what | measured | reference",
     "| --- |",
     "| `mauve_",
