@@ -47,11 +47,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupts = Interrupts()
     # Imported here so that Ctrl-C while modules load is handled already.
     from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
+    from mauve_rt.cli.pipe import piped  # noqa: PLC0415
     from mauve_rt.node.discovery import limit_discovery  # noqa: PLC0415
 
     limit_discovery()  # its children's too
     try:
-        return _run(list(sys.argv[1:] if arguments is None else arguments), interrupts)
+        return piped(lambda: _run(list(sys.argv[1:] if arguments is None else arguments), interrupts))
     except BadInputError as error:
         return _complain(str(error), BAD_INPUT)
     except MissionError as error:

@@ -5,7 +5,7 @@
     mauve reconfigure /robot_1/executor steps.yaml --dry-run
 
 Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such
-executor.
+executor, 141 nobody reads the output any more.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import sys
 from collections.abc import Sequence
 
 from mauve_rt import __version__
+from mauve_rt.cli.pipe import piped
 from mauve_rt.cli.verb import run
 from mauve_rt.cli.verbs import VERBS
 
@@ -27,6 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         import argcomplete  # noqa: PLC0415
 
         argcomplete.autocomplete(parser)
+    return piped(lambda: _parse_and_run(parser, arguments))
+
+
+def _parse_and_run(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> int:
     args = parser.parse_args(arguments)
     return run(args.verb, args)
 

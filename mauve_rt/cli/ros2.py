@@ -11,6 +11,7 @@ from typing import Any
 from ros2cli.command import CommandExtension, add_subparsers_on_demand
 from ros2cli.plugin_system import PLUGIN_SYSTEM_VERSION, satisfies_version
 
+from mauve_rt.cli.pipe import piped
 from mauve_rt.cli.verb import OK, Verb, run
 from mauve_rt.cli.verbs import VERBS
 
@@ -26,9 +27,12 @@ class MauveCommand(CommandExtension):
     def main(self, *, parser: argparse.ArgumentParser, args: argparse.Namespace) -> int:  # noqa: ARG002
         """Run the verb; returns the exit status."""
         if not hasattr(args, "_verb"):
-            self._parser.print_help()
-            return OK
+            return piped(self._print_help)
         return int(args._verb.main(args=args))  # noqa: SLF001 - the name that ros2cli's commands use
+
+    def _print_help(self) -> int:
+        self._parser.print_help()
+        return OK
 
 
 class VerbExtension:

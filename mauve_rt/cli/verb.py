@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mauve_rt.cli.pipe import piped
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.trace.errors import TraceError
 
@@ -23,8 +24,15 @@ class Verb:
 
 def run(verb: Verb, args: argparse.Namespace) -> int:
     """Run a verb, under `mauve` or `ros2 mauve`; returns the exit status, errors are told on stderr."""
+    return piped(lambda: _run(verb, args))
+
+
+def _run(verb: Verb, args: argparse.Namespace) -> int:
     try:
         return verb.main(args)
+    except MemoryError:
+        print("mauve: there is not enough memory for it", file=sys.stderr)
+        return BAD_USAGE
     except (MauveError, TraceError) as error:
         print(f"mauve: {one_line(str(error))}", file=sys.stderr)
         return BAD_USAGE

@@ -35,7 +35,12 @@ def console() -> "Console":
     """Standard output; wide enough for every table where it is no terminal."""
     from rich.console import Console  # noqa: PLC0415
 
-    return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
+    class OurConsole(Console):
+        def on_broken_pipe(self) -> None:
+            """As of any other output: see `pipe`."""
+            raise BrokenPipeError
+
+    return OurConsole(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
 
 
 def report_lines(report: Sequence[Any]) -> list[str]:
