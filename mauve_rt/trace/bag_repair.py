@@ -105,7 +105,8 @@ def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
         told = _read_metadata(path)
     except TraceError as error:
         return str(error)
-    names = [Path(str(name)).name for name in told.get("relative_file_paths", [])]
+    listed = told.get("relative_file_paths")
+    names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
     found = [file.name for file in _named(files)]
     if names != found:
         return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"
@@ -127,8 +128,9 @@ def _read_metadata(path: Path) -> Mapping[str, Any]:
 
     """
     try:
-        text = (path / METADATA).read_text(encoding="utf-8")
-        read = read_yaml(text, max_bytes=_MAX_METADATA_BYTES)
+        with (path / METADATA).open("rb") as file:
+            raw = file.read(_MAX_METADATA_BYTES + 1)
+        read = read_yaml(raw.decode("utf-8"), max_bytes=_MAX_METADATA_BYTES)
     except FileNotFoundError as error:
         msg = "not there"
         raise TraceError(msg) from error
@@ -184,6 +186,10 @@ def _topics(files: Sequence[FileState]) -> list[BagTopic]:
 
 def _one_line(yaml: str) -> str:
     """Return the profiles as flow YAML on one line, as they go into metadata.yaml."""
+    try:
+        read = read_yaml(yaml)
+    except YamlError:  # whoever wrote it did not mean it to be read
+        return "[]"
     if "\n" not in yaml.strip():
         return yaml.strip() or "[]"
-    return json.dumps(read_yaml(yaml))  # JSON is flow YAML
+    return json.dumps(read)  # JSON is flow YAML

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from mauve_rt.trace.errors import TraceError
 
 RECORD_BYTES = 48
+MAX_COMPONENTS = 1 << 16  # a record's number of its component has 16 bits
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _UINT32 = struct.Struct("<I")
 _CLOCK_PAIR = struct.Struct("<qq")
@@ -87,6 +88,9 @@ def decode_batch(data: bytes) -> Batch:
         counters: list[Sequence[int]] = []
         for _ in range(2):
             at, count = _enter_sequence(body, at)
+            if count > MAX_COMPONENTS:
+                msg = f"trace batch: counters of {count:,} components, expected at most {MAX_COMPONENTS:,}"
+                raise TraceError(msg)
             counters.append(struct.unpack_from(f"<{count}Q", body, at))
             at += 8 * count
         at, count = _enter_sequence(body, at)

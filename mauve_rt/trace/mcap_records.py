@@ -8,7 +8,6 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from importlib import import_module
 from typing import Any, NamedTuple, Self
 
 HEAD = struct.Struct("<BQ")
@@ -297,6 +296,8 @@ _LAYOUTS: dict[type[Record], tuple[Opcode, str]] = {
 }
 _READ: dict[int, type[Record]] = {int(opcode): kind for kind, (opcode, _) in _LAYOUTS.items()}
 _READ[Opcode.MESSAGE] = Message
+READ_OPCODES = frozenset(_READ)
+"""Of records that are read; all others are an OtherRecord."""
 
 
 def serialized(*records: Record) -> bytes:
@@ -334,30 +335,3 @@ def split_records(data: Bytes) -> Iterator[tuple[int, int, int, int]]:
             raise McapError(msg)
         yield opcode, at, body, body + length
         at = body + length
-
-
-def unpacked(chunk: Chunk) -> bytes:
-    """Return the records in a chunk, as bytes.
-
-    Raises:
-        McapError: they cannot be uncompressed, or by a package that is not installed.
-
-    """
-    if not chunk.compression:
-        return chunk.data
-    packages = {"zstd": "zstandard", "lz4": "lz4"}
-    if chunk.compression not in packages:
-        msg = f"compressed by {chunk.compression}, expected zstd or lz4"
-        raise McapError(msg)
-    package = packages[chunk.compression]
-    try:
-        if chunk.compression == "zstd":
-            unpack = import_module("zstandard").ZstdDecompressor()
-            return bytes(unpack.decompress(chunk.data, max_output_size=chunk.uncompressed_size))
-        return bytes(import_module("lz4.frame").decompress(chunk.data))
-    except ModuleNotFoundError as error:
-        msg = f"compressed by {chunk.compression}: install python3-{package} (with pip: {package})"
-        raise McapError(msg) from error
-    except Exception as error:  # each compression has an error of its own
-        msg = f"a chunk cannot be unpacked ({error})"
-        raise McapError(msg) from error

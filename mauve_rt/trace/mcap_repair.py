@@ -28,7 +28,6 @@ from mauve_rt.trace.mcap_records import (
     Schema,
     serialized,
     split_records,
-    unpacked,
 )
 from mauve_rt.trace.mcap_scan import Found, McapScan, Told
 from mauve_rt.trace.progress import Progress, silent
@@ -62,7 +61,7 @@ class _ChunkSeen:
             message_start_time=chunk.message_start_time,
             uncompressed_size=chunk.uncompressed_size,
         )
-        data = unpacked(chunk)
+        data = found.unpacked
         for opcode, at, body, _ in split_records(data):
             if opcode == Opcode.MESSAGE:
                 channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(data, body)
@@ -206,7 +205,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             chunk_count += isinstance(record, Chunk)
             if isinstance(record, OtherRecord) and record.opcode in others:
                 others[Opcode(record.opcode)] += 1
-            for one in scan.inside(record):
+            for one in found.inside:
                 if isinstance(one, Message):
                     counts.add(one.channel_id, one.log_time)
             progress(scan.whole_bytes / max(scan.size, 1), "examining")

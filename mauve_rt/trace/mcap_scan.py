@@ -7,34 +7,38 @@ its last whole chunk.
 import os
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Self
 
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_file import MAGIC
+from mauve_rt.trace.mcap_limits import McapLimits
 from mauve_rt.trace.mcap_records import (
     HEAD,
+    READ_OPCODES,
     Channel,
     Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
     Header,
+    McapError,
     Message,
     Opcode,
+    OtherRecord,
     Record,
     Schema,
     Statistics,
     read_record,
     split_records,
-    unpacked,
 )
 
 _FOOTER_BYTES = HEAD.size + 20
 _ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
-_UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError, MemoryError)
+_UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError)
+_DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 
 class Found(NamedTuple):
@@ -43,6 +47,10 @@ class Found(NamedTuple):
     offset: int
     end: int
     record: Record
+    inside: list[Record]
+    """The records of a chunk, or the record itself."""
+    unpacked: bytes = b""
+    """The bytes of the records in a chunk."""
 
 
 @dataclass
@@ -79,6 +87,7 @@ class McapScan:
         except OSError as error:
             msg = f"bag file {path}: cannot be read ({error.strerror})"
             raise TraceError(msg) from error
+        self._limits = McapLimits(f"bag file {path}", self.size)
         try:
             self.header = self._read_header()
         except BaseException:
@@ -99,7 +108,12 @@ class McapScan:
         return os.fstat(self._file.fileno()).st_size
 
     def found(self) -> Iterator[Found]:
-        """Yield the records of the data section up to its end or the first damage; chunks fit their CRC."""
+        """Yield the records of the data section up to its end or the first damage; chunks fit their CRC.
+
+        Raises:
+            TraceError: what comes next would take more memory than its bytes justify, or than there is.
+
+        """
         while self.data_end is None:
             offset = self.whole_bytes
             try:
@@ -107,31 +121,31 @@ class McapScan:
             except _UNREADABLE as error:
                 self.damage = f"byte {offset:,}: {_reason(error)}"
                 return
+            except MemoryError as error:
+                msg = f"bag file {self.path}: byte {offset:,}: there is not enough memory for what comes here"
+                raise TraceError(msg) from error
             self.whole_bytes = found.end
             if isinstance(found.record, DataEnd):
                 self.data_end = found.record
                 self.whole_bytes = found.offset
+            for one in found.inside:
+                if isinstance(one, Schema):
+                    self.schemas[one.id] = one
+                elif isinstance(one, Channel):
+                    self.channels[one.id] = one
             yield found
 
     def messages(self) -> Iterator[tuple[Channel, Message]]:
-        """Yield all messages in the order of the file."""
+        """Yield all messages in the order of the file.
+
+        Raises:
+            TraceError: as found().
+
+        """
         for found in self.found():
-            for record in self.inside(found.record):
+            for record in found.inside:
                 if isinstance(record, Message):
                     yield self.channels[record.channel_id], record
-
-    def inside(self, record: Record) -> list[Record]:
-        """Return the records of a chunk, or the record itself; schemas and channels are noted."""
-        records = [record]
-        if isinstance(record, Chunk):
-            data = memoryview(unpacked(record))
-            records = [read_record(opcode, data[body:end]) for opcode, _, body, end in split_records(data)]
-        for one in records:
-            if isinstance(one, Schema):
-                self.schemas[one.id] = one
-            elif isinstance(one, Channel):
-                self.channels[one.id] = one
-        return records
 
     def type_of(self, channel: Channel) -> str:
         """Type of a channel's messages, package/msg/Name."""
@@ -156,7 +170,7 @@ class McapScan:
             if footer.summary_crc not in (0, crc):
                 return Told("the summary's CRC does not fit")
             return _told(tail[begin:at])
-        except (*_UNREADABLE, OSError) as error:
+        except (*_UNREADABLE, OSError, MemoryError) as error:
             return Told(f"the summary cannot be read ({_reason(error)})")
 
     def _read_header(self) -> Header:
@@ -197,14 +211,55 @@ class McapScan:
         if opcode == 0:
             msg = "no record begins here"
             raise ValueError(msg)
+        if opcode not in READ_OPCODES:  # nobody asks what is in it
+            return Found(offset, end, OtherRecord(opcode), [])
         data = self._file.read(length)
         if len(data) < length:
             msg = "the file became shorter"
             raise EOFError(msg)
+        if opcode in _DEFINITIONS:
+            self._limits.define(opcode, data, length)
         record = read_record(opcode, data)
         if isinstance(record, Chunk):
-            _check(record)
-        return Found(offset, end, record)
+            return self._chunk(offset, end, record)
+        if isinstance(record, Message):
+            self._check_channel(record.channel_id, self.channels)
+        return Found(offset, end, record, [record])
+
+    def _chunk(self, offset: int, end: int, chunk: Chunk) -> Found:
+        """See that a chunk is what its head promises.
+
+        Raises:
+            ValueError: it is not.
+
+        """
+        unpacked = self._limits.unpacked(chunk)
+        crc = zlib.crc32(unpacked)
+        if chunk.uncompressed_crc not in (0, crc):
+            msg = f"a chunk's CRC does not fit: expected {chunk.uncompressed_crc:08x}, found {crc:08x}"
+            raise ValueError(msg)
+        data = memoryview(unpacked)
+        inside: list[Record] = []
+        channels = set(self.channels)
+        for opcode, _, begin, stop in split_records(data):
+            self._limits.count(chunk, 1)
+            if opcode in _DEFINITIONS:
+                self._limits.define(opcode, data[begin:stop], stop - begin)
+            elif opcode != Opcode.MESSAGE:
+                continue  # nothing else belongs here
+            record = read_record(opcode, data[begin:stop])
+            if isinstance(record, Channel):
+                channels.add(record.id)
+            elif isinstance(record, Message) and record.channel_id not in channels:
+                self._check_channel(record.channel_id, channels)
+            inside.append(record)
+        return Found(offset, end, chunk, inside, unpacked)
+
+    @staticmethod
+    def _check_channel(channel_id: int, channels: Collection[int]) -> None:
+        if channel_id not in channels:
+            msg = f"a message of channel {channel_id}, of which the file has not told before"
+            raise McapError(msg)
 
 
 def _told(summary: bytes) -> Told:
@@ -216,19 +271,6 @@ def _told(summary: bytes) -> Told:
         elif isinstance(record, ChunkIndex):
             told.chunk_indexes.append(record)
     return told
-
-
-def _check(chunk: Chunk) -> None:
-    """See that a chunk is what its head promises.
-
-    Raises:
-        ValueError: it is not.
-
-    """
-    crc = zlib.crc32(unpacked(chunk))
-    if chunk.uncompressed_crc not in (0, crc):
-        msg = f"a chunk's CRC does not fit: expected {chunk.uncompressed_crc:08x}, found {crc:08x}"
-        raise ValueError(msg)
 
 
 def _reason(error: BaseException) -> str:

@@ -25,6 +25,8 @@ _FIELD = re.compile(
 _SECTION = re.compile(r"MSG:\s*(\S+)\s*\n")
 _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 _ENCAPSULATION_BYTES = 4
+_MAX_DEPTH = 100  # of types that use each other
+_MAX_FIELDS = 10_000  # of one type
 _EMPTY = ("structure_needs_at_least_one_member", "uint8", None)  # what DDS has of a message without a field
 
 _Fields = list[tuple[str, str, str | None]]
@@ -43,6 +45,7 @@ class Decoder:
         """
         self._definitions = _split(type_name, definition)
         self._readers: dict[str, Callable[[_Cdr], Any]] = {}
+        self._used_by: list[str] = []
         self._read = self._reader(type_name)
 
     def decode(self, data: bytes) -> Any:
@@ -76,20 +79,35 @@ class Decoder:
         if type_name not in self._definitions:
             msg = f"the definition does not tell the type {type_name}"
             raise ValueError(msg)
+        if type_name in self._used_by or len(self._used_by) > _MAX_DEPTH:
+            msg = f"the type {type_name} is defined by itself, or nested too deeply"
+            raise ValueError(msg)
         fields = self._definitions[type_name]
-        kind = make_dataclass(type_name.rpartition("/")[2], [name for name, _, _ in fields])
+        if len(fields) > _MAX_FIELDS:
+            msg = f"the type {type_name} has {len(fields):,} fields, expected at most {_MAX_FIELDS:,}"
+            raise ValueError(msg)
+        try:
+            kind = make_dataclass(type_name.rpartition("/")[2], [name for name, _, _ in fields])
+        except TypeError as error:  # a field given twice, or named by a word of Python
+            msg = f"the type {type_name} cannot be read ({error})"
+            raise ValueError(msg) from error
+        self._used_by.append(type_name)
         readers = [self._field_reader(of, count) for _, of, count in fields]
+        self._used_by.pop()
         return lambda cdr: kind(*[read(cdr) for read in readers])
 
     def _field_reader(self, type_name: str, count: str | None) -> Callable[["_Cdr"], Any]:
         if count is None:
             return self._reader(type_name)
         fixed = int(count) if count.isdigit() else None
+        if fixed == 0:
+            msg = "the definition has an array of no elements"
+            raise ValueError(msg)
         if type_name in _NUMBERS:
             code = _NUMBERS[type_name]
             return lambda cdr: cdr.numbers(code, cdr.number("I") if fixed is None else fixed)
         read = self._reader(type_name)
-        return lambda cdr: [read(cdr) for _ in range(cdr.number("I") if fixed is None else fixed)]
+        return lambda cdr: [read(cdr) for _ in range(cdr.count() if fixed is None else cdr.fitting(fixed))]
 
 
 class _Cdr:
@@ -105,6 +123,17 @@ class _Cdr:
         (value,) = struct.unpack_from(self._order + code, self._data, self._at)
         self._at += size
         return value
+
+    def count(self) -> int:
+        """The length of a sequence."""
+        return self.fitting(self.number("I"))
+
+    def fitting(self, count: int) -> int:
+        """A number of elements, none of which is shorter than a byte."""
+        if count > len(self._data) - self._at:
+            msg = f"{count:,} elements were expected at byte {self._at} of {len(self._data)}"
+            raise struct.error(msg)
+        return count
 
     def numbers(self, code: str, count: int) -> Any:
         dtype = np.dtype(self._order + code)

@@ -228,11 +228,12 @@ def _per_component(
                 parts.setdefault(int(numbers[begin]), []).append(data)
     first = min(batches, key=lambda batch: batch.monotonic_ns)
     last = max(batches, key=lambda batch: batch.monotonic_ns)
-    known = max(len(last.written), *(number + 1 for number in parts), len(components))
-    names = [*components, *(f"component {number}" for number in range(len(components), known))]
+    told = dict(enumerate(components))
+    present = sorted({*told, *parts})  # one damaged number is no reason for 65,535 components
     records: dict[str, Records] = {}
     losses: dict[str, Loss] = {}
-    for number, name in enumerate(names):
+    for number in present:
+        name = told.get(number, f"component {number}")
         rows = _in_order(np.frombuffer(bytearray().join(parts.pop(number, [])), RECORD))
         loss = _loss(rows, number, first, last)
         if name in records:  # removed and added again: the same component's next life

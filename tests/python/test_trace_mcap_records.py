@@ -12,6 +12,7 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.writer import CompressionType, Writer
 
 from mauve_rt.trace import mcap_records as ours
+from mauve_rt.trace.mcap_limits import unpacked
 from mauve_rt.trace.mcap_records import HEAD, McapError
 
 u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (16, 32, 64))
@@ -91,7 +92,7 @@ def test_chunks_and_messages_of_the_library_are_read(compression: CompressionTyp
     for opcode, _, body, end in ours.split_records(data):
         record = ours.read_record(opcode, data[body:end])
         if isinstance(record, ours.Chunk):
-            inside = ours.unpacked(record)
+            inside = unpacked(record)
             assert len(inside) == record.uncompressed_size
             found += [
                 ours.read_record(kind, inside[begin:stop])
@@ -115,7 +116,7 @@ def test_a_compression_that_cannot_be_undone_says_so(monkeypatch: pytest.MonkeyP
 
     for compression, message in (("xz", "expected zstd or lz4"), ("lz4", "cannot be unpacked")):
         with pytest.raises(McapError, match=message):
-            ours.unpacked(chunk(compression))
+            unpacked(chunk(compression))
     monkeypatch.setitem(__import__("sys").modules, "zstandard", None)
     with pytest.raises(McapError, match="install python3-zstandard"):
-        ours.unpacked(chunk("zstd"))
+        unpacked(chunk("zstd"))

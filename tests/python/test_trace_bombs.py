@@ -1,0 +1,292 @@
+"""Small files that claim to be large: every verb ends, in little memory, with one line or a good result."""
+
+import re
+import resource
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import zstandard
+from synthetic_traces import deploy
+from synthetic_traces import run as run_component
+
+from mauve_rt.trace.cdr import encode_names
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.mcap_file import MAGIC
+from mauve_rt.trace.mcap_records import (
+    HEAD,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    MessageIndex,
+    Opcode,
+    Record,
+    Schema,
+    serialized,
+)
+from mauve_rt.trace.mcap_scan import McapScan
+from mauve_rt.trace.reader import open_trace
+from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.synthetic import SyntheticSource
+
+ADDRESS_SPACE = 2 << 30
+NAMES = "mauve_msgs/msg/TraceNames"
+VERBS = """
+import sys
+from mauve_rt.cli.main import main
+bag = sys.argv[1]
+for words in (["trace", "info"], ["trace", "check"], ["trace", "stats"], ["trace", "repair"], ["report"],
+              ["trace", "export", "--format", "csv"]):
+    if words[-1] in ("csv", "report"):
+        words += ["--out", f"{bag}.{words[-1]}.html"]
+    words.insert(2 if words[0] == "trace" else 1, bag)
+    print("VERB", words[:2], main(words), flush=True)
+"""
+
+
+def run(bag: Path) -> tuple[list[int], str]:
+    """The exit status of every verb, and what they wrote to stderr, in 2 GB of addresses."""
+    limits = (ADDRESS_SPACE, ADDRESS_SPACE)
+    done = subprocess.run(
+        [sys.executable, "-c", VERBS, str(bag)],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limits),
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stdout.splitlines() if line.startswith("VERB")]
+    assert len(told) == 6
+    return [int(line.rsplit(" ", 1)[1]) for line in told], done.stderr
+
+
+def small_bag(folder: Path) -> None:
+    source = SyntheticSource(["a"])
+    deploy(source, "a")
+    run_component(source, "a", 20)
+    recorder = Recorder(source, folder, node_name="/executor")
+    recorder.start()
+    recorder.stop()
+
+
+def zstd_zeros(size: int) -> bytes:
+    """A frame that stands for so many zeros: blocks of 128 KB in 4 bytes each."""
+    block = 1 << 17
+    count = size // block
+    blocks = [
+        (block << 3 | 1 << 1 | (number == count - 1)).to_bytes(3, "little") + b"\0" for number in range(count)
+    ]
+    return b"\x28\xb5\x2f\xfd\xc0\x38" + struct.pack("<Q", count * block) + b"".join(blocks)
+
+
+def packed(data: bytes) -> Chunk:
+    return chunk(zstandard.ZstdCompressor().compress(data), len(data))
+
+
+def chunk(data: bytes, size: int, compression: str = "zstd") -> Chunk:
+    return Chunk(0, 0, size, 0, compression, data)
+
+
+def topic(definition: bytes = b"string[] components\nstring[] names\n") -> list[Record]:
+    return [Schema(1, NAMES, "ros2msg", definition), Channel(1, 1, "/trace", "cdr", {})]
+
+
+def said(data: bytes) -> Chunk:
+    return chunk(message_bytes(data), len(message_bytes(data)), "")
+
+
+def message_bytes(data: bytes) -> bytes:
+    body = struct.pack("<HIQQ", 1, 0, 0, 0) + data
+    return HEAD.pack(Opcode.MESSAGE, len(body)) + body
+
+
+def claims_more_than_it_says() -> Iterator[Record]:
+    yield chunk(zstd_zeros(4_200_000_000), 100)
+
+
+def unpacks_to_gigabytes() -> Iterator[Record]:
+    yield chunk(zstd_zeros(4_200_000_000), 4_200_000_000 >> 17 << 17)
+
+
+def claims_an_exabyte() -> Iterator[Record]:
+    yield chunk(zstd_zeros(1 << 20), 1 << 60)
+
+
+def claims_an_exabyte_in_lz4() -> Iterator[Record]:
+    yield chunk(b"\x04\x22\x4d\x18" + bytes(100), 1 << 60, "lz4")
+
+
+def claims_an_exabyte_as_it_is() -> Iterator[Record]:
+    yield chunk(bytes(100), 1 << 60, "")
+
+
+def many_chunks() -> Iterator[Record]:
+    for _ in range(30):
+        yield chunk(zstd_zeros(1 << 27), 1 << 27)
+
+
+def many_messages() -> Iterator[Record]:
+    yield from topic()
+    yield packed(message_bytes(b"") * 4_000_000)
+
+
+def many_other_records() -> Iterator[Record]:
+    yield packed(HEAD.pack(0x7F, 0) * 20_000_000)
+
+
+def a_large_schema() -> Iterator[Record]:
+    yield packed(serialized(Schema(1, "a/msg/B", "ros2msg", bytes(200_000_000))))
+
+
+def many_schemas() -> Iterator[Record]:
+    for number in range(1, 12):
+        yield packed(serialized(Schema(number, "a/msg/B", "ros2msg", bytes(10_000_000))))
+
+
+def an_index_inside_a_chunk() -> Iterator[Record]:
+    body = struct.pack("<HI", 1, 160_000_000) + bytes(160_000_000)
+    yield packed(HEAD.pack(Opcode.MESSAGE_INDEX, len(body)) + body)
+
+
+def a_long_sequence() -> Iterator[Record]:
+    yield from topic()
+    yield said(b"\0\1\0\0" + b"\xff" * 8)
+
+
+def endless_elements() -> Iterator[Record]:
+    definition = (
+        b"Nothing[] components\nstring[] names\n" + b"=" * 80 + b"\nMSG: mauve_msgs/Nothing\nuint8[0] none\n"
+    )
+    yield from topic(definition)
+    yield said(b"\0\1\0\0" + b"\xff" * 8)
+
+
+def a_type_of_itself() -> Iterator[Record]:
+    yield from topic(b"TraceNames[] components\nstring[] names\n")
+    yield said(encode_names(["a"], ["b"]))
+
+
+def a_field_named_class() -> Iterator[Record]:
+    yield from topic(b"string[] class\nstring[] class\n")
+    yield said(encode_names(["a"], ["b"]))
+
+
+def a_message_of_an_unknown_channel() -> Iterator[Record]:
+    yield said(b"\0\1\0\0")
+
+
+def one_chunk_indexed_often() -> Iterator[Record]:
+    yield from topic()
+    yield said(encode_names(["a"], ["b"]))
+    yield MessageIndex(1, [(0, 0)] * 1000)
+
+
+MAKERS = [
+    claims_more_than_it_says,
+    unpacks_to_gigabytes,
+    claims_an_exabyte,
+    claims_an_exabyte_in_lz4,
+    claims_an_exabyte_as_it_is,
+    many_chunks,
+    many_messages,
+    many_other_records,
+    a_large_schema,
+    many_schemas,
+    an_index_inside_a_chunk,
+    a_long_sequence,
+    endless_elements,
+    a_type_of_itself,
+    a_field_named_class,
+    a_message_of_an_unknown_channel,
+    one_chunk_indexed_often,
+]
+
+
+def file_of(*records: Record) -> bytes:
+    data = MAGIC + serialized(Header("ros2", "a bomb"), *records, DataEnd(0))
+    index = ChunkIndex(0, 0, len(MAGIC) + 30, 100, {}, 0, "", 1 << 60, 1 << 60)
+    return data + serialized(*[index] * 1000, Footer(len(data), 0, 0)) + MAGIC
+
+
+@pytest.mark.parametrize("make", MAKERS, ids=lambda make: make.__name__)
+def test_a_bomb_of_a_file(tmp_path: Path, make: Callable[[], Iterator[Record]]):
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    content = file_of(*make())
+    assert len(content) < 400_000
+    (bag / "bag_0.mcap").write_bytes(content)
+    statuses, errors = run(bag)
+    assert set(statuses) <= {0, 1, 2}
+    assert 2 in statuses  # there is no trace in it
+    assert all(line.startswith("mauve: ") for line in errors.splitlines()), errors
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (endless_elements, "an array of no elements"),
+        (a_type_of_itself, "is defined by itself"),
+        (a_field_named_class, "cannot be read (Field names must not be keywords: 'class')"),
+        (a_long_sequence, "4,294,967,295 elements were expected at byte 4 of 8"),
+    ],
+)
+def test_what_its_definitions_make_of_a_message_is_told(
+    tmp_path: Path, make: Callable[[], Iterator[Record]], words: str
+):
+    (tmp_path / "bag_0.mcap").write_bytes(file_of(*make()))
+    with pytest.raises(TraceError, match=re.escape(words)):
+        open_trace(tmp_path)
+
+
+def test_what_would_be_too_much_is_not_cut_off_by_a_repair(tmp_path: Path):
+    bag = tmp_path / "bag_0.mcap"
+    bag.write_bytes(content := file_of(*unpacks_to_gigabytes()))
+    statuses, errors = run(bag)
+    assert statuses == [2] * 6
+    assert errors.count("it is not read, for so little can be made to take all memory") == 6
+    assert bag.read_bytes() == content
+
+
+def test_an_attachment_of_terabytes_is_passed_over(tmp_path: Path):
+    begin = MAGIC + serialized(Header("ros2", "a hole")) + HEAD.pack(Opcode.ATTACHMENT, size := 1 << 40)
+    bag = tmp_path / "bag_0.mcap"
+    bag.write_bytes(begin)
+    try:
+        with bag.open("r+b") as file:
+            file.seek(len(begin) + size)
+            file.write(serialized(*topic(), said(encode_names(["a"], [])), DataEnd(0)))
+    except OSError:
+        pytest.skip("the file system takes no sparse files")
+    with McapScan(bag) as scan:
+        assert [channel.topic for channel, _ in scan.messages()] == ["/trace"]
+
+
+ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" for n in range(1, 60))
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        ALIASES.encode() + b"rosbag2_bagfile_information: {relative_file_paths: *a59}\n",
+        b"[" * 1_000_000,
+        b"rosbag2_bagfile_information: {relative_file_paths: 5, custom_data: [], message_count: {}}\n",
+        b"rosbag2_bagfile_information: {relative_file_paths: [\xff]}\n",
+        b"\0" * 100,
+        "rosbag2_bagfile_information: {}\n".encode("utf-16"),
+        b"",
+    ],
+    ids=["aliases", "deep", "types", "ff", "nul", "utf16", "empty"],
+)
+def test_a_bomb_of_metadata(tmp_path: Path, metadata: bytes):
+    bag = tmp_path / "bag"
+    small_bag(bag)
+    (bag / "metadata.yaml").write_bytes(metadata)
+    statuses, errors = run(bag)
+    assert statuses == [0, 1, 0, 0, 0, 0], errors
