@@ -109,8 +109,8 @@ struct Counter : mauve::Core<CounterShell> {
 
   virtual void act() {
     if (const auto sample = shell().set.read(); sample.is_new()) {
-      if (sample.value.data < -1e8) throw 42;
-      if (sample.value.data < -1e7) throw std::runtime_error("bytes \xff\xfe, no text");
+      if (sample.value.data == -2e8) throw 42;
+      if (sample.value.data == -2e7) throw std::runtime_error("bytes \xff\xfe, no text");
       if (sample.value.data < -1e6) throw std::runtime_error("set to something unheard of");
       count = sample.value.data;
     }
