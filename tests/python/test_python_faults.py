@@ -52,6 +52,29 @@ class FailsInGuard(CountCore):
         raise LookupError("no answer")
 
 
+class FailsInSurrogates(CountCore):
+    def act(self) -> None:
+        raise RuntimeError("no text: \udcff")
+
+
+class _WordlessError(Exception):
+    def __str__(self) -> str:
+        raise SystemExit("no words")
+
+
+class FailsWithoutWords(CountCore):
+    def act(self) -> None:
+        raise _WordlessError
+
+
+# As the file of a path whose bytes are no UTF-8 names it: even its traceback has no valid text.
+_CODE = compile("def act(self):\n    raise SystemExit('left')\n", "/odd/\udcff.py", "exec")
+
+
+class FailsInAnOddPlace(CountCore):
+    exec(_CODE)  # noqa: S102 - the code above
+
+
 class GuardedFsm(Fsm[CountShell, FailsInGuard]):
     def define(self) -> None:
         act, pause = self.execution("Act", FailsInGuard.act), self.wait("Pause", ms_to_ns(2))
@@ -74,6 +97,9 @@ class FailsInTake(CountCore):
     [
         (FailsInAct, ActFsm, ["ValueError: five is too many", "test_python_faults.py", "deeper", "act"]),
         (FailsInGuard, GuardedFsm, ["LookupError: no answer", "test_python_faults.py", "is_five"]),
+        (FailsInSurrogates, ActFsm, ["RuntimeError: no text: \\udcff"]),
+        (FailsWithoutWords, ActFsm, ["_WordlessError"]),
+        (FailsInAnOddPlace, ActFsm, ["SystemExit: left", "/odd/\\udcff.py"]),
     ],
 )
 def test_what_it_raises_is_a_fault_with_its_traceback(built: Stage, core: Any, fsm: Any, words: list[str]):
