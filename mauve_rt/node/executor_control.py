@@ -169,12 +169,7 @@ class Control:
             if not request.dry_run:
                 return self._start_or_stop(step, request)
         with self._bound(plan.bound, dry_run=request.dry_run):
-            committed = self._runtime.deployer.make(
-                plan.transaction,
-                dry_run=request.dry_run,
-                expected_revision=kernel_revision if request.expected_revision else 0,
-                commit_timeout_ns=_timeout_ns(request),
-            )
+            committed = self._commit(plan, request, kernel_revision=kernel_revision)
         if request.dry_run:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
@@ -190,6 +185,20 @@ class Control:
     def _still_taken(self, parts: Sequence[ComponentDescription]) -> dict[str, int]:
         there = {*self._runtime.resources(), *(part.name for part in parts)}
         return {name: taken for name, taken in self._taken.items() if name in there}
+
+    def _commit(self, plan: Plan, request: Request, *, kernel_revision: int) -> Committed:
+        try:
+            return self._runtime.deployer.make(
+                plan.transaction,
+                dry_run=request.dry_run,
+                expected_revision=kernel_revision if request.expected_revision else 0,
+                commit_timeout_ns=_timeout_ns(request),
+            )
+        except MauveError as error:
+            if error_code(error) == "wrong_revision":  # of what changed meanwhile, in our own count
+                self._runtime.observe()
+                check_revision(request, self._runtime)
+            raise
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
         check_revision(request, self._runtime)

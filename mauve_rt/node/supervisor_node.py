@@ -48,9 +48,7 @@ class Supervisor:
         """
         self._node = node
         self.watch = watch = Watch(node.get_logger().error)
-        self._pending: dict[
-            Any, Any
-        ] = {}  # by client (changes, dry runs): the last call
+        self._pending: dict[Any, Any] = {}  # by client (changes, dry runs): the last call
         rules = rules_file.rules
         conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
         self._engine = RuleEngine(

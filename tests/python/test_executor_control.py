@@ -5,11 +5,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mauve_rt._kernel import ComponentDescription
 from mauve_rt.model import load_architecture
+from mauve_rt.node import executor_control
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
@@ -379,3 +381,23 @@ def test_changes_made_at_once_have_a_revision_each(runtime: Runtime, control: Co
     revisions = [outcome.revision for outcome in outcomes]
     assert len(set(revisions)) == len(steps)
     assert runtime.revision == max(revisions)
+
+
+def test_what_is_stopped_while_a_request_is_planned_is_another_revision(
+    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    revision = runtime.revision
+    plan = executor_control.Plan
+
+    def stop_meanwhile(steps: tuple[Step, ...], *rest: Any) -> Any:
+        if steps[0].kind == "set_property" and _part(runtime, "free").state == "RUNNING":
+            assert _ask(control, Step("stop", "free")).success
+        return plan(steps, *rest)
+
+    monkeypatch.setattr(executor_control, "Plan", stop_meanwhile)
+    steps = (Step("set_property", "counter", "step", "2.0"), Step("set_property", "brave", "step", "2.0"))
+    refused = _ask(control, *steps, expected_revision=revision)
+    assert refused.code is Code.WRONG_REVISION
+    assert f"is at revision {runtime.revision}, the request expected {revision};" in refused.message
+    assert _ask(control, Step("start", "free")).success
+    assert _ask(control, *steps).success, "who names no revision is concerned by its own components only"
