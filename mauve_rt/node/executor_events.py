@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mauve_rt.node.executor_requests import Outcome, Request
@@ -105,4 +105,6 @@ class Events:
     def _completed(self, outcome: Outcome) -> Outcome:
         while outcome.pending is not None and not self._hurried:
             outcome = outcome.pending.look(outcome, wait_ns=_LOOK_NS)
-        return outcome if outcome.pending is None else outcome.pending.look(outcome, wait_ns=0)
+        if outcome.pending is not None:
+            outcome = outcome.pending.look(outcome, wait_ns=0)
+        return replace(outcome, pending=None)  # which would keep the deployer

@@ -1,0 +1,102 @@
+"""Events are told in the order in which they were decided, when all of them is known."""
+
+import threading
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from mauve_rt.node.executor_events import Event, Events
+from mauve_rt.node.executor_requests import Code, Outcome, Request
+
+PATIENCE_S = 100.0
+
+
+class Release:
+    """A release that is still to come."""
+
+    def __init__(self) -> None:
+        self.came = threading.Event()
+        self.asked = threading.Event()
+
+    def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
+        self.asked.set()
+        if not self.came.wait(wait_ns / 1e9):
+            return outcome
+        return replace(outcome, message="all is known", pending=None)
+
+
+class Ear:
+    """What was told, and how many it was waited for."""
+
+    def __init__(self) -> None:
+        self.heard: list[Event] = []
+        self._changed = threading.Condition()
+
+    def __call__(self, event: Event) -> None:
+        with self._changed:
+            self.heard.append(event)
+            self._changed.notify_all()
+
+    def messages(self, count: int) -> list[str]:
+        with self._changed:
+            assert self._changed.wait_for(lambda: len(self.heard) >= count, PATIENCE_S)
+            return [event.outcome.message for event in self.heard]
+
+
+def event(message: str, pending: Any = None) -> Event:
+    return Event(Request(), Outcome(code=Code.OK, message=message, pending=pending), None)
+
+
+@pytest.fixture
+def ear() -> Ear:
+    return Ear()
+
+
+def test_an_event_waits_for_what_it_lacks_and_the_next_one_for_it(ear: Ear) -> None:
+    events, release = Events(ear, pytest.fail), Release()
+    for each in (event("of a change", release), event("of a stop")):
+        events.add(each)
+        events.tell(each)
+    assert release.asked.wait(PATIENCE_S)
+    assert ear.heard == []
+    release.came.set()
+    assert ear.messages(2) == ["all is known", "of a stop"]
+    assert ear.heard[0].outcome.pending is None
+    events.close()
+
+
+def test_the_one_who_asked_comes_first(ear: Ear) -> None:
+    events = Events(ear, pytest.fail)
+    first, second = event("first"), event("second")
+    events.add(first)
+    events.add(second)
+    events.tell(second)
+    events.tell(first)
+    assert ear.messages(2) == ["first", "second"]
+    events.close()
+
+
+def test_at_the_end_all_are_told_with_what_is_known(ear: Ear) -> None:
+    events, release = Events(ear, pytest.fail), Release()
+    events.add(event("of a change", release))  # who asked has no answer, nor has the release come
+    events.close()
+    assert ear.messages(1) == ["of a change"]
+    assert ear.heard[0].outcome.pending is None
+
+
+def test_an_event_that_cannot_be_told_keeps_no_other_one_back(ear: Ear) -> None:
+    complaints: list[str] = []
+
+    def tell(told: Event) -> None:
+        if told.outcome.message == "bad":
+            raise ValueError("not that one")
+        ear(told)
+
+    events = Events(tell, complaints.append)
+    for each in (event("bad"), event("good")):
+        events.add(each)
+        events.tell(each)
+    assert ear.messages(1) == ["good"]
+    assert complaints == ["an event was not told: ValueError: not that one"]
+    events.close()
