@@ -10,6 +10,7 @@
 #include <string>
 
 #include "grey_image.hpp"
+#include "utf8.hpp"
 
 namespace mauve_examples {
 
@@ -28,12 +29,39 @@ struct MapDescription {
   double free_threshold{0.25};
 };
 
+constexpr std::size_t kMaxMapFileBytes = 1'000'000;
+
+/// The text of a map file. yaml-cpp takes any bytes for text. Throws MapError.
+std::string read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(kMaxMapFileBytes + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxMapFileBytes) {
+    throw MapError({"map file is too large", path.string(),
+                    "at most " + std::to_string(kMaxMapFileBytes) + " bytes", "more",
+                    "give the map's .yaml file, not its image"});
+  }
+  const std::size_t wrong = std::min(first_no_utf8(text), text.find('\0'));
+  if (wrong < text.size()) {
+    const std::size_t line_begin = wrong == 0 ? std::string::npos : text.rfind('\n', wrong - 1);
+    const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(wrong), '\n') + 1;
+    const std::size_t column = line_begin == std::string::npos ? wrong + 1 : wrong - line_begin;
+    throw MapError({"map file is no text",
+                    path.string() + ":" + std::to_string(line) + ":" + std::to_string(column),
+                    "text in UTF-8", "byte " + std::to_string(static_cast<unsigned char>(text[wrong])),
+                    "give the map's .yaml file, not its image, saved as UTF-8"});
+  }
+  return text;
+}
+
 /// Reads the values of one map file; every complaint names the file, the line and the key.
 class MapYaml {
  public:
   explicit MapYaml(const fs::path& path) : path_(path) {
+    const std::string content = read_text(path);
     try {
-      root_ = YAML::LoadFile(path.string());
+      root_ = YAML::Load(content);
     } catch (const YAML::Exception& error) {
       throw MapError({"map file is no valid YAML", where(error.mark), "YAML as the ROS map server reads it",
                       error.msg, "give the map's .yaml file, not its image"});

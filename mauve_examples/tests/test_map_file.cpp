@@ -54,6 +54,25 @@ TEST(MapFile, GreyIsUnknownUnderTheThresholdsOfMapSaver) {
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kUnknown, kFree}));
 }
 
+TEST(MapFile, WhatIsNoTextIsRefusedWithItsPlace) {
+  const auto told = [](const std::string& yaml, const char* words) {
+    const std::string message = refusal(yaml);
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+    EXPECT_TRUE(std::all_of(message.begin(), message.end(), [](unsigned char c) { return c < 0x80; }))
+        << message;
+  };
+  told("image: map.pgm\nname: \xFF\n", "map.yaml:2:7: expected text in UTF-8, found byte 255");
+  told("image: map\xFF.pgm\nresolution: 0.5\norigin: [0, 0, 0]\n", "map.yaml:1:11:");
+  told("\xFF\xFEi\0m\0", "map.yaml:1:1:");                       // UTF-16
+  told(std::string("image: map.pgm\n\0", 16), "map.yaml:2:1:");  // a null byte
+  told("a: \xC0\xAF\n", "map.yaml:1:4:");                        // an overlong form
+  told("a: \xED\xA0\x80\n", "map.yaml:1:4:");                    // a surrogate
+  told("a: \xF4\x90\x80\x80\n", "map.yaml:1:4:");                // above U+10FFFF
+  told("a: b\xC3", "map.yaml:1:5:");                             // cut off
+  told(std::string(1'000'001, ' '), "too large");
+  EXPECT_EQ(load("# \xC3\xA9 \xE2\x82\xAC \xF0\x9F\x98\x80\n" + good_yaml(), "P5 1 1 255\n\xFE").width, 1);
+}
+
 TEST(MapFile, TakesCommentsAnywhereInTheHeader) {
   const GridMap map = load(good_yaml(), "P5\n# made by hand\n2 # two wide\n1\n#255 is white\n255\n\xFE\xFE");
   EXPECT_EQ(map.cells, (std::vector<std::int8_t>{kFree, kFree}));

@@ -69,9 +69,12 @@ class YamlFile:
         try:
             return raw.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            line = raw.count(b"\n", 0, error.start) + 1
-            column = error.start - raw.rfind(b"\n", 0, error.start)
-            raise self.error("not text in UTF-8", line=line, column=column, code="io") from None
+            before = error.object[: error.start].decode("utf-8")
+            line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+            remedy = "save it as UTF-8"
+            raise self.error(
+                "not text in UTF-8", line=line, column=column, code="io", remedy=remedy
+            ) from None
 
 
 def _part(node: Node, part: int | str) -> tuple[Node, tuple[int, int]] | None:

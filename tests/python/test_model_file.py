@@ -507,7 +507,10 @@ def test_all_problems_are_told_in_the_order_of_the_file(tmp_path: Path, plugin_p
     [
         (b"", ":1:1: not an architecture file: expected the keys mauve, executor, components"),
         (b"- 1\n", ":1:1: not an architecture file"),
-        (b"mauve: 1\nx: \xe9\n", ":2:4: not text in UTF-8"),
+        (b"mauve: 1\nx: \xe9\n", ":2:4: not text in UTF-8; save it as UTF-8"),
+        (b"x: \xc3\xa9\xff\n", ":1:5: not text in UTF-8"),  # the column counts characters
+        ("mauve: 1\n".encode("utf-16"), ":1:1: not text in UTF-8"),
+        (b"mauve: 1\n\0", ":2:1: not YAML: the character U+0000 is not allowed"),
         (b"mauve: 1\n---\nmauve: 1\n", ":2:1: not YAML: expected a single document"),
         (b"a: &a [*a]\n", "the file has no 'mauve'"),
         (
@@ -523,6 +526,12 @@ def test_what_is_no_architecture_file(text: bytes, message: str, tmp_path: Path)
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, text)
     assert message in str(caught.value)
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").mkdir()
+    with pytest.raises(ArchitectureFileError, match=r"robot.yaml:1:1: cannot read the file: Is a directory"):
+        load_architecture(tmp_path / "robot.yaml")
 
 
 def test_missing_file(tmp_path: Path) -> None:

@@ -52,6 +52,29 @@ def test_bad_maps(start: Starter, spoilt: dict, words: str):
     assert words in refused(start, "--map", write_map(start.folder, **spoilt))
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"image: m\xff.pgm\n",
+        GOOD.encode("utf-16"),
+        b"image: m.pgm\0\n",
+        b"",
+        b"[" * 100_000,
+        b"a: " * 400_000,
+    ],
+    ids=["ff", "utf16", "nul", "empty", "deep", "huge"],
+)
+def test_a_map_file_that_is_no_text_or_no_map(start: Starter, content: bytes):
+    path = write_map(start.folder)
+    Path(path).write_bytes(content)
+    assert "m.yaml" in refused(start, "--map", path)
+
+
+def test_a_folder_is_no_map_file(start: Starter):
+    (start.folder / "m.yaml").mkdir()
+    assert "m.yaml" in refused(start, "--map", str(start.folder / "m.yaml"))
+
+
 @pytest.mark.parametrize("name", ["none.yaml", "/nowhere/none.yaml", "nosuchmap"])
 def test_a_map_that_is_not_there(start: Starter, name: str):
     assert name in refused(start, "--map", name)
