@@ -9,7 +9,7 @@ from mauve_msgs.msg import ComponentInfo, StepReport
 
 COMPONENT = "exploration"
 DONE_LASTS_S = 1.5  # before its first scan, or while a peer's map arrives, a robot may think so for a moment
-TOLD_DECISIONS = ("condition_true", "failed", "suppressed")
+TOLD_DECISIONS = ("adopted", "condition_true", "failed", "suppressed")
 
 
 @dataclass

@@ -63,6 +63,34 @@ def test_verbs_do_what_they_say(mauve: Mauve) -> None:
     assert states["counter"]["core"] == "executor_tests/Backwards"
 
 
+def test_output_that_nobody_reads_ends_a_verb_quietly(
+    mauve: Mauve, environment: dict[str, str], graph: Any
+) -> None:
+    def unread(*words: str) -> subprocess.Popen[str]:
+        reading, writing = os.pipe()
+        os.close(reading)
+        try:
+            return subprocess.Popen(
+                [sys.executable, "-m", "mauve_rt.cli", *words],
+                stdout=writing,
+                stderr=subprocess.PIPE,
+                text=True,
+                env=environment,
+            )
+        finally:
+            os.close(writing)
+
+    for words in (("list", NODE), ("list", NODE, "--json"), ("nodes",)):
+        process = unread(*words)
+        assert (process.communicate(timeout=PATIENCE_S)[1], process.returncode) == ("", 141)
+    events = unread("events", NODE)
+    graph.spin_until(lambda: graph.node.count_subscribers(f"{NODE}/events") > 0, "the listener")
+    deadline_s = time.monotonic() + PATIENCE_S
+    while events.poll() is None and time.monotonic() < deadline_s:  # a refusal is an event, too
+        mauve("stop", NODE, "nobody")
+    assert (events.communicate(timeout=PATIENCE_S)[1], events.returncode) == ("", 141)
+
+
 def test_a_transaction_is_carried_out_and_reported_step_by_step(mauve: Mauve, tmp_path: Path) -> None:
     file = tmp_path / "steps.yaml"
     file.write_text(STEPS, encoding="utf-8")
