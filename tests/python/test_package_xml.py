@@ -29,6 +29,7 @@ MODULES = {
     "rosbags": ("", "rosbags"),  # no distribution packages it: the tests' only
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
     "yaml": ("python3-yaml", "PyYAML"),
+    "zstandard": ("", "mcap"),  # comes with it
 }
 OPTIONAL = {"perfetto"}  # rosdep has no key; where it is used it says how to get it
 # Of CMake's packages that rosdep calls otherwise: its keys (rosdep/base.yaml); none if nothing is installed.
