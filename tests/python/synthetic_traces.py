@@ -1,9 +1,11 @@
 """Traces of components that never ran, as their reader gives them."""
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.records import RECORD, Kind, Records
 from mauve_rt.trace.synthetic import SyntheticSource
 from mauve_rt.trace.trace import Loss, Message, Trace
@@ -23,6 +25,22 @@ def trace_of(source: SyntheticSource, messages: tuple[Message, ...] = ()) -> Tra
         losses[name] = Loss(drain.written[index], len(rows), drain.dropped[index], drain.dropped[index])
     pairs = np.array([(drain.monotonic_ns, drain.realtime_ns)], np.int64)
     return Trace(records, tuple(source.trace_names()), losses, pairs, lambda _: iter(messages))
+
+
+def record(source: SyntheticSource, folder: Path) -> Path:
+    """A finished bag of what the source has been given."""
+    recorder = Recorder(source, folder, node_name="/executor")
+    recorder.start()
+    recorder.stop()
+    return folder
+
+
+def record_small_bag(folder: Path) -> Path:
+    """A bag of one component that ran a little."""
+    source = SyntheticSource(["a"])
+    deploy(source, "a")
+    run(source, "a", 20)
+    return record(source, folder)
 
 
 def deploy(source: SyntheticSource, component: str, *, period_ns: int = PERIOD_NS) -> None:

@@ -6,12 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from synthetic_traces import deploy, run
+from synthetic_traces import record_small_bag
 
 from mauve_rt.cli.pipe import PIPE_CLOSED, piped
 from mauve_rt.model.ament_index import share_folder
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.synthetic import SyntheticSource
 
 BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
 
@@ -36,14 +34,7 @@ def nobody_reads(*words: str, both: bool = False, unbuffered: bool = False) -> t
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> str:
-    source = SyntheticSource(["a"])
-    deploy(source, "a")
-    run(source, "a", 20)
-    folder = tmp_path_factory.mktemp("pipe") / "bag"
-    recorder = Recorder(source, folder, node_name="/executor")
-    recorder.start()
-    recorder.stop()
-    return str(folder)
+    return str(record_small_bag(tmp_path_factory.mktemp("pipe") / "bag"))
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 import zstandard
-from synthetic_traces import deploy
-from synthetic_traces import run as run_component
+from synthetic_traces import record_small_bag
 
 from mauve_rt.trace.cdr import encode_names
 from mauve_rt.trace.errors import TraceError
@@ -32,8 +31,6 @@ from mauve_rt.trace.mcap_records import (
 )
 from mauve_rt.trace.mcap_scan import McapScan
 from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.synthetic import SyntheticSource
 
 ADDRESS_SPACE = 2 << 30
 NAMES = "mauve_msgs/msg/TraceNames"
@@ -65,15 +62,6 @@ def run(bag: Path) -> tuple[list[int], str]:
     told = [line for line in done.stdout.splitlines() if line.startswith("VERB")]
     assert len(told) == 6
     return [int(line.rsplit(" ", 1)[1]) for line in told], done.stderr
-
-
-def small_bag(folder: Path) -> None:
-    source = SyntheticSource(["a"])
-    deploy(source, "a")
-    run_component(source, "a", 20)
-    recorder = Recorder(source, folder, node_name="/executor")
-    recorder.start()
-    recorder.stop()
 
 
 def zstd_zeros(size: int) -> bytes:
@@ -286,7 +274,7 @@ ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" f
 )
 def test_a_bomb_of_metadata(tmp_path: Path, metadata: bytes):
     bag = tmp_path / "bag"
-    small_bag(bag)
+    record_small_bag(bag)
     (bag / "metadata.yaml").write_bytes(metadata)
     statuses, errors = run(bag)
     assert statuses == [0, 1, 0, 0, 0, 0], errors

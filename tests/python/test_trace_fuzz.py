@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from synthetic_traces import deploy, overrun, run, swap
+from synthetic_traces import deploy, overrun, record, run, swap
 
 from mauve_rt.cli.trace_views import info_values, statistics_values
 from mauve_rt.trace import TraceError
@@ -16,7 +16,6 @@ from mauve_rt.trace.export_csv import export_csv
 from mauve_rt.trace.export_perfetto import export_perfetto
 from mauve_rt.trace.reader import open_trace
 from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.recorder import Recorder
 from mauve_rt.trace.statistics import all_statistics
 from mauve_rt.trace.synthetic import SyntheticSource
 
@@ -32,11 +31,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     instant = overrun(source, "a", instant)
     swap(source, "a", instant)
     run(source, "a", 3, begin_ns=instant)
-    folder = tmp_path_factory.mktemp("fuzz") / "bag"
-    recorder = Recorder(source, folder, node_name="/executor")
-    recorder.start()
-    recorder.stop()
-    return folder
+    return record(source, tmp_path_factory.mktemp("fuzz") / "bag")
 
 
 def read(bag: Path, out: Path) -> None:
