@@ -38,6 +38,8 @@ def print_components(reply: Any, out: Console | None = None) -> None:
             text = in_words(component)
             words = f"hung: {text}" if component.hung else text
             out.print(f"[{style}]{component.name}[/]: {escape(words)}", soft_wrap=True)
+    for line in reply.warnings:
+        out.print(f"[yellow]warning[/]: {escape(line)}", soft_wrap=True)
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")

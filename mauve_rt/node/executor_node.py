@@ -11,6 +11,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
 from mauve_rt.node.executor_bound_resources import BoundResources
+from mauve_rt.node.executor_console import NameWatch, TopicWatch, number_of
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_diagnostics import Diagnostics
 from mauve_rt.node.executor_parameter_services import ParameterServices
@@ -65,6 +66,8 @@ class ExecutorNode(LifecycleNode):
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording)
         self._properties = Parameters(self, runtime)
+        self._topic_watch = TopicWatch(self.get_logger())
+        self._name_watch = NameWatch(self)
         control = Control(
             runtime,
             phase_timeout_s=self._settings["report_phase_timeout_s"],
@@ -80,6 +83,7 @@ class ExecutorNode(LifecycleNode):
             state=self._state,
             parameters=self._properties,
             watch=self.watch,
+            warnings=self._name_watch.warnings,
             control_group=control_group,
             direct_group=self.direct_group,
             query_group=query_group,
@@ -152,12 +156,17 @@ class ExecutorNode(LifecycleNode):
         if bag:
             self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
         self._log_realtime()
+        parts = number_of(self._runtime.components(), "component")
+        resources = number_of(self._runtime.described_resources(), "resource")
+        recorded = f", recording to {bag}" if bag else ""
+        self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
 
     def _activate(self) -> None:
         with self._starting_or_ending:
             self._runtime.activate()
             self._bound.start()
             self._state.start(self._runtime.deployer)
+        self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
 
     def _end(self) -> None:
         self.quiesce()
@@ -206,6 +215,7 @@ class ExecutorNode(LifecycleNode):
             if self._runtime.active:
                 self._runtime.deactivate()
                 self.watch.guarded("~/state", self._state.refresh)()
+                self.get_logger().info("deactivated: outputs are safe, components parked")
             self._state.stop()
             self._bound.stop()
 
@@ -240,12 +250,21 @@ class ExecutorNode(LifecycleNode):
         self._state.flush()
         self._recording.stop()
         self._bound.close()
+        was_configured = self._runtime.configured
         self._runtime.cleanup()
         self._properties.follow()
+        if was_configured:
+            self.get_logger().info("cleaned up: nothing is configured")
 
     def _tell_health(self) -> None:
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
+        self._topic_watch.look(
+            self._bound.topics(),
+            types=self._bound.other_types(),
+            kinds={resource.name: resource.kind for resource in self._runtime.described_resources()},
+        )
+        self._name_watch.look()
 
     def _log_realtime(self) -> None:
         status = self._runtime.realtime_status()

@@ -127,9 +127,15 @@ class ParameterServices:
                     known = self._node.list_parameters([], 0).names
                     remedy = did_you_mean(parameter.name, known)
                     return _refused(f"there is no parameter {shown(parameter.name)}; {remedy}")
-                if reason := self._refusal(parameter.name):
+                if not self._is_present(parameter) and (reason := self._refusal(parameter.name)):
                     return _refused(reason)
-            return self._node.set_parameters_atomically(list(parameters))
+            changed = [parameter for parameter in parameters if not self._is_present(parameter)]
+            return self._node.set_parameters_atomically(changed)
+
+    def _is_present(self, parameter: Parameter) -> bool:
+        """Whether it has this value already, as in a parameter file that `ros2 param load` gives back."""
+        present = self._node.get_parameter(parameter.name)
+        return (present.type_, present.value) == (parameter.type_, parameter.value)
 
 
 def _refused(reason: str) -> SetParametersResult:

@@ -87,7 +87,7 @@ class Parameters:
 
 def _descriptor(item: PropertyDescription, *, is_protected: bool) -> ParameterDescriptor:
     unit = f"[{item.unit}]" if item.unit else ""
-    parts = " and ".join(item.structural)
+    parts = " and ".join(f"the {part}" for part in item.structural)
     constraint = _STRUCTURAL.format(parts, parts) if parts else ""
     descriptor = ParameterDescriptor(
         type=_TYPES[item.type].value,

@@ -17,6 +17,7 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.node.executor_bound_resources import BoundResources
+from mauve_rt.node.executor_console import log_request
 from mauve_rt.node.executor_control import Control
 from mauve_rt.node.executor_events import Event
 from mauve_rt.node.executor_messages import component_infos, realtime_status, resource_infos, step_reports
@@ -50,15 +51,18 @@ class Services:
         bound: BoundResources,
         state: StatePublisher,
         parameters: Parameters,
+        warnings: Callable[[], list[str]],
         watch: Watch,
         control_group: CallbackGroup,
         direct_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
+        self._warnings = warnings
         self._runtime = runtime
         self._control = control
         self._bound = bound
         self._state = state
+        self._logger = node.get_logger()
         # The change is made by then: what is wrong here is told, and no refusal of it.
         self._follow = watch.guarded("the parameters", parameters.follow)
         self._untold: dict[CallbackGroup, deque[Event]] = {
@@ -107,7 +111,9 @@ class Services:
 
     def _tell(self, group: CallbackGroup) -> None:
         while self._untold[group]:
-            self._state.tell(self._untold[group].popleft())
+            event = self._untold[group].popleft()
+            self._state.tell(event)
+            log_request(self._logger, event.request, event.outcome)
 
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
@@ -115,6 +121,7 @@ class Services:
         response.components = component_infos(self._runtime)
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
+        response.warnings = self._warnings()
         return response
 
     def _handler(

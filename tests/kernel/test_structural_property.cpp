@@ -66,7 +66,7 @@ class StructuralThreads : public Transacted {
     EXPECT_EQ(ErrorCode::structural_property, error.code());
     EXPECT_EQ("c", error.detail().component);
     EXPECT_THAT(error.detail().element, HasSubstr("period_ms"));
-    EXPECT_THAT(error.detail().remedy, HasSubstr("replace fsm beside it"));
+    EXPECT_THAT(error.detail().remedy, HasSubstr("replace the fsm beside it"));
     EXPECT_EQ(before, described());
   }
 };
@@ -162,7 +162,7 @@ TEST(StructuralCore, APropertyOfTwoPartsNeedsBoth) {
   one.replace_core("c", std::make_unique<SizedCore>()).set_property("c", "label", "large");
   const Error error = refusal_of([&] { simulation.commit(architecture, std::move(one)); });
   EXPECT_EQ(ErrorCode::structural_property, error.code());
-  EXPECT_EQ("replacement of fsm in the same transaction", error.detail().expected);
+  EXPECT_EQ("a replacement of the fsm in the same transaction", error.detail().expected);
   EXPECT_EQ(2, error.detail().step);
   Transaction both;
   both.replace_core("c", std::make_unique<SizedCore>()).replace_fsm("c", std::make_unique<SizedFsm>());

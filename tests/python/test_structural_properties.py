@@ -41,7 +41,7 @@ def paced(built: Stage) -> Stage:
 def _refused(caught: pytest.ExceptionInfo[MauveError], part: str) -> None:
     assert caught.value.code == "structural_property"
     assert caught.value.component == "paced"
-    assert f"replace {part} beside it" in caught.value.remedy
+    assert f"replace the {part} beside it" in caught.value.remedy
 
 
 def test_the_declaration_tells_who_reads_it(paced: Stage):

@@ -100,6 +100,7 @@ def test_what_is_read_once_is_read_only(executor: ExecutorProcess, graph: Any) -
             **dict.fromkeys(CHANGEABLE, "is read when the executor is configured: clean it up first"),
         }.get(name, "is read once")
         assert expected in result.reason, name
+        assert remote.set(name, remote.get(name)[0]).successful, "it has that value"
     assert remote.get(*own) == before
     refused = remote.set("qos_overrides./robot_1/count.publisher.depth", 5)
     assert "quality of service is in the architecture file" in refused.reason
@@ -172,10 +173,10 @@ def test_a_structural_property_is_set_beside_its_reader(executor: ExecutorProces
     assert {part.name: list(part.structural) for part in listed}["counter"] == ["period_ms"]
     (described,) = remote.describe("counter.period_ms")
     assert described.read_only
-    assert "structural: read by fsm when configured" in described.additional_constraints
+    assert "structural: read by the fsm when configured" in described.additional_constraints
     result = remote.set("counter.period_ms", 7)
     assert not result.successful
-    assert "replace fsm beside it" in result.reason
+    assert "replace the fsm beside it" in result.reason
     assert remote.get("counter.period_ms") == [20]
     alone = ReconfigurationStep(kind="set_property", target="counter", name="period_ms", value="7")
     refused = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[alone])

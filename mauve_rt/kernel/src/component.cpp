@@ -134,12 +134,12 @@ void Component::check_structural(const PropertyBase& property, const PropertyVal
   for (const ShownProperty& present : shown().properties) {
     if (present.name == property.name() && present.value == value) return;
   }
-  const std::string parts = join(names_of(kept));
-  throw Error(ErrorCode::structural_property,
-              "it is structural: " + parts + " would have to be configured anew, or it changed nothing",
+  std::string parts;
+  for (const std::string& part : names_of(kept)) parts += (parts.empty() ? "the " : " and the ") + part;
+  throw Error(ErrorCode::structural_property, "it is structural, read only when the component is configured",
               {.component = name_,
                .element = "property " + property.name(),
-               .expected = "replacement of " + parts + " in the same transaction",
+               .expected = "a replacement of " + parts + " in the same transaction",
                .found = "none",
                .remedy = "replace " + parts +
                          " beside it, by the same kind if it is to stay, or stop the component, clean it up, "
