@@ -86,6 +86,8 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         return BAD_INPUT
     if discovery:
         node.get_logger().info(discovery)
+    for remark in settings.remarks:
+        node.get_logger().warning(remark)
     status = FAILED
     try:
         gc.freeze()  # nor need it be looked at while Python components run and wait for the interpreter

@@ -136,7 +136,7 @@ class ExecutorNode(LifecycleNode):
 
     def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Seal the bag, release the architecture; refused while a component's state still executes."""
-        return self._transition(self._release)
+        return self._transition(self._clean_up)
 
     def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """As deactivate and cleanup."""
@@ -167,6 +167,10 @@ class ExecutorNode(LifecycleNode):
             self._bound.start()
             self._state.start(self._runtime.deployer)
         self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
+
+    def _clean_up(self) -> None:
+        self._release()
+        self.get_logger().info("cleaned up: nothing is configured")
 
     def _end(self) -> None:
         self.quiesce()
@@ -250,11 +254,8 @@ class ExecutorNode(LifecycleNode):
         self._state.flush()
         self._recording.stop()
         self._bound.close()
-        was_configured = self._runtime.configured
         self._runtime.cleanup()
         self._properties.follow()
-        if was_configured:
-            self.get_logger().info("cleaned up: nothing is configured")
 
     def _tell_health(self) -> None:
         self._state.look_for_hung()

@@ -12,7 +12,7 @@ from mauve_rt.model.words import shown
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.request_limits import RequestLimits
 from mauve_rt.node.ros_arguments import RosArguments, parse_ros_arguments
-from mauve_rt.node.settings import Setting, check_given, usage
+from mauve_rt.node.settings import Setting, check_given, near_misses, usage
 
 _LIMITS = RequestLimits()
 MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
@@ -70,6 +70,7 @@ class Settings:
     require_realtime: bool = False
     trace: bool = True
     overrides: Overrides = Overrides()  # noqa: RUF009 - immutable
+    remarks: tuple[str, ...] = ()  # to be told; nothing is refused for them
 
     @classmethod
     def of(cls, words: Sequence[str]) -> Self:
@@ -81,7 +82,8 @@ class Settings:
         arguments = parse_ros_arguments(words, node="executor")
         namespace = _namespace(arguments)
         given = arguments.within(namespace)
-        check_given(arguments, {**PARAMETERS, "peers": PEERS}, namespace=namespace)
+        settings = {**PARAMETERS, "peers": PEERS}
+        check_given(arguments, settings, namespace=namespace)
         peers = given.get("peers")
         if peers is not None and not (
             isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)
@@ -104,6 +106,7 @@ class Settings:
             require_realtime=_typed(given, "require_realtime", bool, default=False),
             trace=_typed(given, "trace", bool, default=True),
             overrides=Overrides(namespace=arguments.namespace, peers=peers, properties=properties),
+            remarks=near_misses(arguments, settings, namespace=namespace),
         )
 
     def runtime(self) -> Runtime:

@@ -69,6 +69,22 @@ def check_given(arguments: RosArguments, settings: Mapping[str, Setting], *, nam
     return properties
 
 
+def near_misses(
+    arguments: RosArguments, settings: Mapping[str, Setting], *, namespace: str
+) -> tuple[str, ...]:
+    """What to say of names given to nodes of any name, as launch files do, that are almost the table's."""
+    names = [*settings, *OF_RCLPY]
+    its_own = arguments.meant_for_it(namespace)
+    unknown = [name for name in arguments.within(namespace) if name not in its_own and name not in names]
+    remedies = {name: did_you_mean(name, names) for name in unknown if "." not in name}
+    who = _article(arguments.default_node)
+    return tuple(
+        f"parameter {name}: given to nodes of any name, and {who} has none of it; {remedy}"
+        for name, remedy in remedies.items()
+        if remedy.startswith("did you mean")
+    )
+
+
 def no_qos_overrides(node: str) -> str:
     """Why and what instead."""
     where = "a bound topic's quality of service is in the architecture file, as `topic: {qos: ...}`"

@@ -160,7 +160,7 @@ class Supervisor:
 def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
-        check_arguments(arguments)
+        remarks = check_arguments(arguments)
         rclpy.init(
             args=list(arguments),
             signal_handler_options=SignalHandlerOptions.NO,
@@ -174,6 +174,8 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     try:
         supervisor = Supervisor(node, RulesFile(_rules_path(node)))
         executor.add_node(node)
+        for remark in remarks:
+            node.get_logger().warning(remark)
         while not stop.is_set():
             try:
                 executor.spin_once(timeout_sec=_SPIN_S)

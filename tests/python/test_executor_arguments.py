@@ -184,4 +184,10 @@ def test_a_parameter_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None
 def test_parameters_for_nodes_of_any_name_may_be_for_others(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text("/**: {ros__parameters: {colour: red, bags: here}}\n", encoding="utf-8")
-    Settings.of(["executor", "--ros-args", "--params-file", str(file), "-p", "other:colour:=red"])
+    words = ["executor", "--ros-args", "--params-file", str(file), "-p", "other:colour:=red"]
+    assert Settings.of(words).remarks == ()
+    file.write_text("/**: {ros__parameters: {colour: red, bagg: here}}\n", encoding="utf-8")
+    (remark,) = Settings.of(words).remarks
+    assert remark.startswith(
+        "parameter bagg: given to nodes of any name, and an executor has none of it; did"
+    )
