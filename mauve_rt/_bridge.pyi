@@ -46,6 +46,9 @@ class TopicReport:
     def refused(self) -> int:
         """By the middleware or by the resource: full, malformed, or larger than it declares."""
     @property
+    def refusal(self) -> str:
+        """Why the resource refused a message lately; empty: none."""
+    @property
     def troubles(self) -> TopicTroubles: ...
 
 class CallCounts:

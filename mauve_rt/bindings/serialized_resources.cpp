@@ -36,6 +36,13 @@ class SerializedResource : public Resource {
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     return message.size() >= kCdrHeader.size() && write(message, time_ns);
   }
+  std::string why_refused(std::span<const std::byte> message) const override {
+    const std::string found = "it has " + std::to_string(message.size()) + " bytes";
+    if (message.size() < kCdrHeader.size()) return found + ", which are no message";
+    if (message.size() > options_.max_bytes)
+      return found + ", more than the " + std::to_string(options_.max_bytes) + " declared";
+    return "the " + kind() + " was full";
+  }
 
  protected:
   virtual DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept = 0;

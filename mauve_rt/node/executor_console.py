@@ -47,18 +47,14 @@ class TopicWatch:
         self._misfits: set[tuple[str, str]] = set()
         self._refused: dict[str, tuple[int, float]] = {}  # by topic: how many were told, and when
 
-    def look(
-        self, reports: Sequence[TopicReport], *, types: Mapping[str, Sequence[str]], kinds: Mapping[str, str]
-    ) -> None:
-        """Compare with the last look; `types`: others' by topic, `kinds`: by resource."""
+    def look(self, reports: Sequence[TopicReport], types: Mapping[str, Sequence[str]]) -> None:
+        """Compare with the last look; `types`: those of other nodes by topic."""
         for report in reports:
             subject = f"topic {report.topic} of resource '{report.resource}'"
             for what in self._news(report, types.get(report.topic, ())):
                 self._console.warning(f"{subject}: {what}")
             if more := self._refused_since(report):
-                why = "malformed, or larger than the type that is registered or declared here"
-                if kinds.get(report.resource) == "ring_buffer":
-                    why = f"the ring_buffer is full, or {why}"
+                why = report.refusal or "by the middleware"
                 messages = "1 message" if more == 1 else f"{more} messages"
                 self._console.warning(f"{subject}: {messages} refused: {why}")
         present = {report.topic for report in reports}

@@ -260,11 +260,7 @@ class ExecutorNode(LifecycleNode):
     def _tell_health(self) -> None:
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
-        self._topic_watch.look(
-            self._bound.topics(),
-            types=self._bound.other_types(),
-            kinds={resource.name: resource.kind for resource in self._runtime.described_resources()},
-        )
+        self._topic_watch.look(self._bound.topics(), self._bound.other_types())
         self._name_watch.look()
 
     def _log_realtime(self) -> None:

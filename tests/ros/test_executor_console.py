@@ -10,6 +10,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rich.console import Console as RichConsole
 from std_msgs.msg import Float64
 
@@ -24,6 +25,7 @@ KEPT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BUFFER = """\
   few: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 2,
         topic: {name: few, direction: subscribe}}
+  whole: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: whole, direction: subscribe}}
 connections:
 """
 
@@ -94,8 +96,13 @@ def test_misfits_and_refused_messages(
     few = graph.voice(Float64, "/robot_1/few")
     for number in range(5):
         few.publish(Float64(data=float(number)))
-    line = console.await_line(executor, WARN, "topic /robot_1/few of resource 'few': ", "refused: ")
-    assert "the ring_buffer is full, or malformed" in line
+    few_are_refused = "topic /robot_1/few of resource 'few': "
+    line = console.await_line(executor, WARN, few_are_refused, "refused: ")
+    assert line.endswith("refused: the ring_buffer was full: 2 elements")
+    short = graph.voice(Float64, "/robot_1/whole")
+    short.publish(serialize_message(Float64())[:6])
+    line = console.await_line(executor, WARN, "topic /robot_1/whole of resource 'whole': 1 message refused")
+    assert "bytes are no whole std_msgs/msg/Float64" in line
     assert misfit is not None
 
 
@@ -107,8 +114,8 @@ def test_refused_messages_are_told_at_once_and_then_counted() -> None:
     def look(refused: int) -> list[str]:
         told.clear()
         troubles = SimpleNamespace(incompatible_qos=0)
-        report = SimpleNamespace(topic="/t", resource="r", refused=refused, troubles=troubles)
-        watch.look([report], types={}, kinds={})  # type: ignore[list-item]
+        report = SimpleNamespace(topic="/t", resource="r", refused=refused, troubles=troubles, refusal="full")
+        watch.look([report], {})  # type: ignore[list-item]
         return [line.partition(": ")[2].partition(":")[0] for line in told]
 
     assert look(0) == []

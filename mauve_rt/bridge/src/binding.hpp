@@ -48,6 +48,7 @@ struct TopicReport {
   std::string topic;  // expanded and remapped
   TrafficCounts counts;
   TopicTroubles troubles;
+  std::string refusal;  // why the resource refused a message lately; empty: none
 };
 
 /// What is known of a ROS service that a resource calls, or offers: then only answered and other count.

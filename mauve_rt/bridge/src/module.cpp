@@ -79,6 +79,7 @@ PYBIND11_MODULE(_bridge, module) {
       .def_readonly("topic", &TopicReport::topic)
       .def_property_readonly("passed", [](const TopicReport& self) { return self.counts.passed; })
       .def_property_readonly("refused", [](const TopicReport& self) { return self.counts.refused; })
+      .def_readonly("refusal", &TopicReport::refusal)
       .def_property_readonly("troubles", [](const TopicReport& self) { return self.troubles; });
   py::class_<Bridge>(module, "Bridge")
       .def(py::init([](std::uintptr_t node, std::uintptr_t architecture, int priority,

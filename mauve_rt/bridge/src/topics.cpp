@@ -12,7 +12,8 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 64;  // messages of one topic before the others have their turn
+constexpr int kMessagesAtOnce = 64;                 // messages of one topic before the others have their turn
+constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {
   return "resource " + settings.resource + ", topic " + settings.name;
@@ -25,10 +26,20 @@ std::vector<Arrival*> BoundTopic::arrivals(Lane lane) {
 }
 
 void BoundTopic::report(BridgeReport& report) const {
+  const std::lock_guard lock(refusal_mutex_);
   report.topics.push_back({.resource = resource_name(),
                            .topic = full_name(),
                            .counts = counter_.counts(),
-                           .troubles = events().troubles()});
+                           .troubles = events().troubles(),
+                           .refusal = refusal_});
+}
+
+void BoundTopic::explain(std::span<const std::byte> message, time_ns_t now) {
+  if (now < explained_ns_ + kExplainEvery) return;
+  explained_ns_ = now;
+  std::string refusal = resource().why_refused(message);
+  const std::lock_guard lock(refusal_mutex_);
+  refusal_ = std::move(refusal);
 }
 
 void BoundTopic::count(bool passed, time_ns_t time_ns, std::span<const std::byte> message) {
@@ -89,7 +100,9 @@ void IncomingTopic::take() {
     if (!went_well(rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr)))
       return;  // nothing left, which is no error
     const time_ns_t now = monotonic_now_ns();
-    count(resource().write_sample(message_.bytes(), now), now, message_.bytes());
+    const bool passed = resource().write_sample(message_.bytes(), now);
+    if (!passed) explain(message_.bytes(), now);
+    count(passed, now, message_.bytes());
   }
 }
 

@@ -5,6 +5,7 @@
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
 
+#include <mutex>
 #include <string>
 
 #include "binding.hpp"
@@ -33,6 +34,8 @@ class BoundTopic : public Binding {
  protected:
   /// Of a message that went through, or not. [non-rt]
   void count(bool passed, time_ns_t time_ns, std::span<const std::byte> message);
+  /// Notes why the resource refused a message, unless it has just done so of another one. [non-rt]
+  void explain(std::span<const std::byte> message, time_ns_t now);
   virtual std::string full_name() const = 0;
   virtual const TopicEvents& events() const = 0;
 
@@ -40,6 +43,9 @@ class BoundTopic : public Binding {
   TopicLog& log_;
   std::size_t number_;
   TrafficCounter counter_;
+  time_ns_t explained_ns_{0};  // of the thread that counts
+  mutable std::mutex refusal_mutex_;
+  std::string refusal_;  // under refusal_mutex_: that thread writes it, others look
 };
 
 /// Publishes what is written to a resource. For one thread at a time.

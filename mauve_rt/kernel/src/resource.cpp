@@ -77,4 +77,9 @@ ServiceBase* Resource::find_service(std::string_view name) const noexcept {
   return nullptr;
 }
 
+std::string Resource::why_refused(std::span<const std::byte> message) const {
+  return "its " + std::to_string(message.size()) + " bytes are no whole " + type_ +
+         ", or one with longer lists or texts than are declared here";
+}
+
 }  // namespace mauve

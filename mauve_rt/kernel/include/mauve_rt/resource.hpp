@@ -134,6 +134,8 @@ class Resource : public Configurable {
   /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
+  /// Why write_sample() has just refused this message, in words. [non-rt]
+  virtual std::string why_refused(std::span<const std::byte> message) const;
 
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
   virtual ClientBase* client() noexcept { return nullptr; }

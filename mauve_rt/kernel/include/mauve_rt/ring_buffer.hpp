@@ -59,6 +59,12 @@ class RingBuffer final : public Resource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
+  std::string why_refused(std::span<const std::byte> message) const override {
+    const auto value = std::make_unique<T>();
+    return CdrReader(message).get(*value)
+               ? "the ring_buffer was full: " + std::to_string(capacity()) + " elements"
+               : Resource::why_refused(message);
+  }
 
  private:
   struct Place {
