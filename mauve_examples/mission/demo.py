@@ -108,16 +108,28 @@ def _report(options: Any, world: Any, mission: Any, interrupts: Interrupts) -> i
     from mauve_examples.mission.demo_ending import ending, summarise  # noqa: PLC0415
 
     facts = mission.facts()
+    supervised = _simulate_supervised(options, world, interrupts)
     if interrupts.asked():  # who presses Ctrl-C wants to be gone within 3 s: figures, but no drawings
         summary = summarise(options.out, facts, world.area)
     else:
         from mauve_examples.mission.results import write_results  # noqa: PLC0415
 
-        summary = write_results(options.out, facts, area=world.area)
+        summary = write_results(options.out, facts, area=world.area, supervised=supervised)
     print(ending(options.out, mission.story.lines(by_time=True), summary), flush=True)
     if interrupts.asked():
         return INTERRUPTED
     return SUCCESS if summary["success"] else FAILURE
+
+
+def _simulate_supervised(options: Any, world: Any, interrupts: Interrupts) -> Any:
+    """The same mission with supervisors, for one that was to go without; None for others."""
+    if options.supervisor or options.link_loss_at_s is None or interrupts.asked():
+        return None
+    from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
+    from mauve_examples.mission.supervised_run import simulate_supervised  # noqa: PLC0415
+
+    with open_progress() as progress:
+        return simulate_supervised(options, world, progress=progress, interrupted=interrupts.asked)
 
 
 def _complain(text: str, status: int) -> int:

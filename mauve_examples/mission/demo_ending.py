@@ -9,6 +9,7 @@ from mauve_examples.mission.evidence import read_robot, replay_coverage
 from mauve_examples.mission.facts import MissionArea, MissionFacts
 from mauve_examples.mission.hints import sourcing
 from mauve_examples.mission.summary import SUMMARY, build_summary, write_summary
+from mauve_examples.mission.supervised import compared_in_words
 from mauve_rt.trace import TraceError
 
 
@@ -50,6 +51,9 @@ def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[st
     else:
         yield "FAILED:"
         yield from (f"  {reason}" for reason in summary.get("reasons", ()))
+    if summary["supervisors_saved"] is not None:
+        yield "What supervisors would have saved:"
+        yield from (f"  {line}" for line in compared_in_words(summary["supervisors_saved"]))
     report = out / "report.html"
     yield f"Report: {report if report.exists() else 'none, the mission was interrupted'}"
     yield f"Figures: {out / 'summary.json'}   traces: {out / 'bag'}"

@@ -15,13 +15,16 @@ from mauve_examples.mission.evidence import CoverageHistory, RobotEvidence
 from mauve_examples.mission.facts import MissionArea, MissionFacts
 from mauve_examples.mission.figure_coverage import draw_coverage
 from mauve_examples.mission.figure_map import draw_map
+from mauve_examples.mission.figure_supervised import draw_supervised
 from mauve_examples.mission.story import cores_in_words, happenings, key_figures, realtime_in_words, verdict
+from mauve_examples.mission.supervised import Supervised, compared_in_words
 from mauve_examples.mission.swaps import Swap
 from mauve_rt.trace import report
 from mauve_rt.trace.report.blocks import bullets, picture, prose
 from mauve_rt.trace.trace import Message, Trace, merge_traces
 
 REPORT, MAP, COVERAGE = "report.html", "map.png", "coverage.png"
+SUPERVISORS = "supervisors.png"
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,8 @@ class ReportData:
     swaps: dict[str, list[Swap]]
     """Per robot."""
     summary: dict[str, Any]
+    supervised: Supervised | None = None
+    """The same mission with supervisors, simulated, where this one had none."""
 
 
 def write_report(out_dir: Path, data: ReportData) -> None:
@@ -46,6 +51,8 @@ def write_report(out_dir: Path, data: ReportData) -> None:
     swaps = [(one, data.swaps[one.robot]) for one in data.robots]
     draw_map(out_dir / MAP, data.facts, data.area, data.coverage, swaps)
     draw_coverage(out_dir / COVERAGE, data.facts, data.coverage, data.swaps)
+    if data.supervised is not None and data.summary["supervisors_saved"] is not None:
+        draw_supervised(out_dir / SUPERVISORS, data.facts, data.coverage, data.supervised)
 
     def judged(told: report.Verdict) -> report.Verdict:
         return _verdict(data, told)
@@ -94,6 +101,10 @@ def _verdict(data: ReportData, told: report.Verdict) -> report.Verdict:
 def _sections(out_dir: Path, data: ReportData) -> Iterator[report.Section]:
     if data.summary["reasons"]:
         yield report.Section("Why it failed", bullets(data.summary["reasons"], css="bad"), anchor="why")
+    if data.summary["supervisors_saved"] is not None:
+        words = bullets(compared_in_words(data.summary["supervisors_saved"]))
+        saved = words + picture(out_dir / SUPERVISORS, "coverage over time with and without supervisors")
+        yield report.Section("What supervisors would have saved", saved, anchor="supervisors")
     yield report.Section("What happened", _story(data), note="Times are mission time.", anchor="story")
     yield report.Section(
         "Where the robots went", picture(out_dir / MAP, "map with trajectories"), anchor="map"

@@ -13,6 +13,7 @@ from mauve_examples.mission.facts import (
 )
 from mauve_examples.mission.report import ReportData, write_report
 from mauve_examples.mission.summary import SUMMARY, build_summary, write_summary
+from mauve_examples.mission.supervised import Supervised, compare
 from mauve_examples.mission.swaps import find_swaps
 from mauve_rt.trace import TraceError
 
@@ -21,7 +22,13 @@ __all__ = ["ComponentFacts", "MissionFacts", "RealtimeFacts", "write_results"]
 BAGS = "bag"
 
 
-def write_results(out_dir: Path, mission: MissionFacts, *, area: MissionArea | None = None) -> dict[str, Any]:
+def write_results(
+    out_dir: Path,
+    mission: MissionFacts,
+    *,
+    area: MissionArea | None = None,
+    supervised: Supervised | None = None,
+) -> dict[str, Any]:
     """Read out_dir/bag/<robot>/ of every robot, write the results beside, return the summary.
 
     A bag that is missing or cannot be read is a reason for failure in the summary, not an error.
@@ -30,6 +37,7 @@ def write_results(out_dir: Path, mission: MissionFacts, *, area: MissionArea | N
         out_dir: the mission's folder.
         mission: what the driver knows.
         area: the map, when it has been loaded already.
+        supervised: the same mission with supervisors, to compare one that had none.
 
     Raises:
         OSError: the results cannot be written.
@@ -46,8 +54,10 @@ def write_results(out_dir: Path, mission: MissionFacts, *, area: MissionArea | N
     summary = build_summary(mission, evidence, coverage)
     summary["reasons"] += unreadable
     summary["success"] = not summary["reasons"]
+    if supervised is not None and mission.link_down_ns:
+        summary["supervisors_saved"] = compare(mission, coverage, evidence, supervised)
     write_summary(out_dir / SUMMARY, summary)
     swaps = {one.robot: find_swaps(one) for one in evidence}
-    data = ReportData(mission, area, coverage, evidence, swaps, summary)
+    data = ReportData(mission, area, coverage, evidence, swaps, summary, supervised)
     write_report(out_dir, data)
     return summary

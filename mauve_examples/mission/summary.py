@@ -37,6 +37,7 @@ def build_summary(
         "collisions": encounters.as_json(),
         "robots": robots,
         "realtime": {"granted": facts.realtime["granted"], "missing": list(facts.realtime["missing"])},
+        "supervisors_saved": None,
         "simulation": None if facts.simulation is None else dict(facts.simulation),
     }
 

@@ -153,6 +153,7 @@ def test_the_ending_of_a_failure_says_why_and_what_is_missing():
         "robots": {
             "robot_1": {"reconfigurations": [swap | figures, swap | {"from": None, "to": None} | figures]}
         },
+        "supervisors_saved": None,
         "collisions": {"events": 2, "pair_seconds": 1.234, "nearest_m": 0.1},
         "realtime": {"granted": False, "missing": ["rtprio is 0"]},
         "simulation": None,

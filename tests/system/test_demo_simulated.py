@@ -146,6 +146,30 @@ def test_without_supervisors_it_fails(start: Starter):
     assert "exploration was not replaced while the link was down" in "\n".join(demo.lines)
 
 
+def test_without_supervisors_it_shows_what_they_would_have_saved(mission: Demo, start: Starter):
+    """The comparison is the very mission that has them: same map, seed and times."""
+    demo = simulate(start, "alone", "--no-supervisor")
+    saved = figures(demo)["supervisors_saved"]
+    assert (saved["without"], saved["with"]) == ("simulated", "simulated")
+    assert saved["link_down_s"] == pytest.approx(4.0, abs=0.1)
+    assert saved["explored_while_down"]["with"] >= saved["explored_while_down"]["without"]
+    for robot in ROBOTS:
+        compared = demo.out / "with_supervisors" / "bag" / robot
+        assert_rosbag2_reads(compared)
+        assert open_trace(compared).records["exploration"].tobytes() == (
+            open_trace(mission.out / "bag" / robot).records["exploration"].tobytes()
+        )
+        assert 0.0 <= saved["stood_still_s"][robot] <= 4.0
+    text = "\n".join(demo.lines)
+    assert "What supervisors would have saved:" in text
+    assert "With supervisors, same map and seed, they would have explored +" in text
+    page = (demo.out / "report.html").read_text(encoding="utf-8")
+    assert "What supervisors would have saved" in page
+    assert (demo.out / "supervisors.png").read_bytes()[1:4] == b"PNG"
+    assert figures(mission)["supervisors_saved"] is None
+    assert not (mission.out / "with_supervisors").exists()
+
+
 def test_it_says_whether_robots_ran_into_each_other(mission: Demo):
     found = figures(mission)["collisions"]
     assert (found["events"], found["pair_seconds"]) == (0, 0)
