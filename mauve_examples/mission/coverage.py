@@ -77,6 +77,7 @@ class _RobotMap:
         self._known: BoolGrid = np.zeros((0, 0), np.bool_)
         self._row_of = self._column_of = np.zeros(0, np.intp)
         self._explored: BoolGrid | None = np.zeros_like(area.reachable)
+        self._is_true_grid = False
 
     def update(self, message: Any) -> None:
         geometry = _Geometry(
@@ -92,7 +93,10 @@ class _RobotMap:
         self._explored = None
 
     def explored(self) -> BoolGrid:
-        if self._explored is None:
+        if self._explored is None and self._is_true_grid:
+            height, width = self._area.cells.shape
+            self._explored = self._known[:height, :width].copy()
+        elif self._explored is None:
             inside = (self._row_of >= 0)[:, None] & (self._column_of >= 0)[None, :]
             self._explored = self._known[np.ix_(self._row_of, self._column_of)] & inside
         return self._explored
@@ -107,6 +111,10 @@ class _RobotMap:
         self._known = np.zeros((max(rows, 1), max(columns, 1)), np.bool_)
         self._row_of = _cell_of(np.arange(height), scale=scale, shift=shift_y, count=rows)
         self._column_of = _cell_of(np.arange(width), scale=scale, shift=shift_x, count=columns)
+        self._is_true_grid = bool(
+            np.array_equal(self._row_of, np.arange(height))
+            and np.array_equal(self._column_of, np.arange(width))
+        )
 
 
 def _cell_of(index: npt.NDArray[np.intp], *, scale: float, shift: float, count: int) -> npt.NDArray[np.intp]:

@@ -29,6 +29,7 @@ void FrontierFinder::configure(const GridGeometry& geometry, const FrontierOptio
   clearance_.configure(geometry, options.radius_m);
   near_squared_ = clearance_.squared_cells(options.radius_m);
   const std::size_t count = geometry.cell_count();
+  kind_.assign(count, 0);
   cost_.assign(count, kUnreached);
   next_.assign(count, kNone);
   previous_.assign(count, kNone);
@@ -39,11 +40,11 @@ void FrontierFinder::configure(const GridGeometry& geometry, const FrontierOptio
 }
 
 const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, const Point& robot) noexcept {
-  cells_ = cells;
   list_.clear();
   for (std::size_t i = 0; i < member_count_; ++i) is_member_[members_[i]] = 0;
   member_count_ = 0;
   clearance_.compute(cells);
+  classify(cells);
   std::fill(cost_.begin(), cost_.end(), kUnreached);
   const auto start =
       nearest_cell(geometry_, geometry_.cell_at(robot.x, robot.y), cells_of(geometry_, kSnap_m),
@@ -55,19 +56,41 @@ const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, con
   return list_;
 }
 
-bool FrontierFinder::passable(std::size_t index) const noexcept {
-  return cells_[index] == kFree && clearance_.at_least(index, near_squared_);
+void FrontierFinder::classify(std::span<const std::int8_t> cells) noexcept {
+  for (std::size_t i = 0; i < kind_.size(); ++i) {
+    const auto of_free = static_cast<std::uint8_t>(cells[i] == kFree ? kPassable : 0);
+    // Unknown cells that touch walls are of no interest: no robot will ever stand there, whatever they hold.
+    const auto of_state = static_cast<std::uint8_t>(cells[i] == kUnknown ? kToBeSeen : of_free);
+    kind_[i] = clearance_.at_least(i, near_squared_) ? of_state : std::uint8_t{0};
+  }
 }
 
 bool FrontierFinder::beside_unknown(Cell cell) const noexcept {
-  // Unknown cells that touch walls are of no interest: no robot will ever stand there, whatever they hold.
   const auto unknown = [this](Cell beside) {
-    if (!geometry_.contains(beside)) return false;
-    const std::size_t index = geometry_.index(beside);
-    return cells_[index] == kUnknown && clearance_.at_least(index, near_squared_);
+    return geometry_.contains(beside) && kind_[geometry_.index(beside)] == kToBeSeen;
   };
   return unknown({cell.column + 1, cell.row}) || unknown({cell.column - 1, cell.row}) ||
          unknown({cell.column, cell.row + 1}) || unknown({cell.column, cell.row - 1});
+}
+
+inline void FrontierFinder::unlink(std::uint32_t index) noexcept {
+  if (previous_[index] != kNone) {
+    next_[previous_[index]] = next_[index];
+  } else {
+    bucket_[static_cast<std::size_t>(cost_[index]) % kBuckets] = next_[index];
+  }
+  if (next_[index] != kNone) previous_[next_[index]] = previous_[index];
+}
+
+inline void FrontierFinder::relax(std::uint32_t index, std::int32_t cost) noexcept {
+  if (cost >= cost_[index]) return;
+  if (cost_[index] != kUnreached) unlink(index);
+  cost_[index] = cost;
+  std::uint32_t& head = bucket_[static_cast<std::size_t>(cost) % kBuckets];
+  next_[index] = head;
+  previous_[index] = kNone;
+  if (head != kNone) previous_[head] = index;
+  head = index;
 }
 
 void FrontierFinder::flood(Cell start) noexcept {
@@ -88,42 +111,53 @@ void FrontierFinder::flood(Cell start) noexcept {
         members_[member_count_++] = index;
         is_member_[index] = kOpen;
       }
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const Cell next{cell.column + dx, cell.row + dy};
-          if (!geometry_.contains(next)) continue;
-          const bool diagonal = dx != 0 && dy != 0;
-          if (diagonal && !(passable(geometry_.index({next.column, cell.row})) &&
-                            passable(geometry_.index({cell.column, next.row})))) {
-            continue;
-          }
-          relax(index, next, diagonal ? kDiagonal : kStraight);
-        }
+      const bool inside = cell.column > 0 && cell.row > 0 && cell.column + 1 < geometry_.width &&
+                          cell.row + 1 < geometry_.height;
+      if (inside) {
+        spread_inside(index);
+      } else {
+        spread_at_border(cell);
       }
     }
   }
 }
 
-void FrontierFinder::relax(std::uint32_t from, Cell next, std::int32_t step) noexcept {
-  const auto index = static_cast<std::uint32_t>(geometry_.index(next));
-  const std::int32_t cost = cost_[from] + step;
-  if (cost >= cost_[index] || !passable(index)) return;
-  if (cost_[index] != kUnreached) unlink(index);
-  cost_[index] = cost;
-  std::uint32_t& head = bucket_[static_cast<std::size_t>(cost) % kBuckets];
-  next_[index] = head;
-  previous_[index] = kNone;
-  if (head != kNone) previous_[head] = index;
-  head = index;
+void FrontierFinder::spread_inside(std::uint32_t index) noexcept {
+  const auto width = static_cast<std::uint32_t>(geometry_.width);
+  const std::uint32_t below = index - width;
+  const std::uint32_t above = index + width;
+  const std::int32_t straight = cost_[index] + kStraight;
+  const std::int32_t diagonal = cost_[index] + kDiagonal;
+  const bool left = passable(index - 1);
+  const bool right = passable(index + 1);
+  if (passable(below)) {
+    if (left && passable(below - 1)) relax(below - 1, diagonal);
+    relax(below, straight);
+    if (right && passable(below + 1)) relax(below + 1, diagonal);
+  }
+  if (left) relax(index - 1, straight);
+  if (right) relax(index + 1, straight);
+  if (passable(above)) {
+    if (left && passable(above - 1)) relax(above - 1, diagonal);
+    relax(above, straight);
+    if (right && passable(above + 1)) relax(above + 1, diagonal);
+  }
 }
 
-void FrontierFinder::unlink(std::uint32_t index) noexcept {
-  if (previous_[index] != kNone) {
-    next_[previous_[index]] = next_[index];
-  } else {
-    bucket_[static_cast<std::size_t>(cost_[index]) % kBuckets] = next_[index];
+void FrontierFinder::spread_at_border(Cell cell) noexcept {
+  const std::int32_t cost = cost_[geometry_.index(cell)];
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const Cell next{cell.column + dx, cell.row + dy};
+      if (!geometry_.contains(next) || !passable(geometry_.index(next))) continue;
+      const bool diagonal = dx != 0 && dy != 0;
+      if (diagonal && !(passable(geometry_.index({next.column, cell.row})) &&
+                        passable(geometry_.index({cell.column, next.row})))) {
+        continue;
+      }
+      relax(static_cast<std::uint32_t>(geometry_.index(next)), cost + (diagonal ? kDiagonal : kStraight));
+    }
   }
-  if (next_[index] != kNone) previous_[next_[index]] = previous_[index];
 }
 
 void FrontierFinder::cluster() noexcept {

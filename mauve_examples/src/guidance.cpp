@@ -20,7 +20,7 @@ void GuidanceCore::read_inputs() {
   shell().scan.read(*scan_);
   if (const mauve::Sample<Point> goal = shell().goal.read(); goal.status != mauve::DataStatus::none)
     pilot_.set_goal(goal.value);
-  shell().map_get([this](const OccupancyGrid& map) { pilot_.read_map(map.cells()); });
+  shell().map_get([this](const OccupancyGrid& map) { pilot_.read_map(map); });
   pilot_.look(*scan_, pose.value, clock_ns());
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_examples/pilot.hpp"
 
-#include <algorithm>
-
 namespace mauve_examples {
 
 namespace {
@@ -18,12 +16,24 @@ constexpr std::int64_t kLongBackOff_ns = 10'000'000'000;
 void Pilot::configure(const GridGeometry& geometry, std::uint8_t number) {
   navigator_.configure(geometry, PlanOptions{});
   traffic_.configure(geometry, number, TrafficOptions{});
+  geometry_ = geometry;
+  changes_.configure(geometry.tile_count());
   map_.assign(geometry.cell_count(), kUnknown);
   cells_ = map_;
   has_goal_ = wants_path_ = makes_room_ = false;
 }
 
-void Pilot::read_map(std::span<const std::int8_t> cells) noexcept { std::ranges::copy(cells, map_.begin()); }
+void Pilot::read_map(const OccupancyGrid& map) noexcept {
+  const auto columns = static_cast<std::size_t>(geometry_.tile_columns());
+  changes_.collect(map, [&](std::size_t tile) {
+    for_each_tile_cell(geometry_, static_cast<int>(tile % columns), static_cast<int>(tile / columns),
+                       [&](Cell cell, std::size_t) {
+                         const std::size_t index = geometry_.index(cell);
+                         map_[index] = cells_[index] = map.cells()[index];
+                       });
+    return true;
+  });
+}
 
 void Pilot::set_goal(const Point& goal) noexcept {
   if (!has_goal_ || distance_m(goal, goal_) > 0.0) wants_path_ = was_on_its_way_ = true;
@@ -36,8 +46,8 @@ void Pilot::look(const Scan& scan, const Pose2D& pose, std::int64_t now_ns) noex
   now_ns_ = now_ns;
   pose_ = pose;
   if (backed_off && !backing_off()) wants_path_ = true;
+  traffic_.erase(cells_, map_);
   traffic_.see(scan, pose, now_ns);
-  std::ranges::copy(map_, cells_.begin());
   traffic_.draw(cells_);
   const bool blocked = has_path() && navigator_.blocked(cells_, pose, kLookAhead_m);
   if (navigator_.stalled(pose, now_ns, kPatience_ns) || blocked) wants_path_ = true;

@@ -23,6 +23,7 @@ bool RobotCore::configure_hook() {
          .remedy = "start it elsewhere"});
   }
   scan_ = std::make_unique<Scan>();
+  walls_ = std::make_unique<Scan>();
   (void)beam_table();  // computed at its first use, which is not to be in real time
   others_.clear();
   steps_ = 0;
@@ -70,7 +71,12 @@ void RobotCore::meet_others() {
 
 void RobotCore::sense() {
   meet_others();
-  range_scan(world_, body_.pose, static_cast<float>(shell().max_range.value()), *scan_);
+  const auto range_m = static_cast<float>(shell().max_range.value());
+  const bool as_before = walls_->max_range_m == range_m && seen_from_.x == body_.pose.x &&
+                         seen_from_.y == body_.pose.y && seen_from_.theta == body_.pose.theta;
+  if (!as_before) range_scan(world_, body_.pose, range_m, *walls_);
+  seen_from_ = body_.pose;
+  *scan_ = *walls_;
   scan_robots(others_, body_.pose, *scan_);
   // One right after the other: who reads both on another CPU seldom gets one of them without the other.
   shell().pose.write(body_.pose);

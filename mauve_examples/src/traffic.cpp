@@ -33,6 +33,7 @@ void Traffic::configure(const GridGeometry& geometry, std::uint8_t number, const
   number_ = number;
   options_ = options;
   others_.fill(Other{});
+  drawn_.clear();
   side_ = 2 * static_cast<int>(std::ceil(options.refuge_reach_m / kStep_m)) + 1;
   const auto places = static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_);
   visited_.assign(places, 0);
@@ -61,7 +62,7 @@ void Traffic::see(const Scan& scan, const Pose2D& pose, std::int64_t now_ns) noe
   }
 }
 
-void Traffic::draw(std::span<std::int8_t> cells) const noexcept {
+void Traffic::draw(std::span<std::int8_t> cells) noexcept {
   for (std::size_t number = 1; number < others_.size(); ++number) {
     const Other& other = others_[number];
     if (!in_sight(other) || distance_m(other.at, pose_) > options_.heed_m) continue;
@@ -76,14 +77,26 @@ void Traffic::draw(std::span<std::int8_t> cells) const noexcept {
   }
 }
 
-void Traffic::draw_disc(std::span<std::int8_t> cells, const Point& at) const noexcept {
+void Traffic::erase(std::span<std::int8_t> cells, std::span<const std::int8_t> map) noexcept {
+  for (const Point& at : drawn_)
+    for_each_cell_of_disc(at, [&](std::size_t index) { cells[index] = map[index]; });
+  drawn_.clear();
+}
+
+void Traffic::draw_disc(std::span<std::int8_t> cells, const Point& at) noexcept {
+  if (!drawn_.push_back(at)) return;
+  for_each_cell_of_disc(at, [&](std::size_t index) { cells[index] = kOccupied; });
+}
+
+template <typename Visit>
+void Traffic::for_each_cell_of_disc(const Point& at, Visit&& visit) const {
   const Cell low = geometry_.cell_at(at.x - options_.berth_m, at.y - options_.berth_m);
   const Cell high = geometry_.cell_at(at.x + options_.berth_m, at.y + options_.berth_m);
   for (int row = low.row; row <= high.row; ++row) {
     for (int column = low.column; column <= high.column; ++column) {
       const Cell cell{column, row};
       if (!geometry_.contains(cell) || distance_m(geometry_.centre(cell), at) > options_.berth_m) continue;
-      cells[geometry_.index(cell)] = kOccupied;
+      visit(geometry_.index(cell));
     }
   }
 }

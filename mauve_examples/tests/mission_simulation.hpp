@@ -236,7 +236,7 @@ class MissionSimulation {
   }
 
   void guide(SimulatedRobot& robot) {
-    robot.pilot.read_map(robot.map.cells());
+    robot.pilot.read_map(robot.map);
     robot.pilot.look(robot.scan, robot.body.pose, now_ns_);
     if (robot.pilot.wants_path()) {
       ++robot.plans;

@@ -52,7 +52,7 @@ TEST(Allocation, TheAlgorithmsDoNone) {
     if (tick % 2 == 0 ? explorer.decide_together(tick) : explorer.decide_alone(tick)) {
       pilot.set_goal(explorer.destination());
     }
-    pilot.read_map(map.cells());
+    pilot.read_map(map);
     pilot.look(scan, body.pose, tick * 1'500'000'000);
     if (pilot.wants_path()) pilot.plan(1.0);
     explorer.compose(*message);

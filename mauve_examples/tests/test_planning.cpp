@@ -2,6 +2,8 @@
 // Ways through known and unknown space: clearance, A*, the path and following it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -36,6 +38,32 @@ TEST(Clearance, EqualsBruteForce) {
     for (int squared = 0; squared <= 36; ++squared) {
       EXPECT_EQ(field.at_least(i, static_cast<std::uint16_t>(squared)), nearest >= squared);
     }
+  }
+}
+
+TEST(Clearance, AfterChangesEqualsOneComputedAnew) {
+  GridMap map;
+  map.width = 201;
+  map.height = 130;
+  map.resolution_m = 0.1;
+  map.cells.assign(map.cell_count(), kUnknown);
+  std::mt19937 random(11);  // NOLINT(bugprone-random-generator-seed): the same map every time
+  ClearanceField field;
+  field.configure(map, 0.7);
+  for (int round = 0; round < 60; ++round) {
+    // Obstacles come and go; at times nothing changes, or only what is no obstacle.
+    for (int i = 0; i < round % 7; ++i) {
+      const std::array states{kOccupied, kOccupied, kFree, kUnknown};
+      map.cells[random() % map.cells.size()] = states[random() % states.size()];
+    }
+    if (round == 40) std::replace(map.cells.begin(), map.cells.end(), kOccupied, kFree);
+    field.compute(map.cells);
+    ClearanceField anew;
+    anew.configure(map, 0.7);
+    anew.compute(map.cells);
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < map.cells.size(); ++i) wrong += field.squared(i) != anew.squared(i) ? 1U : 0U;
+    EXPECT_EQ(wrong, 0U) << round;
   }
 }
 

@@ -50,11 +50,16 @@ class FrontierFinder {
 
  private:
   static constexpr std::size_t kBuckets = 8;  // one more than the longest step
+  static constexpr std::uint8_t kPassable = 1;
+  static constexpr std::uint8_t kToBeSeen = 2;  // unknown, and not beside a wall
 
-  bool passable(std::size_t index) const noexcept;
+  bool passable(std::size_t index) const noexcept { return kind_[index] == kPassable; }
+  void classify(std::span<const std::int8_t> cells) noexcept;
   bool beside_unknown(Cell cell) const noexcept;
   void flood(Cell start) noexcept;
-  void relax(std::uint32_t from, Cell next, std::int32_t step) noexcept;
+  void spread_inside(std::uint32_t index) noexcept;
+  void spread_at_border(Cell cell) noexcept;
+  void relax(std::uint32_t index, std::int32_t cost) noexcept;
   void unlink(std::uint32_t index) noexcept;
   void cluster() noexcept;
   Frontier grow(std::uint32_t seed) noexcept;
@@ -64,9 +69,9 @@ class FrontierFinder {
   FrontierOptions options_;
   ClearanceField clearance_;
   std::uint16_t near_squared_{0};
-  std::span<const std::int8_t> cells_;  // only during find
-  std::vector<std::int32_t> cost_;      // in fifths of a cell; kUnreached
-  std::vector<std::uint32_t> next_;     // of the same bucket
+  std::vector<std::uint8_t> kind_;   // what a cell is to the search
+  std::vector<std::int32_t> cost_;   // in fifths of a cell; kUnreached
+  std::vector<std::uint32_t> next_;  // of the same bucket
   std::vector<std::uint32_t> previous_;
   std::uint32_t bucket_[kBuckets]{};
   std::vector<std::uint32_t> members_;  // frontier cells, nearest first

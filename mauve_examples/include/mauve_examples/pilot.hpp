@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
+#include "mauve_examples/changed_tiles.hpp"
 #include "mauve_examples/navigator.hpp"
 #include "mauve_examples/occupancy_grid.hpp"
 #include "mauve_examples/traffic.hpp"
@@ -19,8 +19,8 @@ class Pilot {
   /// Allocates. `number` is the robot's own. [setup]
   void configure(const GridGeometry& geometry, std::uint8_t number);
 
-  /// Copies the map: planning does not keep others from it. [rt]
-  void read_map(std::span<const std::int8_t> cells) noexcept;
+  /// Copies what has changed on the map: planning does not keep others from it. [rt]
+  void read_map(const OccupancyGrid& map) noexcept;
   /// Where to go; the same place again changes nothing. [rt]
   void set_goal(const Point& goal) noexcept;
   /// Judges the present path by what is seen and by the map as read. [rt]
@@ -42,6 +42,8 @@ class Pilot {
 
   Navigator navigator_;
   Traffic traffic_;
+  GridGeometry geometry_;
+  ChangedTiles changes_;
   std::vector<std::int8_t> map_;    // as read
   std::vector<std::int8_t> cells_;  // with the robots in sight
   Pose2D pose_;

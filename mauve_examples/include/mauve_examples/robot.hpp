@@ -70,6 +70,8 @@ class RobotCore : public mauve::Core<RobotShell> {
   Unicycle body_;
   UnicycleLimits limits_;
   std::unique_ptr<Scan> scan_;
+  std::unique_ptr<Scan> walls_;  // without robots: as before while this one stands
+  Pose2D seen_from_;
   mauve::BoundedVector<RobotBody, kMaxOthers> others_;  // where they were when they last said so
   std::int64_t steps_{0};
   std::int64_t collisions_{0};

@@ -37,7 +37,9 @@ class Traffic {
   /// Takes in a scan and where it was taken. [rt]
   void see(const Scan& scan, const Pose2D& pose, std::int64_t now_ns) noexcept;
   /// Draws those robots into a copy of the map that this one has to plan around. [rt]
-  void draw(std::span<std::int8_t> cells) const noexcept;
+  void draw(std::span<std::int8_t> cells) noexcept;
+  /// Puts the map back where robots were drawn the last time. [rt]
+  void erase(std::span<std::int8_t> cells, std::span<const std::int8_t> map) noexcept;
   /// Whether the robot has stood still for so long with others near that it is up to it to make room. Asks anew
   /// after each yes. [rt]
   bool must_back_off(bool has_path) noexcept;
@@ -62,7 +64,9 @@ class Traffic {
     return now_ns_ - other.seen_at_ns <= options_.forget_ns;
   }
   bool moving(const Other& other) const noexcept { return now_ns_ - other.moved_at_ns <= options_.forget_ns; }
-  void draw_disc(std::span<std::int8_t> cells, const Point& at) const noexcept;
+  void draw_disc(std::span<std::int8_t> cells, const Point& at) noexcept;
+  template <typename Visit>
+  void for_each_cell_of_disc(const Point& at, Visit&& visit) const;
   bool roomy(std::span<const std::int8_t> cells, const Point& at) const noexcept;
   double worth(const Point& place, double way_m) const noexcept;
 
@@ -71,6 +75,7 @@ class Traffic {
   std::uint8_t number_{0};
   std::array<Other, kMaxSightings + 1> others_{};  // by number
   Sightings sightings_;
+  mauve::BoundedVector<Point, 256> drawn_;  // the discs
   Pose2D pose_;
   Point stood_at_;
   std::int64_t stands_since_ns_{0};
