@@ -18,9 +18,9 @@ class MauveError(Exception):
     code is the name of an ErrorCode: 'invalid_argument', 'unknown_component', 'unknown_core',
     'undeclared_core', 'unknown_shell', 'unknown_fsm', 'unknown_resource', 'unknown_service', 'unknown_port',
     'unknown_property', 'unknown_type', 'type_mismatch', 'out_of_range', 'duplicate_name',
-    'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed', 'not_configured', 'not_running',
-    'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed', 'timeout',
-    'realtime_denied', 'plugin', 'io', 'internal'.
+    'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed', 'not_configured', 'not_connected',
+    'not_running', 'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed',
+    'timeout', 'realtime_denied', 'plugin', 'io', 'internal'.
     """
 
     code: str
@@ -34,12 +34,34 @@ class MauveError(Exception):
     step_name: str
 
 @final
+class FieldShape:
+    """A field of a message as its C++ struct has it."""
+
+    name: Final[str]
+    type: Final[str]  # of an element, as in .msg files: 'float64', 'string', 'geometry_msgs/msg/Point'
+    text_capacity: Final[int]  # of a string; 0: any length
+    is_array: Final[bool]
+    is_fixed: Final[bool]  # an array of exactly `size`, not of at most
+    size: Final[int]
+    fields: Final[list[FieldShape]]  # of a message within the message
+
+@final
+class MessageShape:
+    """A message as its C++ struct has it."""
+
+    type: Final[str]
+    bytes: Final[int]  # of the struct
+    fields: Final[list[FieldShape]]
+
+@final
 class PortDescription:
     name: Final[str]
     kind: Final[str]  # 'read', 'write', 'call', 'event'
     type: str  # 'geometry_msgs/msg/Point', or 'void(package/Name)' for call ports
     resource: Final[str]  # '' when not connected
     service: Final[str]
+    required: Final[bool]  # told of a shell's ports, not of a component's
+    messages: Final[list[MessageShape]]  # likewise
 
 @final
 class PropertyDescription:
@@ -64,6 +86,7 @@ class ServiceDescription:
     kind: Final[str]  # as PortDescription.kind: the kind of port that connects to it
     type: Final[str]
     takes_messages: Final[bool]  # a call that can be a ROS service
+    messages: Final[list[MessageShape]]  # a call's request and response; none where C++ has no struct
 
 @final
 class ResourceDescription:
@@ -176,10 +199,12 @@ class ShellView:
 class ShellBuilder:
     """Takes the declarations of a shell written in Python. `zero`: the message's default, serialized."""
 
-    def read_port(self, name: str, type: str, zero: bytes | None) -> None: ...
-    def write_port(self, name: str, type: str, zero: bytes | None, on_commit: str, on_stop: str) -> None: ...
+    def read_port(self, name: str, type: str, zero: bytes | None, optional: bool = False) -> None: ...
+    def write_port(
+        self, name: str, type: str, zero: bytes | None, on_commit: str, on_stop: str, optional: bool = False
+    ) -> None: ...
     def call_port(self, name: str, type: str) -> None: ...
-    def event_port(self, name: str) -> None: ...
+    def event_port(self, name: str, optional: bool = False) -> None: ...
     def property(
         self,
         name: str,

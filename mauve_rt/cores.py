@@ -24,6 +24,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, get_args
 
 from mauve_rt._kernel import PartFactory, ShellView
+from mauve_rt.errors import PortTypeError
+from mauve_rt.messages import message_class
 from mauve_rt.parts import Configurable, implementation_name
 from mauve_rt.ports import Property, ReadPort, Sample, WritePort
 from mauve_rt.shells import Shell, shell_of
@@ -83,11 +85,30 @@ class Core(Configurable, Generic[ShellT]):
                 f"the core was written for another shell: {cls.__qualname__} is for "
                 f"{cls._shell_class.__qualname__}, found {view.implementation()}"
             )
+        require_served(view, cls.__qualname__)
         return cls(shell)
+
+
+def require_served(view: ShellView, core: str) -> None:
+    """Whether a core in Python can use every port of a shell; unconnected optional ones aside.
+
+    Raises:
+        PortTypeError: a port's type has no class in Python.
+    """
+    for port in view.ports():
+        if port.kind not in ("read", "write") or not (port.required or port.resource):
+            continue
+        if message_class(port.type) is None:
+            raise PortTypeError(port.name, port.type, core=core)
 
 
 def core_factory(core_class: Any) -> Callable[[ShellView], object]:
     """What `PluginRegistry.add_python_core` takes; also of a class that only looks like a Core."""
     if isinstance(core_class, type) and issubclass(core_class, Core):
         return core_class._make
-    return lambda view: core_class(shell_of(view))
+
+    def make(view: ShellView) -> object:
+        require_served(view, getattr(core_class, "__qualname__", repr(core_class)))
+        return core_class(shell_of(view))
+
+    return make

@@ -3,6 +3,7 @@
     class HoverShell(Shell):
         pose = read_port(Pose)
         target = write_port(Point, on_commit="hold", on_stop="set_zero")
+        advice = read_port(Point, optional=True)    # all others are to be connected
         height = property(1.0, unit="m", minimum=0.0)
 
 A type is a class of ROS messages, or a name such as "geometry_msgs/msg/Point".
@@ -22,9 +23,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def read_port(type: type[T] | str, default: T | None = None) -> ReadPort[T]:  # noqa: A002
-    """A port to read from; `default` is what it yields before anything was written."""
-    return ReadPort(type, default)
+def read_port(type: type[T] | str, default: T | None = None, *, optional: bool = False) -> ReadPort[T]:  # noqa: A002
+    """A port to read from; `default` is what it yields before anything was written, or unconnected."""
+    return ReadPort(type, default, optional=optional)
 
 
 def write_port(
@@ -32,9 +33,10 @@ def write_port(
     *,
     on_commit: OutputPolicy = "hold",
     on_stop: OutputPolicy = "set_zero",
+    optional: bool = False,
 ) -> WritePort[T]:
     """A port to write to, and what the kernel writes while the component is replaced or does not run."""
-    return WritePort(type, on_commit=on_commit, on_stop=on_stop)
+    return WritePort(type, on_commit=on_commit, on_stop=on_stop, optional=optional)
 
 
 @overload
@@ -46,9 +48,9 @@ def call_port(service: Callable[..., Any] | str) -> CallPort[..., Any]:
     return CallPort(service if isinstance(service, str) else service_type(service))
 
 
-def event_port() -> EventPort:
+def event_port(*, optional: bool = False) -> EventPort:
     """A port that raises an event."""
-    return EventPort()
+    return EventPort(optional=optional)
 
 
 def property(  # noqa: A001 - its name in C++

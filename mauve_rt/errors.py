@@ -35,6 +35,19 @@ class ParameterError(MauveError):
         _describe(self, code="invalid_argument", element=element)
 
 
+class PortTypeError(MauveError):
+    """A port whose type a core in Python cannot serve. `code` is "type_mismatch"."""
+
+    def __init__(self, port: str, type_name: str, *, core: str) -> None:
+        what = f"core {core} is written in Python, which has no class for the port's type"
+        element, expected = f"port {port}", "an installed ROS message"
+        remedy = "write the core in C++, or give the port such a type"
+        super().__init__(f"{element}: {what}: expected {expected}, found {type_name}; {remedy}")
+        self.statement, self.component = what, ""
+        facts = {"element": element, "expected": expected, "found": type_name, "remedy": remedy}
+        _describe(self, code="type_mismatch", **facts)
+
+
 class TopicError(MauveError):
     """A topic that a resource cannot be bound to, because of another message type on it."""
 

@@ -1,4 +1,8 @@
-"""Ports and properties of shells. A port's methods are for the component's thread, in actions and guards."""
+"""Ports and properties of shells. A port's methods are for the component's thread, in actions and guards.
+
+A component is configured only with its ports connected, but for those declared `optional`: unconnected, one
+reads its default and writes nowhere. Call ports are always required.
+"""
 
 import copy
 from collections.abc import Collection
@@ -76,9 +80,10 @@ class Member:
 
 
 class _DataPort(Member, Generic[T]):
-    def __init__(self, type: type[T] | str) -> None:  # noqa: A002 - the word of the field
+    def __init__(self, type: type[T] | str, *, optional: bool) -> None:  # noqa: A002 - the word of the field
         super().__init__()
         self.type = messages.type_name(type)
+        self.optional = optional
 
     @cached_property
     def message_class(self) -> Any:
@@ -98,13 +103,19 @@ class _DataPort(Member, Generic[T]):
 class ReadPort(_DataPort[T]):
     """A port to read from."""
 
-    def __init__(self, type: type[T] | str, default: T | None = None) -> None:  # noqa: A002
-        super().__init__(type)
+    def __init__(
+        self,
+        type: type[T] | str,  # noqa: A002
+        default: T | None = None,
+        *,
+        optional: bool = False,
+    ) -> None:
+        super().__init__(type, optional=optional)
         self._default = default
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
-        builder.read_port(self.name, self.type, messages.zero(self.type))
+        builder.read_port(self.name, self.type, messages.zero(self.type), optional=self.optional)
 
     def read(self) -> Sample[T]:
         """The present value, its status and the writer's time."""
@@ -123,15 +134,23 @@ class WritePort(_DataPort[T]):
         *,
         on_commit: OutputPolicy = "hold",
         on_stop: OutputPolicy = "set_zero",
+        optional: bool = False,
     ) -> None:
-        super().__init__(type)
+        super().__init__(type, optional=optional)
         self.on_commit = on_commit
         self.on_stop = on_stop
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
         zero = messages.zero(self.type)
-        builder.write_port(self.name, self.type, zero, on_commit=self.on_commit, on_stop=self.on_stop)
+        builder.write_port(
+            self.name,
+            self.type,
+            zero,
+            on_commit=self.on_commit,
+            on_stop=self.on_stop,
+            optional=self.optional,
+        )
 
     def write(self, value: T) -> bool:
         """Write a ROS message; False when there was no room for it.
@@ -168,9 +187,13 @@ class CallPort(Member, Generic[P, R]):
 class EventPort(Member):
     """A port that raises an event of a resource."""
 
+    def __init__(self, *, optional: bool = False) -> None:
+        super().__init__()
+        self.optional = optional
+
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
-        builder.event_port(self.name)
+        builder.event_port(self.name, optional=self.optional)
 
     def raise_(self) -> None:
         """Say that it happened, at the component's clock (C++: `raise`, a word that Python keeps)."""

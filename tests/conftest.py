@@ -24,25 +24,38 @@ INSTALLED = (
 )  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
 
 
-@pytest.fixture(scope="session")
-def plugin_prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """An ament prefix with the package executor_tests, put in front of those searched."""
-    prefix = tmp_path_factory.mktemp("executor_tests")
+def _install_plugins(prefix: Path, package: str) -> None:
+    """Compile `plugins/PACKAGE.cpp` and list what PACKAGE.txt says, in an ament prefix."""
     index = prefix / "share" / "ament_index" / "resource_index"
-    (prefix / "lib").mkdir()
-    (prefix / "share" / "executor_tests").mkdir(parents=True)
+    (prefix / "lib").mkdir(exist_ok=True)
+    (prefix / "share" / package).mkdir(parents=True)
     for kind in ("packages", "mauve_rt_plugins"):
-        (index / kind).mkdir(parents=True)
-    (index / "packages" / "executor_tests").touch()
-    shutil.copy(PLUGINS / "executor_tests.txt", index / "mauve_rt_plugins" / "executor_tests")
-    library = prefix / "lib" / "libexecutor_tests.so"
+        (index / kind).mkdir(parents=True, exist_ok=True)
+    (index / "packages" / package).touch()
+    shutil.copy(PLUGINS / f"{package}.txt", index / "mauve_rt_plugins" / package)
+    library = prefix / "lib" / f"lib{package}.so"
     subprocess.run(
         [
-            *("g++", "-std=c++20", "-O1", "-shared", "-fPIC", PLUGINS / "executor_tests.cpp", "-o", library),
+            *("g++", "-std=c++20", "-O1", "-shared", "-fPIC", PLUGINS / f"{package}.cpp", "-o", library),
             *(f"-I{INSTALLED}/include", f"-L{INSTALLED}/lib", "-lmauve_rt", f"-Wl,-rpath,{INSTALLED}/lib"),
         ],
         check=True,
     )
+
+
+@pytest.fixture(scope="session")
+def misfits_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An ament prefix with the package misfits, which is searched only where a test says so."""
+    prefix = tmp_path_factory.mktemp("misfits")
+    _install_plugins(prefix, "misfits")
+    return prefix
+
+
+@pytest.fixture(scope="session")
+def plugin_prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An ament prefix with the package executor_tests, put in front of those searched."""
+    prefix = tmp_path_factory.mktemp("executor_tests")
+    _install_plugins(prefix, "executor_tests")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(
             "AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), os.environ.get("AMENT_PREFIX_PATH", "")])

@@ -14,8 +14,8 @@ struct SoakShell : mauve::Shell {
   mauve::Property<std::int64_t>& period_us =
       property("period_us", 1000, {.unit = "us", .structural = mauve::ReadBy::fsm});
   mauve::Property<double>& gain = property("gain", 1.0, {.minimum = 0.0, .maximum = 10.0});
-  mauve::ReadPort<Small>& input = read_port<Small>("input");
-  mauve::WritePort<Small>& output = write_port<Small>("output");
+  mauve::ReadPort<Small>& input = read_port<Small>("input").optional();
+  mauve::WritePort<Small>& output = write_port<Small>("output").optional();
 };
 struct OtherSoakShell : SoakShell {};
 

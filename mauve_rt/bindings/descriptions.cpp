@@ -12,7 +12,7 @@ std::vector<PortDescription> describe_ports(const Shell& shell) {
   for (const auto& port : shell.ports()) {
     auto [resource, service] = port->connected_to();
     ports.push_back({port->name(), std::string(to_string(port->kind())), port->type(), std::move(resource),
-                     std::move(service)});
+                     std::move(service), port->is_required(), port->messages()});
   }
   return ports;
 }
@@ -36,7 +36,7 @@ ResourceDescription describe_resource(const Resource& resource) {
   ResourceDescription description{resource.name(), resource.kind(), resource.type(), {}};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
-                                    service->is_call_serializable()});
+                                    service->is_call_serializable(), service->messages()});
   }
   return description;
 }
@@ -112,12 +112,27 @@ RecentMaxima take_recent_maxima(const Component& component) {
 }
 
 void bind_descriptions(py::module_& module) {
+  py::class_<FieldShape>(module, "FieldShape")
+      .def_readonly("name", &FieldShape::name)
+      .def_readonly("type", &FieldShape::type)
+      .def_readonly("text_capacity", &FieldShape::text_capacity)
+      .def_property_readonly("is_array", [](const FieldShape& self) { return self.arity != FieldArity::one; })
+      .def_property_readonly("is_fixed",
+                             [](const FieldShape& self) { return self.arity == FieldArity::fixed; })
+      .def_readonly("size", &FieldShape::size)
+      .def_readonly("fields", &FieldShape::fields);
+  py::class_<MessageShape>(module, "MessageShape")
+      .def_readonly("type", &MessageShape::type)
+      .def_readonly("bytes", &MessageShape::bytes)
+      .def_readonly("fields", &MessageShape::fields);
   py::class_<PortDescription>(module, "PortDescription")
       .def_readonly("name", &PortDescription::name)
       .def_readonly("kind", &PortDescription::kind)
       .def_readonly("type", &PortDescription::type)
       .def_readonly("resource", &PortDescription::resource)
-      .def_readonly("service", &PortDescription::service);
+      .def_readonly("service", &PortDescription::service)
+      .def_readonly("required", &PortDescription::required)
+      .def_readonly("messages", &PortDescription::messages);
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type)
@@ -135,7 +150,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("name", &ServiceDescription::name)
       .def_readonly("kind", &ServiceDescription::kind)
       .def_readonly("type", &ServiceDescription::type)
-      .def_readonly("takes_messages", &ServiceDescription::takes_messages);
+      .def_readonly("takes_messages", &ServiceDescription::takes_messages)
+      .def_readonly("messages", &ServiceDescription::messages);
   py::class_<ResourceDescription>(module, "ResourceDescription")
       .def_readonly("name", &ResourceDescription::name)
       .def_readonly("kind", &ResourceDescription::kind)

@@ -38,20 +38,24 @@ class ShellBuilder {
  public:
   ShellBuilder(PythonShell& shell, const PluginRegistry& registry) : shell_(shell), registry_(registry) {}
 
-  void read_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero) {
-    data_port(PortKind::read, name, type, {}, zero);
+  void read_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero,
+                 bool optional) {
+    data_port(PortKind::read, name, type, {}, zero, optional);
   }
   void write_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero,
-                  const std::string& on_commit, const std::string& on_stop) {
+                  const std::string& on_commit, const std::string& on_stop, bool optional) {
     data_port(
         PortKind::write, name, type,
         {.on_commit = output_policy(on_commit, "on_commit"), .on_stop = output_policy(on_stop, "on_stop")},
-        zero);
+        zero, optional);
   }
   void call_port(const std::string& name, const std::string& type) {
     shell_.add_port(std::make_unique<PythonCallPort>(name, type));
   }
-  void event_port(const std::string& name) { shell_.event_port(name); }
+  void event_port(const std::string& name, bool optional) {
+    EventPort& port = shell_.event_port(name);
+    if (optional) port.make_optional();
+  }
   void property(const std::string& name, const PropertyValue& value, const std::string& unit,
                 const std::string& description, std::optional<double> minimum, std::optional<double> maximum,
                 const std::vector<std::string>& structural) {
@@ -70,13 +74,14 @@ class ShellBuilder {
   }
   /// C++ has the type where a plug-in registered it; a message that none registered travels serialized.
   void data_port(PortKind kind, const std::string& name, const std::string& type, OutputOptions output,
-                 const std::optional<std::string>& zero) {
+                 const std::optional<std::string>& zero, bool optional) {
     const std::vector<std::string> registered = registry_.names("type");
     if (zero.has_value() && !std::binary_search(registered.begin(), registered.end(), type)) {
       shell_.add_port(make_serialized_port(kind, name, type, output, as_bytes_view(*zero)));
     } else {
       shell_.add_port(registry_.make_port(kind, type, name, output));
     }
+    if (optional) shell_.find_port(name)->make_optional();
   }
 
   PythonShell& shell_;
@@ -195,11 +200,12 @@ void bind_python_shell(py::module_& module) {
       .def("python", &ShellView::python)
       .def("implementation", &ShellView::implementation);
   py::class_<ShellBuilder>(module, "ShellBuilder")
-      .def("read_port", &ShellBuilder::read_port, py::arg("name"), py::arg("type"), py::arg("zero"))
+      .def("read_port", &ShellBuilder::read_port, py::arg("name"), py::arg("type"), py::arg("zero"),
+           py::arg("optional") = false)
       .def("write_port", &ShellBuilder::write_port, py::arg("name"), py::arg("type"), py::arg("zero"),
-           py::arg("on_commit"), py::arg("on_stop"))
+           py::arg("on_commit"), py::arg("on_stop"), py::arg("optional") = false)
       .def("call_port", &ShellBuilder::call_port, py::arg("name"), py::arg("type"))
-      .def("event_port", &ShellBuilder::event_port, py::arg("name"))
+      .def("event_port", &ShellBuilder::event_port, py::arg("name"), py::arg("optional") = false)
       .def("property", &ShellBuilder::property, py::arg("name"), py::arg("value"), py::arg("unit"),
            py::arg("description"), py::arg("minimum"), py::arg("maximum"), py::arg("structural"));
 }

@@ -74,6 +74,8 @@ struct PortDescription {
   std::string type;
   std::string resource;
   std::string service;
+  bool required{true};
+  std::vector<MessageShape> messages{};  // of a shell's; a component's tells none
 };
 std::vector<PortDescription> describe_ports(const Shell& shell);
 
@@ -95,6 +97,7 @@ struct ServiceDescription {
   std::string kind;
   std::string type;
   bool takes_messages;
+  std::vector<MessageShape> messages;
 };
 struct ResourceDescription {
   std::string name;

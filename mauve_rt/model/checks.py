@@ -1,10 +1,17 @@
 """What an architecture file says, held against the plug-ins it names."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
-from mauve_rt._kernel import PortDescription, PropertyDescription, ResourceDescription, ShellDescription
+from mauve_rt._kernel import (
+    PortDescription,
+    PropertyDescription,
+    ResourceDescription,
+    ServiceDescription,
+    ShellDescription,
+)
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
+from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.message_types import message_class, service_class
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.model.resource_parts import describe_resource
@@ -21,6 +28,7 @@ class Checks:
         self._loader = loader
         self._shells: dict[str, ShellDescription] = {}  # by component
         self._resources: dict[str, ResourceDescription] = {}
+        self._unlike: set[str] = set()  # types that were told to differ from their messages
 
     def problems(self) -> list[Problem]:
         """Everything wrong; empty: the architecture can be built."""
@@ -42,6 +50,7 @@ class Checks:
         yield from missing
         if not missing:
             self._shells[name] = registry.describe_shell(component.shell)
+            yield from self._structs(self._shells[name].ports, (*place, "shell"))
         for kind, plugin, written_for in (
             ("core", component.core, registry.core_shell),
             ("fsm", component.fsm, registry.fsm_shell),
@@ -133,7 +142,21 @@ class Checks:
             expected = "an installed message type such as geometry_msgs/msg/Point"
             found = shown(self._resources[name].type)
             yield self._model.key_problem((*place, "topic"), what, expected=expected, found=found)
+        at = (*place, "type" if resource.type else "kind")
+        yield from self._structs(self._resources[name].services, at)
         yield from self._service(name)
+
+    def _structs(
+        self, carriers: Iterable[PortDescription | ServiceDescription], place: Location
+    ) -> Iterator[Problem]:
+        """C++ structs that are not what the ROS messages of their names are; each once."""
+        for carrier in carriers:
+            for found in mismatches(carrier.messages):
+                if found.type in self._unlike:
+                    continue
+                self._unlike.add(found.type)
+                facts = {"expected": found.expected, "found": found.found, "remedy": REMEDY}
+                yield self._model.problem(place, found.what, **facts, code="type_mismatch")
 
     def _service(self, name: str) -> Iterator[Problem]:
         """The ROS service that a resource calls or offers."""

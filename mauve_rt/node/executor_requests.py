@@ -61,6 +61,7 @@ _INVALID = (
     "unknown_service",
     "unknown_resource",
     "unknown_type",
+    "not_connected",
     "bad_period",
 )
 _CODES = {

@@ -17,12 +17,19 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from mauve_rt._kernel import ComponentDescription, PropertyDescription, ResourceDescription, Transaction
+from mauve_rt._kernel import (
+    ComponentDescription,
+    PropertyDescription,
+    ResourceDescription,
+    ShellDescription,
+    Transaction,
+)
 from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
 from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
+from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.words import did_you_mean, shown
@@ -169,6 +176,7 @@ class Plan:
             case _:
                 self.transaction.replace_shell(step.target, step.name)
                 shell = self._runtime.registry.describe_shell(step.name)
+                _check_structs(shell)
                 sketch.properties = {item.name: item for item in shell.properties}
 
     def _add_component(self, step: Step) -> None:
@@ -238,6 +246,15 @@ def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -
         return RefusalError(Code.UNKNOWN_CORE, f"{kind} {shown(step.name)} is not installed; {takes}")
     text = f"{kind} '{step.name}' is installed, but not declared: {takes}"
     return RefusalError(Code.UNDECLARED_CORE, f"{text}; name it among its alternatives in the file")
+
+
+def _check_structs(shell: ShellDescription) -> None:
+    """Refuse a shell in which a C++ struct is not the ROS message whose name it bears."""
+    for port in shell.ports:
+        for found in mismatches(port.messages):
+            text = f"shell '{shell.name}', port '{port.name}': {found.what}"
+            facts = f"expected {found.expected}, found {found.found}; {REMEDY}"
+            raise RefusalError(Code.PREPARE_FAILED, f"{text}: {facts}")
 
 
 def _words(error: MauveError) -> str:

@@ -30,10 +30,10 @@ struct TestShell : Shell {
   Property<double>& gain =
       property("gain", 1.0, {.unit = "1", .description = "a factor", .minimum = 0.0, .maximum = 10.0});
   Property<std::int64_t>& period_ms = property("period_ms", 1, {.structural = ReadBy::fsm});
-  ReadPort<Number>& input = read_port<Number>("input", Number{7.0});
-  WritePort<Number>& output = write_port<Number>("output");
+  ReadPort<Number>& input = read_port<Number>("input", Number{7.0}).optional();
+  WritePort<Number>& output = write_port<Number>("output").optional();
   WritePort<Number>& held =
-      write_port<Number>("held", {.on_commit = OutputPolicy::hold, .on_stop = OutputPolicy::hold});
+      write_port<Number>("held", {.on_commit = OutputPolicy::hold, .on_stop = OutputPolicy::hold}).optional();
 };
 
 /// Calls `work` at every activation.

@@ -115,7 +115,7 @@ TEST_F(Rule12Events, EveryKindOfResourceRaisesThem) {
 }
 
 struct CountShell : TestShell {
-  ReadPort<EventCount>& count = read_port<EventCount>("count");
+  ReadPort<EventCount>& count = read_port<EventCount>("count").optional();
 };
 struct CountFsm : Fsm<CountShell, TestCore> {
   void define() override {

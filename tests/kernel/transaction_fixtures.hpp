@@ -39,7 +39,7 @@ struct SyncopatedFsm : Fsm<TestShell, TestCore> {
 };
 
 struct WideShell : TestShell {
-  ReadPort<Number>& second_input = read_port<Number>("second_input");
+  ReadPort<Number>& second_input = read_port<Number>("second_input").optional();
 };
 struct NarrowShell : Shell {
   Property<double>& gain = property("gain", 1.0);

@@ -51,7 +51,16 @@ struct SetBool {
   };
 };
 
-/// Without the report at the end.
+struct StepReport {
+  mauve::BoundedString<64> step;
+  mauve::BoundedString<32> component;
+  std::int64_t prepare_ns{};
+  std::int64_t blackout_ns{};
+  std::int64_t missed_releases{};
+  std::int64_t phase_nominal_ns{};
+  std::int64_t phase_actual_ns{};
+};
+
 struct Stop {
   struct Request {
     mauve::BoundedString<16> request_id;
@@ -64,6 +73,10 @@ struct Stop {
   struct Response {
     bool success{};
     std::uint16_t code{};
+    mauve::BoundedString<512> message;
+    mauve::BoundedString<64> instance_id;
+    std::uint64_t revision{};
+    mauve::BoundedVector<StepReport, 4> report;
   };
 };
 
@@ -86,7 +99,10 @@ MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", s
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s)
-MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code)
+MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
+           missed_releases, phase_nominal_ns, phase_actual_ns)
+MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
+           instance_id, revision, report)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")
 MAUVE_TYPE(executor_tests::Trigger::Request, "std_srvs/srv/Trigger_Request")
 MAUVE_TYPE(executor_tests::Trigger::Response, "std_srvs/srv/Trigger_Response", success, message)
@@ -100,8 +116,8 @@ struct CounterShell : mauve::Shell {
   mauve::Property<bool>& enabled = property("enabled", true);
   mauve::Property<std::string>& label = property("label", "");
   mauve::Property<std::string>& list_file = property("list_file", "");
-  mauve::ReadPort<Number>& set = read_port<Number>("set");
-  mauve::WritePort<Number>& count = write_port<Number>("count");
+  mauve::ReadPort<Number>& set = read_port<Number>("set").optional();
+  mauve::WritePort<Number>& count = write_port<Number>("count").optional();
 };
 
 struct Counter : mauve::Core<CounterShell> {
@@ -279,7 +295,7 @@ struct OtherShell : mauve::Shell {};
 struct TwinShell : mauve::Shell {
   mauve::Property<double>& step = property("step", 1.0, {.unit = "1", .minimum = 0.0, .maximum = 10.0});
   mauve::Property<double>& factor = property("factor", 2.0);
-  mauve::WritePort<Number>& count = write_port<Number>("count");
+  mauve::WritePort<Number>& count = write_port<Number>("count").optional();
 };
 
 struct Twin : mauve::Core<TwinShell> {
@@ -304,7 +320,7 @@ struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
 struct CallerShell : mauve::Shell {
   mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
   mauve::CallPort<mauve::CallOf<SetBool>>& lamp = call_port<SetBool>("lamp");
-  mauve::WritePort<Number>& count = write_port<Number>("count");
+  mauve::WritePort<Number>& count = write_port<Number>("count").optional();
 };
 
 /// Counts answers; says how a call ended that was not answered by minus its outcome.
@@ -335,7 +351,7 @@ struct CallerFsm : mauve::Fsm<CallerShell, Caller> {
 /// Asks for the stop of a component whose name is no text; says the reply's code.
 struct StopperShell : mauve::Shell {
   mauve::CallPort<mauve::CallOf<Stop>>& stop = call_port<Stop>("stop");
-  mauve::WritePort<Number>& count = write_port<Number>("count");
+  mauve::WritePort<Number>& count = write_port<Number>("count").optional();
 };
 struct Stopper : mauve::Core<StopperShell> {
   void act() {

@@ -28,7 +28,7 @@ TIMEOUT_NS = 20_000_000_000
 
 
 class CountShell(Shell):
-    out = write_port(PoseStamped)
+    out = write_port(PoseStamped, optional=True)
     step = property(1, minimum=1, maximum=10, unit="1")
 
 
@@ -56,7 +56,7 @@ class ActFsm(Fsm[Any, Any]):
 
 
 class HearShell(Shell):
-    heard = read_port(PoseStamped)
+    heard = read_port(PoseStamped, optional=True)
 
 
 class HearCore(Core[HearShell]):
@@ -79,7 +79,7 @@ class IdleCore(Core[Shell]):
 
 
 class PointShell(Shell):
-    point = write_port(Point)
+    point = write_port(Point, optional=True)
 
 
 class Stage:

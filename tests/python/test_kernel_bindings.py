@@ -59,6 +59,8 @@ def architecture(registry: PluginRegistry) -> Architecture:
         )
         made.set_property(name, "ticks_per_beat", 5)
     made.connect("metronome", "beat", "beat", "write")
+    made.add_resource("protected_beat", kind="shared_data", type=FLOAT)
+    made.connect("protected", "beat", "protected_beat", "write")
     made.publish("beat")
     return made
 

@@ -23,13 +23,17 @@ from mauve_rt.api import (
     LatestValue,
     MauveError,
     PluginRegistry,
+    Resource,
     RingBuffer,
     SharedData,
     Shell,
+    Transaction,
+    call_port,
     event_port,
     ms_to_ns,
     property,  # noqa: A004
     read_port,
+    service,
     write_port,
 )
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
@@ -103,8 +107,11 @@ def test_a_core_in_python_on_an_fsm_in_cpp_and_not_the_reverse(built: Stage):
         loader.require(kind, f"mauve_examples/{name}")
     shell = "mauve_examples/MetronomeShell"
     built.add("good", shell, "mauve_examples/PythonMetronome", "mauve_examples/MetronomeFsm")
-    built.architecture.component("good").configure()
     built.add("bad", shell, "mauve_examples/Metronome", ActFsm)
+    built.architecture.add_resource("beat", kind="shared_data", type="std_msgs/msg/Float64")
+    for name in ("good", "bad"):
+        built.architecture.connect(name, "beat", "beat", "write")
+    built.architecture.component("good").configure()
     with pytest.raises(MauveError, match="an fsm in Python finds the core's methods by name") as refused:
         built.architecture.component("bad").configure()
     assert refused.value.code == "type_mismatch"
@@ -221,12 +228,46 @@ def test_a_type_that_nobody_knows_is_refused(built: Stage):
 # ---- what a shell has
 
 
+class AskShell(Shell):
+    """One port of each kind."""
+
+    heard = read_port(Point)
+    said = write_port(Point)
+    rung = event_port()
+    asked = call_port("package/Ask")
+
+
+@pytest.mark.parametrize("left_out", ["heard", "said", "rung", "asked"])
+def test_required_ports_are_connected_before_configure(built: Stage, left_out: str):
+    class Oracle(Resource):
+        @service("package/Ask")
+        def ask(self) -> int:
+            return 1
+
+    built.add("asker", AskShell, IdleCore)
+    places = {"heard": "point.read", "said": "point.write", "rung": "bell.raise", "asked": "oracle.ask"}
+    for name, resource in (("point", SharedData(Point)), ("bell", EventCounter()), ("oracle", Oracle)):
+        built.architecture.add_resource(name, resource)
+    for port, place in places.items():
+        if port != left_out:
+            built.architecture.connect("asker", port, *place.split("."))
+    with pytest.raises(MauveError, match="a required port is not connected") as refused:
+        built.architecture.configure()
+    assert (refused.value.code, refused.value.component) == ("not_connected", "asker")
+    assert refused.value.element == f"port {left_out}"
+    built.architecture.connect("asker", left_out, *places[left_out].split("."))
+    deployer = built.deploy()
+    with pytest.raises(MauveError, match="a required port is not connected") as refused:
+        deployer.commit(Transaction().disconnect("asker", left_out))
+    assert (refused.value.code, refused.value.element) == ("not_connected", f"port {left_out}")
+
+
 def test_unconnected_ports_and_defaults(built: Stage):
     class LoneShell(Shell):
-        heard = read_port(Point, default=Point(x=7.0))
-        plain = read_port(Point)
-        said = write_port(Point)
-        rung = event_port()
+        heard = read_port(Point, default=Point(x=7.0), optional=True)
+        plain = read_port(Point, optional=True)
+        said = write_port(Point, optional=True)
+        rung = event_port(optional=True)
 
     class LoneCore(Core[LoneShell]):
         seen: tuple[Any, ...] = ()

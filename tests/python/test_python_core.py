@@ -185,6 +185,8 @@ def stage(made: list[Counting]) -> Iterator[Stage]:
         architecture.set_property(name, "ticks_per_beat", 3)
         architecture.set_property(name, "period_us", 2000)
     architecture.connect("metronome", "beat", "beat", "write")
+    architecture.add_resource("other_beat", kind="shared_data", type="std_msgs/msg/Float64")
+    architecture.connect("neighbour", "beat", "other_beat", "write")
     architecture.publish("beat")
     architecture.configure()
     deployer = Deployer(architecture)

@@ -69,11 +69,15 @@ def test_services_are_called_by_cores_in_python(built: Stage):
     assert Kind.SERVICE_END in records["kind"]
 
 
-def test_an_unconnected_call_port_is_a_fault(built: Stage):
-    component = built.add("add", AddShell, AddCore)
-    built.deploy()
-    built.until(lambda: component.state == "FAULTED")
-    assert "the call port is not connected" in component.describe().fault
+def test_an_unconnected_call_port_is_refused(built: Stage):
+    built.add("add", AddShell, AddCore)
+    with pytest.raises(MauveError, match="a required port is not connected") as refused:
+        built.deploy()
+    assert (refused.value.code, refused.value.component, refused.value.element) == (
+        "not_connected",
+        "add",
+        "port add",
+    )
 
 
 def test_services_of_other_types_are_refused(built: Stage):

@@ -55,7 +55,7 @@ def test_a_component_in_python_is_added_wired_and_removed(counting: Stage):
 
 def test_core_fsm_and_shell_are_replaced_together(counting: Stage):
     class NewShell(Shell):
-        out = write_port(PoseStamped)
+        out = write_port(PoseStamped, optional=True)
 
     class NewCore(Core[NewShell]):
         count = 0

@@ -304,8 +304,25 @@ void Component::bind_fsm(FsmBase& fsm, Shell& shell) const {
   }
 }
 
+void Component::check_stack(const Shell& shell) const {
+  const LargestMessage largest = largest_message(shell);
+  const std::size_t needed = stack_bytes_for(largest);
+  if (needed <= task_.settings().stack_bytes) return;
+  throw Error(ErrorCode::out_of_range, "a port's messages do not fit on the component's stack",
+              {.component = name_,
+               .element = "port " + largest.port,
+               .expected = "stack_bytes of at least " + std::to_string(needed) + " for " +
+                           std::to_string(largest.bytes) + " bytes of " + largest.type,
+               .found = "stack_bytes of " + std::to_string(task_.settings().stack_bytes),
+               .remedy = "raise the component's stack_bytes, or make the message smaller"});
+}
+
 bool Component::configure_hook() {
   require_parked("configure");
+  for (const auto& port : parts_.shell->ports()) {
+    if (port->is_required() && !port->is_connected()) throw_not_connected(*port, name_);
+  }
+  check_stack(*parts_.shell);
   bind_fsm(*parts_.fsm, *parts_.shell);
   time_ns_t period_ns = 0;
   try {

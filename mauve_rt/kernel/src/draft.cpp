@@ -146,7 +146,10 @@ void Draft::connect(DraftComponent& component, const std::string& port_name, con
 }
 
 void Draft::disconnect(DraftComponent& component, const std::string& port) {
-  if (component.wires.erase(port) != 0) return;
+  if (component.wires.erase(port) != 0) {
+    component.disconnected.insert_or_assign(port, step_);
+    return;
+  }
   find_port(component.shell(), port, component.name());
   throw Error(ErrorCode::invalid_argument, "the port is not connected",
               {.component = component.name(), .element = "port " + port, .remedy = "leave the step out"});

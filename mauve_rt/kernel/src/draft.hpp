@@ -40,6 +40,7 @@ struct DraftComponent {
   Component::FsmFactory make_fsm{};
   std::map<std::string, Wire> wires_before{};  // by port
   std::map<std::string, Wire> wires{};
+  std::map<std::string, int> disconnected{};  // by port: the last step that disconnected it
   std::map<std::string, DraftProperty> properties{};
   int shell_step{0};
   int fsm_step{0};
@@ -104,7 +105,8 @@ class Draft {
   void disconnect(DraftComponent& component, const std::string& port);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
 
-  /// Checks what only the whole shows: kept connections of new shells, structural properties, ports per service. Throws Error with the step.
+  /// Checks what only the whole shows: kept connections of new shells, structural properties, ports that must
+  /// lead somewhere, ports per service. Throws Error with the step.
   void finish() const;
 
   std::list<DraftComponent>& components() noexcept { return components_; }
@@ -115,6 +117,7 @@ class Draft {
  private:
   void check_kept_wires(const DraftComponent& component) const;
   static void check_structural(const DraftComponent& component);
+  void check_required_ports(const DraftComponent& component) const;
   void check_port_counts() const;
 
   Architecture& architecture_;

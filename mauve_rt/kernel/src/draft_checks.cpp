@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "draft.hpp"
+#include "lookup.hpp"
 
 namespace mauve {
 
@@ -17,6 +18,7 @@ void Draft::finish() const {
   for (const DraftComponent& component : components_) {
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
+    if (component.first_step != 0 && architecture_.is_configured()) check_required_ports(component);
   }
   check_port_counts();
 }
@@ -49,6 +51,17 @@ void Draft::check_structural(const DraftComponent& component) {
     } catch (const Error& failure) {
       rethrow_as_of(failure, component.name(), property.step);
     }
+  }
+}
+
+void Draft::check_required_ports(const DraftComponent& component) const {
+  for (const auto& port : component.shell().ports()) {
+    if (!port->is_required() || component.wires.contains(port->name())) continue;
+    const auto disconnected = component.disconnected.find(port->name());
+    const int step = disconnected != component.disconnected.end() ? disconnected->second
+                     : component.shell_step != 0                  ? component.shell_step
+                                                                  : component.first_step;
+    throw_not_connected(*port, component.name(), step);
   }
 }
 

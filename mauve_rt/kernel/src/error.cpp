@@ -62,6 +62,8 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "configure_failed";
     case ErrorCode::not_configured:
       return "not_configured";
+    case ErrorCode::not_connected:
+      return "not_connected";
     case ErrorCode::not_running:
       return "not_running";
     case ErrorCode::already_running:

@@ -31,4 +31,17 @@ ServiceBase& find_service(const Resource& resource, const std::string& name, con
                .found = name});
 }
 
+void throw_not_connected(const PortBase& port, const std::string& component, int step) {
+  const bool is_call = port.kind() == PortKind::call;
+  const std::string where = is_call ? "connect it" : "connect it, or declare it optional in the shell";
+  throw Error(ErrorCode::not_connected, "a required port is not connected",
+              {.component = component,
+               .element = "port " + port.name(),
+               .expected = "a connection to a " + std::string(to_string(port.kind())) + " service" +
+                           (port.type().empty() ? "" : " of " + port.type()),
+               .found = "none",
+               .remedy = step == 0 ? where : where + ", in the same transaction",
+               .step = step});
+}
+
 }  // namespace mauve

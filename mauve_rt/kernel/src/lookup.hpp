@@ -20,6 +20,9 @@ PropertyBase& find_property(const Shell& shell, const std::string& name, const s
 ServiceBase& find_service(const Resource& resource, const std::string& name, const std::string& component,
                           const std::string& port);
 
+/// Of a required port that leads nowhere. [non-rt]
+[[noreturn]] void throw_not_connected(const PortBase& port, const std::string& component, int step = 0);
+
 /// `present`: those there are. [non-rt]
 template <typename Items>
 [[noreturn]] void throw_no_component(const std::string& name, const Items& present) {

@@ -76,6 +76,7 @@ void PartsChange::prepare_parts() {
   Shell& shell = this->shell();
   if (parts_.shell != nullptr) {
     what_ = parts_.shell->description();
+    component_.check_stack(shell);
     parts_.shell->configure();
   }
   if (parts_.fsm != nullptr) {

@@ -26,6 +26,21 @@ void Shell::set_context(const Context* context) noexcept {
   for (const auto& port : ports_) port->set_context(context);
 }
 
+LargestMessage largest_message(const Shell& shell) {
+  LargestMessage largest;
+  for (const auto& port : shell.ports()) {
+    for (const MessageShape& message : port->messages()) {
+      if (message.bytes > largest.bytes) largest = {port->name(), message.type, message.bytes};
+    }
+  }
+  return largest;
+}
+
+std::size_t stack_bytes_for(const LargestMessage& largest) noexcept {
+  constexpr std::size_t kForOthers = std::size_t{32} * 1024;
+  return 2 * largest.bytes + kForOthers;
+}
+
 void Shell::check_new(const std::string& name) const {
   if (find_port(name) != nullptr || find_property(name) != nullptr) {
     throw Error(ErrorCode::duplicate_name, "the shell declares the name twice",

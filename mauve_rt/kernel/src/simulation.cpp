@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/simulation.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <tuple>
 
@@ -20,6 +22,30 @@ class RingOfThread {
   RingOfThread& operator=(const RingOfThread&) = delete;
 };
 
+/// Of the calling thread; 0 when the system does not tell.
+std::size_t own_stack_bytes() noexcept {
+  pthread_attr_t attributes;
+  if (pthread_getattr_np(pthread_self(), &attributes) != 0) return 0;
+  void* lowest = nullptr;
+  std::size_t size = 0;
+  pthread_attr_getstack(&attributes, &lowest, &size);
+  pthread_attr_destroy(&attributes);
+  return size;
+}
+
+/// A simulated component runs on the caller's stack, not on one of its own.
+void check_stack(Component& component, std::size_t stack_bytes) {
+  const LargestMessage largest = largest_message(component.shell());
+  const std::size_t needed = stack_bytes_for(largest);
+  if (stack_bytes == 0 || needed <= stack_bytes) return;
+  throw Error(ErrorCode::out_of_range, "a port's messages do not fit on the simulating thread's stack",
+              {.component = component.name(),
+               .element = "port " + largest.port,
+               .expected = "a stack of at least " + std::to_string(needed) + " bytes",
+               .found = std::to_string(stack_bytes),
+               .remedy = "raise the limit (ulimit -s), or make the message smaller"});
+}
+
 }  // namespace
 
 Simulation::Simulation(SimulationOptions options) : options_(options), now_ns_(options.begin_ns) {
@@ -36,7 +62,9 @@ void Simulation::add(Architecture& architecture) {
     throw Error(ErrorCode::not_configured, "the architecture is not configured",
                 {.remedy = "call configure() first"});
   }
+  const std::size_t stack_bytes = own_stack_bytes();
   for (const auto& component : architecture.components()) {
+    check_stack(*component, stack_bytes);
     if (!component->task().has_thread() && !component->task().is_simulated()) continue;
     throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
                 {.component = component->name(), .remedy = "shut that down first"});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,11 +52,11 @@ class RequestService : public CallService<CallOf<S>> {
 
   bool is_call_serializable() const noexcept override { return true; }
   CallOutcome call_serialized(std::span<const std::byte> message, std::vector<std::byte>& reply) override {
-    typename S::Request request{};
-    typename S::Response response{};
-    if (!CdrReader(message).get(request)) return CallOutcome::malformed;
-    const CallOutcome outcome = this->call(request, response);
-    if (outcome == CallOutcome::answered) CdrWriter(reply).put(response);
+    const auto request = std::make_unique<typename S::Request>();
+    const auto response = std::make_unique<typename S::Response>();
+    if (!CdrReader(message).get(*request)) return CallOutcome::malformed;
+    const CallOutcome outcome = this->call(*request, *response);
+    if (outcome == CallOutcome::answered) CdrWriter(reply).put(*response);
     return outcome;
   }
 };

@@ -22,7 +22,8 @@ static_assert(std::endian::native == std::endian::little,
 
 namespace mauve {
 
-/// What MAUVE_TYPE specialises: `name` (the type's identity) and `fields()` (a tuple of member pointers).
+/// What MAUVE_TYPE specialises: `name` (the type's identity), `fields()` (a tuple of member pointers) and
+/// `field_names` (their names, with commas between).
 template <typename T>
 struct TypeTraits;
 
@@ -186,9 +187,11 @@ class CdrReader {
 
 /// Declares a struct's identity and its mapping to a ROS message, once, in message order, at global scope:
 ///   MAUVE_TYPE(my::Point, "geometry_msgs/msg/Point", x, y, z)
+/// Members are named as the message's fields, or so with one word more: cost_m for cost, class_ for class.
 #define MAUVE_TYPE(type, type_name, ...)                                                         \
   template <>                                                                                    \
   struct mauve::TypeTraits<type> {                                                               \
     static constexpr std::string_view name = type_name;                                          \
+    static constexpr std::string_view field_names = #__VA_ARGS__;                                \
     static constexpr auto fields() { return std::make_tuple(MAUVE_MEMBERS(type, __VA_ARGS__)); } \
   };

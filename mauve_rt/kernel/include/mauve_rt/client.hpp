@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 
 #include "mauve_rt/call_type.hpp"
@@ -93,15 +94,15 @@ class Client final : public ClientBase {
   }
 
   bool next_request(std::vector<std::byte>& message, std::uint32_t& number) override {
-    Request request;
-    if (!take_request(number, [&] { request = request_; })) return false;
-    CdrWriter(message).put(request);
+    const auto request = std::make_unique<Request>();
+    if (!take_request(number, [&] { *request = request_; })) return false;
+    CdrWriter(message).put(*request);
     return true;
   }
   void answer(std::uint32_t number, std::span<const std::byte> message) override {
-    Response response{};
-    if (!CdrReader(message).get(response)) return refuse(number, CallOutcome::malformed);
-    end(number, CallOutcome::answered, [&] { response_ = response; });
+    const auto response = std::make_unique<Response>();
+    if (!CdrReader(message).get(*response)) return refuse(number, CallOutcome::malformed);
+    end(number, CallOutcome::answered, [&] { response_ = *response; });
   }
 
  private:

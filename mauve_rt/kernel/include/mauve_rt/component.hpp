@@ -244,6 +244,8 @@ class Component final : public Configurable {
   void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
   void bind_fsm(FsmBase& fsm, Shell& shell) const;
+  /// Refuses a shell whose messages do not fit on the task's stack. Throws Error (out_of_range).
+  void check_stack(const Shell& shell) const;
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();

@@ -33,6 +33,7 @@ enum class ErrorCode : std::uint16_t {
   bad_period,
   configure_failed,
   not_configured,
+  not_connected,
   not_running,
   already_running,
   faulted,

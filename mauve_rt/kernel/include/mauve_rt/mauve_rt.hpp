@@ -17,6 +17,7 @@
 #include "mauve_rt/fsm.hpp"
 #include "mauve_rt/function_ref.hpp"
 #include "mauve_rt/latest_value.hpp"
+#include "mauve_rt/message_shape.hpp"
 #include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/plugin.hpp"
 #include "mauve_rt/port.hpp"

@@ -12,12 +12,19 @@
 
 namespace mauve {
 
-/// Reads from a resource. Unconnected, it yields its default with status none.
+/// Reads from a resource. Unconnected (which is for optional ones), it yields its default with status none.
 template <Described T>
 class ReadPort final : public PortBase {
  public:
-  explicit ReadPort(std::string name, T initial = {})
-      : PortBase(std::move(name), PortKind::read, type_name<T>()), default_(std::move(initial)) {}
+  explicit ReadPort(std::string name) : PortBase(std::move(name), PortKind::read, type_name<T>()) {}
+  ReadPort(std::string name, const T& initial)
+      : PortBase(std::move(name), PortKind::read, type_name<T>()), default_(initial) {}
+
+  /// Lets it go unconnected. [setup]
+  ReadPort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
@@ -41,6 +48,7 @@ class ReadPort final : public PortBase {
   /// How old what the last read found is by the component's clock; 0 when there was nothing. [rt]
   time_ns_t age_ns() const noexcept { return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns; }
 
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
     auto value = std::make_unique<T>(default_);
     status = read(*value, &time_ns);
@@ -79,15 +87,21 @@ class ReadPort final : public PortBase {
   LatestRegister<T>* latest_{nullptr};
   ReaderState reader_;
   DataStatus status_{DataStatus::none};
-  T default_;
+  T default_{};  // kept here, as zero_: large types do not belong on a stack
 };
 
-/// Writes to a resource, stamped with the component's logical clock. Unconnected, it does nothing.
+/// Writes to a resource, stamped with the component's logical clock. Unconnected (optional), it does nothing.
 template <Described T>
 class WritePort final : public PortBase {
  public:
   explicit WritePort(std::string name, OutputOptions output = {})
       : PortBase(std::move(name), PortKind::write, type_name<T>()), output_(output) {}
+
+  /// Lets it go unconnected. [setup]
+  WritePort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
 
   /// False when the resource had no room. [rt]
   bool write(const T& value) noexcept {
@@ -101,6 +115,7 @@ class WritePort final : public PortBase {
     if (service_ != nullptr) service_->write(zero_, stamp_ns());
   }
   OutputOptions output() const noexcept override { return output_; }
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
 
   bool write_serialized(std::span<const std::byte> message) override {
     auto value = std::make_unique<T>();
@@ -122,14 +137,15 @@ class WritePort final : public PortBase {
 template <typename Signature>
 class CallPort;
 
-/// Calls a service of a resource; the type is the name the service declares.
+/// Calls a service of a resource; the type is the name the service declares. Always required.
 template <typename R, typename... Args>
 class CallPort<R(Args...)> final : public PortBase {
  public:
   CallPort(std::string name, std::string type) : PortBase(std::move(name), PortKind::call, std::move(type)) {}
 
-  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected (check
-  /// is_connected()).
+  std::vector<MessageShape> messages() const override { return message_shapes<Args...>(); }
+  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected, which only a port that
+  /// belongs to no component can be.
   R operator()(Args... args) {
     if (service_ == nullptr) throw std::logic_error("call port '" + name() + "' is not connected");
     const ServiceSpan span(trace_id());
@@ -148,10 +164,15 @@ class CallPort<R(Args...)> final : public PortBase {
   CallService<R(Args...)>* service_{nullptr};
 };
 
-/// Raises an event of a resource. Unconnected, it does nothing.
+/// Raises an event of a resource. Unconnected (optional), it does nothing.
 class EventPort final : public PortBase {
  public:
   explicit EventPort(std::string name) : PortBase(std::move(name), PortKind::event, "") {}
+  /// Lets it go unconnected. [setup]
+  EventPort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
   /// [rt]
   void raise() noexcept {
     if (service_ != nullptr && !is_closed()) service_->raise(stamp_ns());

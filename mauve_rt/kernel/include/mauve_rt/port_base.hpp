@@ -44,6 +44,7 @@ struct ConnectedTo {
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
 /// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
 /// | context_    | [setup]                        | component                 | -                                    |
+/// | optional_   | [setup]                        | any                       | -                                    |
 /// | closed_     | the watchdog                   | component                 | release/acquire: its zeros stay last |
 class PortBase {
  public:
@@ -58,6 +59,12 @@ class PortBase {
   const std::string& type() const noexcept { return type_; }
   /// As ServiceBase::representation(). [rt]
   virtual std::string_view representation() const noexcept { return "C++"; }
+  /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
+  virtual std::vector<MessageShape> messages() const { return {}; }
+  /// Whether its component is configured only with it connected: call ports always, others unless optional. [rt]
+  bool is_required() const noexcept { return kind_ == PortKind::call || !optional_; }
+  /// Lets it go unconnected; a call port stays required. [setup]
+  void make_optional() noexcept { optional_ = true; }
   bool is_connected() const noexcept { return connection_.service != nullptr; }
   /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
   ServiceBase* service() const noexcept { return connection_.service; }
@@ -115,6 +122,7 @@ class PortBase {
   mutable PiMutex shown_mutex_;  // a commit may swap while an ordinary thread describes the architecture
   PortConnection connection_;
   const Context* context_{nullptr};
+  bool optional_{false};
   std::atomic<bool> closed_{false};
 };
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mauve_rt/cdr.hpp"
+#include "mauve_rt/message_shape.hpp"
 #include "mauve_rt/time.hpp"
 
 namespace mauve {
@@ -82,6 +82,8 @@ class ServiceBase {
   const std::string& type() const noexcept { return type_; }
   /// How it holds values of the type: "C++", or what another language does. [rt]
   virtual std::string_view representation() const noexcept { return "C++"; }
+  /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
+  virtual std::vector<MessageShape> messages() const { return {}; }
   /// The resource that offers it, or nullptr. [rt]
   Resource* resource() const noexcept { return resource_; }
 
@@ -114,6 +116,7 @@ template <Described T>
 class ReadService : public ServiceBase {
  public:
   explicit ReadService(std::string name) : ServiceBase(std::move(name), PortKind::read, type_name<T>()) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Copies what is there; leaves value and time alone when there is nothing. [rt]
   virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept = 0;
   /// The same by value, `fallback` when there is nothing; override it where that saves a copy. [rt]
@@ -132,6 +135,7 @@ template <Described T>
 class WriteService : public ServiceBase {
  public:
   explicit WriteService(std::string name) : ServiceBase(std::move(name), PortKind::write, type_name<T>()) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Takes a copy; false when there was no room. [rt]
   virtual bool write(const T& value, time_ns_t time_ns) noexcept = 0;
 };
@@ -146,6 +150,7 @@ class CallService<R(Args...)> : public ServiceBase {
  public:
   CallService(std::string name, std::string type)
       : ServiceBase(std::move(name), PortKind::call, std::move(type)) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<Args...>(); }
   /// [rt] as far as the resource says so.
   virtual R call(Args... args) = 0;
 };

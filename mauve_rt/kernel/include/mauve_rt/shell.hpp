@@ -19,6 +19,8 @@ namespace mauve {
 ///     mauve::Property<double>& path_step = property("path_step", 0.5, {.unit = "m"});
 ///     mauve::ReadPort<Point>& goal = read_port<Point>("goal");
 ///   };
+///
+/// Every port is to be connected before configure, unless declared so: read_port<Point>("goal").optional().
 class Shell : public Configurable {
  public:
   const std::vector<std::unique_ptr<PortBase>>& ports() const noexcept { return ports_; }
@@ -36,8 +38,12 @@ class Shell : public Configurable {
 
  protected:
   template <typename T>
-  ReadPort<T>& read_port(std::string name, T initial = {}) {
-    return add(ports_, std::make_unique<ReadPort<T>>(std::move(name), std::move(initial)));
+  ReadPort<T>& read_port(std::string name) {
+    return add(ports_, std::make_unique<ReadPort<T>>(std::move(name)));
+  }
+  template <typename T>
+  ReadPort<T>& read_port(std::string name, const T& initial) {
+    return add(ports_, std::make_unique<ReadPort<T>>(std::move(name), initial));
   }
   template <typename T>
   WritePort<T>& write_port(std::string name, OutputOptions output = {}) {
@@ -93,5 +99,16 @@ class Shell : public Configurable {
   std::vector<std::unique_ptr<PropertyBase>> properties_;
   std::string implementation_;
 };
+
+/// The port with the largest message; default: no port carries one.
+struct LargestMessage {
+  std::string port;
+  std::string type;
+  std::size_t bytes{0};
+};
+/// [non-rt]
+LargestMessage largest_message(const Shell& shell);
+/// The stack that a thread needs for a core that keeps what it reads and what it writes there. [non-rt]
+std::size_t stack_bytes_for(const LargestMessage& largest) noexcept;
 
 }  // namespace mauve

@@ -12,7 +12,8 @@
 
 namespace mauve {
 
-/// `output`, `only_new`, and `input_0` to `input_<N-1>`. An input left unconnected has never a value.
+/// `output`, `only_new`, and `input_0` to `input_<N-1>`. One of
+/// several inputs may be left unconnected: it has never a value.
 template <Described T, std::size_t N>
 struct SelectorShell : PeriodicShell {
   static_assert(N > 0);
@@ -28,6 +29,7 @@ struct SelectorShell : PeriodicShell {
     std::array<ReadPort<T>*, N> made{};
     for (std::size_t i = 0; i < N; ++i) {
       made[i] = &this->template read_port<T>(N == 1 ? "input" : "input_" + std::to_string(i));
+      if (N > 1) made[i]->make_optional();
     }
     return made;
   }
