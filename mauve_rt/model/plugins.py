@@ -211,6 +211,7 @@ def _factory(plugin: Plugin) -> Callable[[Any], object]:
 
     module_name, _, class_name = plugin.target.partition(":")
     try:
+        importlib.invalidate_caches()  # it may have been installed a moment ago
         core_class = getattr(importlib.import_module(module_name), class_name)
     except BaseException as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
         text = f"core '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
