@@ -19,7 +19,8 @@ using mauve::types::Point;
 
 struct TalkerShell : mauve::Shell {
   TalkerShell() {
-    for (int i = 0; i < kMostTopics; ++i) points.push_back(&write_port<Point>("point_" + std::to_string(i)));
+    for (int i = 0; i < kMostTopics; ++i)
+      points.push_back(&write_port<Point>("point_" + std::to_string(i)).optional());
   }
   mauve::Property<std::int64_t>& topics = property("topics", 1, {.minimum = 0, .maximum = kMostTopics});
   mauve::Property<std::int64_t>& marks = property(

@@ -59,14 +59,14 @@ def architecture(registry: PluginRegistry) -> Architecture:
         )
         made.set_property(name, "ticks_per_beat", 5)
     made.connect("metronome", "beat", "beat", "write")
-    made.add_resource("protected_beat", kind="shared_data", type=FLOAT)
-    made.connect("protected", "beat", "protected_beat", "write")
     made.publish("beat")
     return made
 
 
 @pytest.fixture
 def deployer(architecture: Architecture) -> Iterator[Deployer]:
+    architecture.add_resource("protected_beat", kind="shared_data", type=FLOAT)
+    architecture.connect("protected", "beat", "protected_beat", "write")
     architecture.configure()
     made = Deployer(architecture)
     made.deploy()

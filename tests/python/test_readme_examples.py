@@ -161,6 +161,8 @@ for kind, name in parts.items():
     loader.require(kind, f"mauve_examples/{name}")
 architecture = Architecture(registry)
 architecture.add_component("metronome", *(f"mauve_examples/{name}" for name in parts.values()))
+architecture.add_resource("beat", kind="shared_data", type="std_msgs/msg/Float64")
+architecture.connect("metronome", "beat", "beat", "write")
 architecture.configure()
 deployer = Deployer(architecture)
 deployer.deploy()
