@@ -9,7 +9,7 @@ from mauve_rt._kernel import (
     ServiceDescription,
     ShellDescription,
 )
-from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Problem
+from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, PortTypeError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.message_types import message_class, service_class
@@ -83,6 +83,19 @@ class Checks:
                 shell = registry.core_shell(part) if kind == "core" else registry.fsm_shell(part)
                 if shell not in shells:
                     yield from self._same_shell(name, part, shell, at)
+                if kind == "core":
+                    yield from self._served(name, part, shell, at)
+
+    def _served(self, component: str, core: str, shell: str, place: Location) -> Iterator[Problem]:
+        """Ports that an alternative in Python cannot use; of the first core configure() tells."""
+        plugin = self._loader.index.find("core", core)
+        ports = self._shells[component].ports if component in self._shells else []
+        if plugin is None or not plugin.is_python or shell != self._model.components[component].shell:
+            return
+        for port in ports:
+            if port.kind in ("read", "write") and port.required and message_class(port.type) is None:
+                error = PortTypeError(port.name, port.type, core=f"'{core}'")
+                yield self._model.problem(place, str(error), code=error.code)
 
     def _plugin(self, kind: str, name: str, place: Location) -> Iterator[Problem]:
         try:

@@ -175,4 +175,9 @@ def test_a_core_in_python_is_refused_on_a_type_that_only_cpp_has(check: Check) -
     assert "core PyLarge is written in Python, which has no class for the port's type" in error
     assert "port input" in error
     assert "found misfits/Large" in error
+    alternative = "fsm: misfits/LargeFsm, alternatives: [misfits/PyLarge],"
+    status, _, errors = check(LARGE.replace("fsm: misfits/LargeFsm,", alternative))
+    assert status == 2
+    assert [error.partition(" ")[0] for error in errors] == ["robot:3:98:"] * 2
+    assert all("which has no class for the port's type" in error for error in errors)
     assert "write the core in C++" in error
