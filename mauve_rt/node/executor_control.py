@@ -3,22 +3,20 @@
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 from mauve_rt._kernel import (
     Committed,
     ComponentDescription,
     ResourceDescription,
-    StepReport,
-    TransactionReport,
     monotonic_ns,
 )
 from mauve_rt.errors import MauveError, error_code, exception_text, one_line
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.node.executor_checks import check_form, check_revision, check_state, check_time
+from mauve_rt.node.executor_reports import Following, message_of, reports_of
 from mauve_rt.node.executor_requests import (
-    NOT_MEASURED,
     Code,
     Outcome,
     RecordingOrder,
@@ -176,10 +174,10 @@ class Control:
         self._runtime.declare(added=plan.added, removed=plan.removed)
         self._taken = plan.taken
         measured = committed.report()
-        report, pending = _reports(request.steps, measured), None
+        report, pending = reports_of(request.steps, measured), None
         if not measured.is_complete and (timeout_ns := self._phase_timeout_of(request)) > 0:
-            pending = _Following(committed, request.steps, monotonic_ns() + timeout_ns)
-        message = _message(request.steps, measured)
+            pending = Following(committed, request.steps, monotonic_ns() + timeout_ns)
+        message = message_of(request.steps, measured)
         return Outcome(code=Code.OK, message=message, report=report, pending=pending)
 
     def _still_taken(self, parts: Sequence[ComponentDescription]) -> dict[str, int]:
@@ -258,24 +256,6 @@ class Control:
             return
 
 
-@dataclass(frozen=True)
-class _Following:
-    """The releases that follow a commit."""
-
-    committed: Committed
-    steps: tuple[Step, ...]
-    until_ns: int
-
-    def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
-        """As Pending.look."""
-        left_ns = self.until_ns - monotonic_ns()
-        measured = self.committed.report(max(0, min(left_ns, wait_ns)))
-        is_over = measured.is_complete or left_ns <= wait_ns
-        return replace(
-            outcome, report=_reports(self.steps, measured), pending=None if is_over else outcome.pending
-        )
-
-
 def _is_direct(request: Request) -> bool:
     """Whether it is carried out without a transaction, beside whatever else there is."""
     return len(request.steps) == 1 and request.steps[0].kind in ("start", "stop") and not request.dry_run
@@ -293,50 +273,3 @@ def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> t
 
 def _timeout_ns(request: Request) -> int:
     return round((request.timeout_s or DEFAULT_TIMEOUT_S) * 1e9)
-
-
-def _message(steps: tuple[Step, ...], measured: TransactionReport) -> str:
-    if len(steps) > 1:
-        figures = f"prepared in {measured.prepare_ns / 1e6:.3g} ms"
-        if measured.blackout_ns > 0:
-            figures += f", longest blackout {measured.blackout_ns / 1e6:.3g} ms"
-        return f"{len(steps)} steps are in force; {figures}"
-    step, report = steps[0], measured.steps[0]
-    match step.kind:
-        case "replace_core":
-            return f"component '{step.target}' runs {report.to_core}, before {report.from_core}"
-        case "set_property":
-            return f"property '{step.name}' of component '{step.target}' is {step.value}"
-        case _:
-            return f"done: {step}"
-
-
-def _reports(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Report, ...]:
-    if len(steps) == 1:  # then all of it was for this one
-        alone, complete = measured.steps[0], measured.is_complete
-        return (_report(steps[0], alone, prepare_ns=measured.prepare_ns, is_complete=complete),)
-    return tuple(
-        _report(step, report, prepare_ns=report.prepare_ns, is_complete=measured.is_complete)
-        for step, report in zip(steps, measured.steps, strict=True)
-    )
-
-
-def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: bool) -> Report:
-    is_long = step.kind in ("add_component", "add_resource")
-    on_resource = step.kind in ("add_resource", "remove_resource")
-    words = [step.kind, step.target if on_resource else step.name]
-    if not is_long and step.kind != "replace_core":
-        words.append(step.value)
-    held = measured.blackout_ns != 0
-    follows = held and not is_complete and measured.phase_actual_ns == NOT_MEASURED
-    return Report(
-        step=" ".join(word for word in words if word),
-        component=measured.component,
-        prepare_ns=prepare_ns,
-        blackout_ns=measured.blackout_ns if held else NOT_MEASURED,
-        missed_releases=NOT_MEASURED if follows else measured.missed_releases,
-        phase_nominal_ns=measured.phase_nominal_ns if held else NOT_MEASURED,
-        phase_actual_ns=measured.phase_actual_ns,
-        from_core=measured.from_core,
-        to_core=measured.to_core,
-    )
