@@ -16,6 +16,7 @@ from pathlib import Path
 import machine
 from command import command_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
+from mission import mission_rows
 from native import BenchmarkError
 from reading import reading_rows
 from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
@@ -54,6 +55,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording": recording_rows,
     "recording-killed": kill_rows,
     "reading": reading_rows,
+    "mission": mission_rows,
 }
 
 

@@ -57,11 +57,14 @@ const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, con
 }
 
 void FrontierFinder::classify(std::span<const std::int8_t> cells) noexcept {
-  for (std::size_t i = 0; i < kind_.size(); ++i) {
+  const std::span<const std::uint16_t> squared = clearance_.squared();
+  const std::uint16_t near = near_squared_;
+  std::uint8_t* const kind = kind_.data();
+  for (std::size_t i = 0; i < squared.size(); ++i) {
     const auto of_free = static_cast<std::uint8_t>(cells[i] == kFree ? kPassable : 0);
     // Unknown cells that touch walls are of no interest: no robot will ever stand there, whatever they hold.
     const auto of_state = static_cast<std::uint8_t>(cells[i] == kUnknown ? kToBeSeen : of_free);
-    kind_[i] = clearance_.at_least(i, near_squared_) ? of_state : std::uint8_t{0};
+    kind[i] = squared[i] >= near ? of_state : std::uint8_t{0};
   }
 }
 

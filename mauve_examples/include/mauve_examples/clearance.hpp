@@ -30,6 +30,7 @@ class ClearanceField {
     return squared_[index] >= squared;
   }
   std::uint16_t squared(std::size_t index) const noexcept { return squared_[index]; }
+  std::span<const std::uint16_t> squared() const noexcept { return squared_; }
   /// The squared distance in cells that keeps a disc of the radius clear of an obstacle's border. [rt]
   std::uint16_t squared_cells(double radius_m) const noexcept;
 
