@@ -85,6 +85,7 @@ def test_what_ruamel_writes_is_read_as_ruamel_reads_it(value: Any, flow: bool): 
     text = _written_by_ruamel(value, flow=flow)
     # PyYAML refuses `[:a]` and, where it has no libyaml, `[a?b]`.
     assume(not flow or not re.search(r"[\[{ ]:|\?", text))
+    assume(not re.search(r"\.[0-9]*e", text, re.IGNORECASE))  # to ruamel.yaml `.5e3` is no number
     assert repr(read_yaml(text)) == repr(by_ruamel(text))
 
 
