@@ -6,7 +6,7 @@ refused, not damaged: a repair would cut it off there.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import Any, NoReturn
 
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.mcap_records import Bytes, Chunk, McapError
@@ -56,17 +56,23 @@ class McapLimits:
         self._bytes -= len(data)
         return data
 
+    def records_left(self, chunk: Chunk) -> int:
+        """How many records a chunk may hold."""
+        return self._records if chunk.compression else len(chunk.data)
+
     def count(self, chunk: Chunk, records: int) -> None:
-        """Count records of a chunk as they are read.
-
-        Raises:
-            TraceError: they are more than is read.
-
-        """
+        """Count the records of a chunk that was read."""
         if chunk.compression:
             self._records -= records
-            if self._records < 0:
-                self._refuse("more records in its compressed chunks than a file of its size holds")
+
+    def refuse_records(self) -> NoReturn:
+        """There are more.
+
+        Raises:
+            TraceError: to say so.
+
+        """
+        self._refuse("more records in its compressed chunks than a file of its size holds")
 
     def define(self, opcode: int, body: Bytes, size: int) -> None:
         """Count the bytes of a schema or channel that is to be read; `body` begins with its id.
@@ -81,7 +87,7 @@ class McapLimits:
         if size > MAX_DEFINITION_BYTES or self._defined_bytes > MAX_DEFINITIONS_BYTES:
             self._refuse(f"a schema or channel of {size:,} bytes")
 
-    def _refuse(self, what: str) -> None:
+    def _refuse(self, what: str) -> NoReturn:
         why = "it is not read, for so little can be made to take all memory"
         msg = f"{self._where}: {what}: {why}; {_UNCOMPRESSED}"
         raise TraceError(msg)

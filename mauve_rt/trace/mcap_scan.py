@@ -38,7 +38,8 @@ from mauve_rt.trace.mcap_records import (
 _FOOTER_BYTES = HEAD.size + 20
 _ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
 _UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError)
-_DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+_DEFINITIONS = (int(Opcode.SCHEMA), int(Opcode.CHANNEL))
+_MESSAGE = int(Opcode.MESSAGE)  # an enum is compared more slowly, and there are many
 
 
 class Found(NamedTuple):
@@ -241,18 +242,22 @@ class McapScan:
         data = memoryview(unpacked)
         inside: list[Record] = []
         channels = set(self.channels)
-        for opcode, _, begin, stop in split_records(data):
-            self._limits.count(chunk, 1)
-            if opcode in _DEFINITIONS:
+        count, most = 0, self._limits.records_left(chunk)
+        for count, (opcode, _, begin, stop) in enumerate(split_records(data), start=1):
+            if count > most:
+                self._limits.refuse_records()
+            if opcode == _MESSAGE:
+                message = Message.from_bytes(data[begin:stop])
+                if message.channel_id not in channels:
+                    self._check_channel(message.channel_id, channels)
+                inside.append(message)
+            elif opcode in _DEFINITIONS:  # nothing else belongs here
                 self._limits.define(opcode, data[begin:stop], stop - begin)
-            elif opcode != Opcode.MESSAGE:
-                continue  # nothing else belongs here
-            record = read_record(opcode, data[begin:stop])
-            if isinstance(record, Channel):
-                channels.add(record.id)
-            elif isinstance(record, Message) and record.channel_id not in channels:
-                self._check_channel(record.channel_id, channels)
-            inside.append(record)
+                record = read_record(opcode, data[begin:stop])
+                if isinstance(record, Channel):
+                    channels.add(record.id)
+                inside.append(record)
+        self._limits.count(chunk, count)
         return Found(offset, end, chunk, inside, unpacked)
 
     @staticmethod
