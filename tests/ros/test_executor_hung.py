@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 
-from mauve_msgs.msg import ArchitectureState, ComponentInfo
+from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus
 from mauve_msgs.srv import ListComponents, Stop
 from mauve_rt.node.executor_requests import Code
 
@@ -49,7 +49,8 @@ class Told:
 
     def in_state(self, part: str) -> Any:
         """Its part of the newest ~/state."""
-        return next((found for found in self.states[-1].components if found.name == part), None)
+        newest = self.states[-1].components if self.states else ()
+        return next((found for found in newest if found.name == part), ComponentStatus())
 
     def await_hung(self, part: str, state: str = "Count") -> None:
         said = f"hung: state {state} has lasted "
