@@ -179,6 +179,43 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/test_executor_arguments.py::test_an_unknown_parameter_is_refused",
         "python/test_executor_arguments.py::test_bad_properties",
     ),
+    "What is read only once is read-only": (
+        "ros/test_executor_settings.py::test_what_is_read_once_is_read_only",
+        "ros/test_executor_settings.py::test_a_structural_property_is_set_beside_its_reader",
+    ),
+    "`executor --help` lists them": ("ros/test_executor_settings.py::test_help_starts_nothing",),
+    "set it in the transaction that replaces its reader": (
+        "StructuralThreads.BesideTheFsmThatReadsItItTakesEffectInEitherOrder",
+        "ros/test_executor_settings.py::test_a_structural_property_is_set_beside_its_reader",
+    ),
+    "A state that does not end": (
+        "ros/test_executor_hung.py::test_a_hung_component_is_told_until_it_goes_on",
+    ),
+    "What requests may take is limited by the executor's parameters": (
+        "ros/test_request_limits.py::test_memory_and_priority_that_requests_may_take",
+        "ros/test_request_limits.py::test_limits_are_parameters",
+    ),
+    "A port has to be connected unless its shell declares it optional": (
+        "ros/test_required_ports.py::test_a_required_port_stays_connected",
+        "python/test_misfits.py::test_an_unconnected_call_port_is_refused",
+    ),
+    "which is held against that one field by field": (
+        "python/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
+        "python/test_misfits.py::test_a_services_response_is_held_against_the_service",
+    ),
+    "It has the executor check its rules when it arms them": (
+        "ros/test_supervisor_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
+    ),
+    "undoes what a supervisor before it did": (
+        "ros/test_supervisor_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
+    ),
+    "A class installed meanwhile is found": (
+        "ros/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
+    ),
+    "Code that was rebuilt since the executor loaded it is refused": (
+        "ros/test_plugins_installed_anew.py::test_a_library_that_was_rebuilt_is_told",
+        "ros/test_plugins_installed_anew.py::test_a_python_module_that_was_changed_is_told",
+    ),
     "The executor is a managed node": ("ros/test_executor_process.py::test_lifecycle_step_by_step",),
     "A transition that fails for a reason you can correct leaves everything as it was": (
         "ros/test_executor_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
