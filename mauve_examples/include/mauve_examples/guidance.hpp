@@ -26,10 +26,12 @@ struct GuidanceShell : mauve::Shell {
                                                      .minimum = 1,
                                                      .maximum = 10000,
                                                      .structural = mauve::ReadBy::fsm});
-
-  mauve::Property<std::int64_t>& number = property(
-      "number", 1,
-      {.unit = "", .description = "of this robot: lower ones go first", .minimum = 1, .maximum = 16});
+  mauve::Property<std::int64_t>& number = property("number", 1,
+                                                   {.unit = "",
+                                                    .description = "of this robot: lower ones go first",
+                                                    .minimum = 1,
+                                                    .maximum = 16,
+                                                    .structural = mauve::ReadBy::core});
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
