@@ -389,10 +389,10 @@ def test_what_is_stopped_while_a_request_is_planned_is_another_revision(
     revision = runtime.revision
     plan = executor_control.Plan
 
-    def stop_meanwhile(steps: tuple[Step, ...], *rest: Any) -> Any:
+    def stop_meanwhile(steps: tuple[Step, ...], *rest: Any, **limits: Any) -> Any:
         if steps[0].kind == "set_property" and _part(runtime, "free").state == "RUNNING":
             assert _ask(control, Step("stop", "free")).success
-        return plan(steps, *rest)
+        return plan(steps, *rest, **limits)
 
     monkeypatch.setattr(executor_control, "Plan", stop_meanwhile)
     steps = (Step("set_property", "counter", "step", "2.0"), Step("set_property", "brave", "step", "2.0"))

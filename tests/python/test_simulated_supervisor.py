@@ -8,8 +8,9 @@ import pytest
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
-from mauve_rt._kernel import Simulation
+from mauve_rt._kernel import PluginRegistry, Simulation
 from mauve_rt.model.ament_index import share_folder
+from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.simulated_executor import SimulatedExecutor
 from mauve_rt.node.simulated_supervisor import SimulatedSupervisor
 from mauve_rt.node.simulated_topics import SimulatedTopics
@@ -61,7 +62,11 @@ class Stage:
 
 
 @pytest.fixture
-def stage(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Stage]:
+def stage(
+    tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Stage]:
+    # Other tests load other packages into the one of the process, with C++ types of their own for Float64.
+    monkeypatch.setattr(Runtime, "registry", PluginRegistry())
     stage = Stage(tmp_path, **request.param)
     yield stage
     stage.supervisor.close()

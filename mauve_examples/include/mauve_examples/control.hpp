@@ -21,7 +21,7 @@ struct ControlShell : mauve::Shell {
 
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
   mauve::ReadPort<Point>& target = read_port<Point>("target");
-  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
+  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan").optional();  // without one it goes blind
   mauve::WritePort<Twist>& command =
       write_port<Twist>("command");  // zero when stopped: the robot stands still
 };

@@ -24,7 +24,7 @@ def log_ticks(low: float, high: float) -> list[float]:
     factors = (1,) if math.log10(high / low) > _DECADES_WITHOUT_HALVES else (1, 2, 5)
     exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     found = [factor * 10.0**exponent for exponent in exponents for factor in factors]
-    return [value for value in found if low * 0.999 <= value <= high * 1.001]
+    return [value for value in found if low <= value <= high]
 
 
 def asks_for_log(low: float, high: float) -> bool:
