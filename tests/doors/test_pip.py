@@ -20,8 +20,10 @@ components:
   relay: {shell: mauve_rt/PointRelayShell, core: mauve_rt/PointRelay, fsm: mauve_rt/PointRelayFsm}
 resources:
   given: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: given, direction: subscribe}}
+  passed: {kind: shared_data, type: geometry_msgs/msg/Point}
 connections:
   - [relay.input, given.read]
+  - [relay.output, passed.write]
 """
 
 

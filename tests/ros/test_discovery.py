@@ -28,8 +28,10 @@ components:
   relay: {shell: mauve_rt/Float64RelayShell, core: mauve_rt/Float64Relay, fsm: mauve_rt/Float64RelayFsm}
 resources:
   given: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: given, direction: subscribe}}
+  passed: {kind: shared_data, type: std_msgs/msg/Float64}
 connections:
   - [relay.input, given.read]
+  - [relay.output, passed.write]
 """
 RULES = """\
 mauve: 1
