@@ -264,7 +264,7 @@ def _is_direct(request: Request) -> bool:
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:
     """Which core the request's one replace_core step puts in the place of which."""
     replacing = [step for step in request.steps if step.kind == "replace_core"]
-    if len(replacing) != 1:
+    if len(replacing) != 1 or request.dry_run:
         return "", ""
     step = replacing[0]
     present = [part.core for part in parts if part.name == step.target]

@@ -144,6 +144,7 @@ def test_a_dry_run_prepares_everything_and_changes_nothing(runtime: Runtime, con
     assert outcome.message.endswith("would be accepted")
     assert not outcome.report
     refused = _ask(control, Step("replace_core", "free", "executor_tests/Twin"), dry_run=True)
+    assert (refused.from_core, refused.to_core) == ("", ""), "of what did not happen"
     assert refused.code is Code.UNDECLARED_CORE
     assert _look(runtime) == before
 

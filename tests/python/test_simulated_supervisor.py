@@ -62,9 +62,7 @@ class Stage:
 
 
 @pytest.fixture
-def stage(
-    tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Stage]:
+def stage(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
     # Other tests load other packages into the one of the process, with C++ types of their own for Float64.
     monkeypatch.setattr(Runtime, "registry", PluginRegistry())
     stage = Stage(tmp_path, **request.param)
