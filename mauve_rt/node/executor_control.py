@@ -121,13 +121,17 @@ class Control:
                 return replace(known, replayed=True)
             if identity:
                 self._under_way.add(identity)
-        with nullcontext() if _is_direct(request) else self._changing:
-            outcome = self._outcome(request)
-        with self._answered:
-            self._log.add(request, replace(outcome, pending=None))
-            self._under_way.discard(identity)
-            self._answered.notify_all()
-        return outcome
+        outcome: Outcome | None = None
+        try:
+            with nullcontext() if _is_direct(request) else self._changing:
+                outcome = self._outcome(request)
+            return outcome
+        finally:
+            with self._answered:
+                if outcome is not None:
+                    self._log.add(request, replace(outcome, pending=None))
+                self._under_way.discard(identity)
+                self._answered.notify_all()
 
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
