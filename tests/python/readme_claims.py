@@ -77,6 +77,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "replaces the core of its component `exploration` by one that decides alone": (
         "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
     ),
+    "a simulation of the same mission says what supervisors would have saved": (
+        "system/test_demo_simulated.py::test_without_supervisors_it_shows_what_they_would_have_saved",
+    ),
+    "Robots that drive into each other fail a mission": (
+        "system/test_demo_simulated.py::test_it_says_whether_robots_ran_into_each_other",
+        "python/test_collisions.py::test_every_pair_and_every_meeting_counts",
+    ),
     "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
     "takes any map of the ROS map server": (
         "system/test_demo_mission.py::test_maps_of_others_work_as_they_are",
