@@ -82,7 +82,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "Robots that drive into each other fail a mission": (
         "system/test_demo_simulated.py::test_it_says_whether_robots_ran_into_each_other",
-        "python/test_collisions.py::test_every_pair_and_every_meeting_counts",
+        "python/test_collisions.py::test_a_collision_fails_the_mission",
     ),
     "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
     "takes any map of the ROS map server": (

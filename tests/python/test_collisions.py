@@ -1,11 +1,14 @@
 """Whether a mission says that its robots ran into each other."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from mauve_examples.mission import summary
 from mauve_examples.mission.collisions import find_encounters
 from mauve_examples.mission.evidence import RobotEvidence
 from mauve_examples.mission.facts import MissionFacts
@@ -65,3 +68,16 @@ def test_one_robot_or_one_that_was_never_seen_meets_nobody():
     one = driving("robot_1", [(0.0, 0.0, 0.0), (10.0, 10.0, 0.0)])
     assert find_encounters(FACTS, [one]).nearest_m is None
     assert find_encounters(FACTS, [one, driving("robot_2", [])]).nearest_m is None
+
+
+def test_a_collision_fails_the_mission(monkeypatch: pytest.MonkeyPatch):
+    for name, found in (("find_swaps", []), ("failure_reasons", []), ("_robot", {}), ("_warnings", [])):
+        monkeypatch.setattr(summary, name, lambda *_rest, found=found: found)
+    one = driving("robot_1", [(0.0, 0.0, 0.0), (10.0, 10.0, 0.0)])
+    other = driving("robot_2", [(0.0, 10.0, 0.1), (10.0, 0.0, 0.1)])
+    history: Any = SimpleNamespace(robots={}, union=[])
+    facts = replace(FACTS, realtime={"granted": True, "missing": []})
+    told = summary.build_summary(facts, [one, other], history)
+    assert not told["success"]
+    assert "robot_1 and robot_2 collided" in told["reasons"][0]
+    assert told["collisions"]["events"] == 1
