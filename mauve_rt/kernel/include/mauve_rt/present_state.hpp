@@ -62,7 +62,7 @@ class PresentState {
 
  private:
   static constexpr time_ns_t kChanging = -1;
-  static constexpr std::uint64_t kWait = std::uint64_t{1} << 32;  // beside the name
+  static constexpr std::uint64_t kWait = std::uint64_t{1} << 32U;  // beside the name
 
   std::atomic<time_ns_t> since_ns_{0};  // two states never begin at one instant: it tells one from the next
   std::atomic<time_ns_t> bound_ns_{0};
