@@ -3,6 +3,8 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind
@@ -22,9 +24,19 @@ def log_request(console: RcutilsLogger, request: Request, outcome: Outcome) -> N
     why = f" ({_foreign(request.cause)})" if request.cause else ""
     asked = f"request{who}{why}: {_foreign(str(request))}"
     if outcome.success:
-        console.info(f"{asked}: done, revision {outcome.revision}: {_foreign(outcome.message)}")
+        text = f"{asked}: done, revision {outcome.revision}: {_foreign(outcome.message)}"
+        _say(console, LoggingSeverity.INFO, text)
     else:
-        console.warning(f"{asked}: refused, {outcome.code.name}: {_foreign(outcome.message)}")
+        text = f"{asked}: refused, {outcome.code.name}: {_foreign(outcome.message)}"
+        _say(console, LoggingSeverity.WARN, text)
+
+
+def _say(console: RcutilsLogger, severity: LoggingSeverity, text: str) -> None:
+    """As console.info() and its like, which search stack and disk for their caller: 0.2 ms each."""
+    if console.is_enabled_for(severity):
+        rclpy_implementation.rclpy_logging_rcutils_log(
+            severity, console.name, text, "log_request", __file__, 0
+        )
 
 
 def number_of(things: Sequence[object], what: str) -> str:
