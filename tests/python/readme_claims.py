@@ -602,6 +602,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| `replace_core` of a 1 kHz component over its service": (
         "bench: replace_core of a 1 kHz component over its service",
     ),
+    "| mission of 4 robots in simulated time, map of 0.03 m": (
+        "bench:  robots in simulated time, map of ",
+    ),
     "| `stop` of a 1 kHz component over its service while another one's new core is prepared": (
         "bench: stop of a 1 kHz component over its service while another one's new core is prepared",
     ),
