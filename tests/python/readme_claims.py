@@ -602,9 +602,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| `replace_core` of a 1 kHz component over its service": (
         "bench: replace_core of a 1 kHz component over its service",
     ),
-    "| mission of 4 robots in simulated time, map of 0.03 m": (
-        "bench:  robots in simulated time, map of ",
-    ),
+    "| mission of 4 robots in simulated time, map of 0.03 m": ("bench:  robots in simulated time, map of ",),
     "| `stop` of a 1 kHz component over its service while another one's new core is prepared": (
         "bench: stop of a 1 kHz component over its service while another one's new core is prepared",
     ),
