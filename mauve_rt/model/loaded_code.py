@@ -49,7 +49,8 @@ class LoadedCode:
         """`target` (a library or module) is about to be loaded, or was just now, from these files."""
         self._sources[target] = tuple(files)
         for file in self._sources[target]:
-            self._files.setdefault(file, _Loaded(Stamp.of(file), _digest(file)))
+            if file not in self._files:
+                self._files[file] = _Loaded(Stamp.of(file), _digest(file))
 
     def change_of(self, target: str) -> str:
         """Which file of a loaded library or module is another one by now, in words; empty: none."""

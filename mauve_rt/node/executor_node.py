@@ -22,7 +22,7 @@ from mauve_rt.node.executor_services import Services
 from mauve_rt.node.executor_settings import PARAMETERS
 from mauve_rt.node.executor_state import StatePublisher
 from mauve_rt.node.request_limits import RequestLimits
-from mauve_rt.node.service_thread import refusal as refused_reply
+from mauve_rt.node.service_thread import refused_reply
 from mauve_rt.node.setting_parameters import declare_settings
 from mauve_rt.node.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
 from mauve_rt.node.watch import Watch

@@ -71,7 +71,7 @@ class ServiceThread:
         service.send_response(service.callback(request, service.srv_type.Response()), header)
 
 
-def refusal(request: Any, filled: Any, error: BaseException) -> Any:
+def refused_reply(request: Any, filled: Any, error: BaseException) -> Any:
     """A response that says no, as far as it has words for that, to a request whose handler raised."""
     response = type(filled)()  # nothing of what the handler filled in already
     text = f"internal error: {exception_text(error)}"

@@ -19,7 +19,7 @@ import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
 from mauve_rt.node.executor_requests import Code
-from mauve_rt.node.service_thread import refusal
+from mauve_rt.node.service_thread import refused_reply
 from mauve_rt.trace.bag_repair import examine_bag
 
 NODE = "/robot_1/executor"
@@ -149,13 +149,13 @@ def test_a_thread_that_cannot_go_on_ends_the_process_in_order(
 
 def test_a_handler_that_raises_is_a_refusal_of_every_service() -> None:
     gone = SystemExit("gone")
-    reply = refusal(ReplaceCore.Request(), ReplaceCore.Response(success=True), gone)
+    reply = refused_reply(ReplaceCore.Request(), ReplaceCore.Response(success=True), gone)
     assert (reply.success, reply.code) == (False, Code.PREPARE_FAILED)
     assert reply.message == "internal error: SystemExit: gone"
     two = SetParameters.Request(parameters=[Parameter(), Parameter()])
-    results = refusal(two, SetParameters.Response(), gone).results
+    results = refused_reply(two, SetParameters.Response(), gone).results
     assert [(result.successful, result.reason) for result in results] == [(False, reply.message)] * 2
-    result = refusal(SetParametersAtomically.Request(), SetParametersAtomically.Response(), gone).result
+    result = refused_reply(SetParametersAtomically.Request(), SetParametersAtomically.Response(), gone).result
     assert (result.successful, result.reason) == (False, reply.message)
     for service in (ListComponents, ListParameters):  # without words for it
-        assert refusal(service.Request(), service.Response(), gone) == service.Response()
+        assert refused_reply(service.Request(), service.Response(), gone) == service.Response()
