@@ -525,8 +525,9 @@ class Deployer:
         expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
         phase_timeout_ns: int = 1_000_000_000,
+        max_missed: int = 0,
     ) -> TransactionReport:
-        """Carries out a transaction, deployed or not.
+        """Carries out a transaction, deployed or not; each component may miss `max_missed` releases for it.
 
         Raises MauveError with the number of the failed step (`step`); nothing was changed then.
         """
@@ -537,6 +538,7 @@ class Deployer:
         dry_run: bool = False,
         expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
+        max_missed: int = 0,
     ) -> Committed:
         """As commit(), but waits for no release that follows: ask what it returns."""
     def replace_core(

@@ -156,18 +156,21 @@ class PyCommitted {
 };
 
 std::unique_ptr<PyCommitted> make(PyDeployer& self, const PyTransaction& steps, bool dry_run,
-                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns) {
+                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
+                                  std::int64_t max_missed) {
   Transaction transaction = steps.build(self.registry());
   const py::gil_scoped_release release;
-  const TransactionOptions options{
-      .timeouts = timeouts(commit_timeout_ns, 0), .dry_run = dry_run, .expected_revision = expected_revision};
+  const TransactionOptions options{.timeouts = timeouts(commit_timeout_ns, 0),
+                                   .dry_run = dry_run,
+                                   .expected_revision = expected_revision,
+                                   .max_missed = max_missed};
   return std::make_unique<PyCommitted>(self.deployer().make(std::move(transaction), options));
 }
 
 TransactionReport commit(PyDeployer& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
-                         time_ns_t phase_timeout_ns) {
-  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns);
+                         time_ns_t phase_timeout_ns, std::int64_t max_missed) {
+  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, max_missed);
   const py::gil_scoped_release release;
   return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
@@ -244,10 +247,10 @@ void bind_deployer(py::module_& module) {
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("phase_timeout_ns") = s_to_ns(1))
+           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("max_missed") = 0)
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::keep_alive<0, 1>())
+           py::arg("max_missed") = 0, py::keep_alive<0, 1>())
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(

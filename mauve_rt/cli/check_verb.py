@@ -75,13 +75,13 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
 
 
 def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
-    from mauve_rt.model.steps import load_steps  # noqa: PLC0415
-    from mauve_rt.node.rehearsal import try_steps  # noqa: PLC0415
+    from mauve_rt.model.steps import load_change  # noqa: PLC0415
+    from mauve_rt.node.rehearsal import try_change  # noqa: PLC0415
 
-    steps = load_steps(path)
+    change = load_change(path)
     if model is not None:
-        try_steps(path, steps, model)
-    print(f"{path}: {len(steps)} steps{_tried_on(model)}: no error found")
+        try_change(path, change, model)
+    print(f"{path}: {len(change.steps)} steps{_tried_on(model)}: no error found")
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:

@@ -39,8 +39,19 @@ def _add_timeout(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_max_missed(parser: argparse.ArgumentParser, *, default: int | None = 0) -> None:
+    parser.add_argument(
+        "--max-missed",
+        type=_int64,
+        default=default,
+        metavar="N",
+        help="releases that each component may miss for it (default 0)",
+    )
+
+
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
+    _add_max_missed(parser)
     parser.add_argument("core", help="the new core, package/Class")
 
 
@@ -50,6 +61,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="check and prepare everything, change nothing")
     _add_record(parser)
     _add_timeout(parser)
+    _add_max_missed(parser, default=None)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -91,19 +103,20 @@ def _replace_core(args: argparse.Namespace) -> int:
         component=args.component,
         core=args.core,
         commit_timeout_s=args.timeout,
+        max_missed=args.max_missed,
     )
 
 
 def _reconfigure(args: argparse.Namespace) -> int:
     from mauve_msgs.msg import ReconfigurationStep  # noqa: PLC0415
     from mauve_msgs.srv import Reconfigure  # noqa: PLC0415
-    from mauve_rt.model.steps import load_steps  # noqa: PLC0415
+    from mauve_rt.model.steps import load_change  # noqa: PLC0415
 
     try:
         if args.file == "-":
-            steps = load_steps("standard input", text=sys.stdin.read())
+            change = load_change("standard input", text=sys.stdin.read())
         else:
-            steps = load_steps(args.file)
+            change = load_change(args.file)
     except ArchitectureFileError as error:
         print("\n".join(error.lines()), file=sys.stderr)
         return BAD_USAGE
@@ -113,10 +126,11 @@ def _reconfigure(args: argparse.Namespace) -> int:
         "reconfigure",
         steps=[
             ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
-            for step in steps
+            for step in change.steps
         ],
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
+        max_missed=change.max_missed if args.max_missed is None else args.max_missed,
     )
 
 
@@ -260,6 +274,13 @@ def _recording(args: argparse.Namespace) -> int:
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _int64(text: str) -> int:
+    number = int(text)
+    if not -(2**63) <= number < 2**63:
+        raise ValueError
+    return number
 
 
 def _absolute(name: str) -> str:

@@ -15,7 +15,9 @@ class FileKind(Enum):
 
 
 def file_kind(path: str | Path) -> FileKind:
-    """The kind of a file: steps are a list, rules have the key `rules`, all else is to be an architecture.
+    """The kind of a file.
+
+    Steps are a list or have the key `steps`, rules have `rules`; all else is to be an architecture.
 
     Raises:
         ArchitectureFileError: it cannot be read or is no YAML.
@@ -23,6 +25,9 @@ def file_kind(path: str | Path) -> FileKind:
     data = YamlFile(path).data
     if isinstance(data, list):
         return FileKind.STEPS
-    if isinstance(data, dict) and "rules" in data and "components" not in data:
-        return FileKind.RULES
+    if isinstance(data, dict) and "components" not in data:
+        if "rules" in data:
+            return FileKind.RULES
+        if "steps" in data:
+            return FileKind.STEPS
     return FileKind.ARCHITECTURE

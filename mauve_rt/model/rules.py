@@ -9,6 +9,7 @@
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
         undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
+        max_missed: 0               # releases that each component may miss for `do`; in undo: for that
 
 Names of topics and of the executor are resolved against the supervisor's namespace, as ROS 2 does.
 """
@@ -20,7 +21,7 @@ from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Text
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
-from mauve_rt.model.steps import STEPS, Step, form_error
+from mauve_rt.model.steps import MISSED, STEPS, Step, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 _SECONDS = Real(least=0)
@@ -46,6 +47,7 @@ class Undo(Section):
 
     for_s: float = setting(_SECONDS, default=0.0)
     do: list[Step] = setting(STEPS)
+    max_missed: int = setting(MISSED, default=0)
 
 
 class Rule(Section):
@@ -57,6 +59,7 @@ class Rule(Section):
     do: list[Step] = setting(STEPS)
     undo: Undo | None = setting(Part(Undo), default=None)
     cooldown_s: float = setting(_SECONDS, default=0.0)
+    max_missed: int = setting(MISSED, default=0)
 
     def targets(self) -> set[str]:
         """Components that must run before the rule is armed: those of which it replaces or sets something."""

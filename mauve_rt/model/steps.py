@@ -4,6 +4,8 @@
 - {kind: connect, target: guidance, name: goal, value: goal.read}
 - {kind: set_property, target: guidance, name: path_step, value: 0.5}
 - {kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}
+
+Or, where its components may miss releases for it: {max_missed: 2, steps: [...]}.
 """
 
 import json
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Text
+from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Text, Whole
 from mauve_rt.model.schema import IDENTIFIER
 from mauve_rt.model.schema_errors import expected
 from mauve_rt.model.section import Part, Section, setting
@@ -62,7 +64,18 @@ class Step(Section):
         return None
 
 
+MAX_MISSED = 1_000_000
+MISSED = Whole(0, MAX_MISSED)
 STEPS = ListOf(Part(Step), few=1)
+
+
+class Change(Section):
+    """A transaction: its steps, and how many releases each component may miss for it."""
+
+    max_missed: int = setting(MISSED, default=0)
+    steps: list[Step] = setting(STEPS)
+
+
 _SHOULD: Mapping[str, str] = {
     "rule": "{limit}",
     "list": "input should be a valid list",
@@ -72,18 +85,32 @@ _SHOULD: Mapping[str, str] = {
 }
 
 
-def load_steps(path: str | Path, *, text: str | None = None) -> list[Step]:
-    """The steps of a file, or of `text` in its place.
+def load_change(path: str | Path, *, text: str | None = None) -> Change:
+    """The transaction of a file, or of `text` in its place.
 
     Raises:
         ArchitectureFileError: it cannot be read, is no YAML or no list of steps.
     """
     file = YamlFile(path, text=text)
     faults: Faults = []
-    steps: list[Step] = STEPS.read(file.data, (), faults)
-    if faults:
-        raise form_error(file, faults)
-    return steps
+    if _has_settings(file):
+        change = Change.read(file.data, (), faults)
+        if not faults:
+            return change
+    else:
+        steps: list[Step] = STEPS.read(file.data, (), faults)
+        if not faults:
+            return Change(steps=steps)
+    raise form_error(file, faults)
+
+
+def place_of_step(file: YamlFile, index: int) -> Location:
+    """Where in a file of steps one of them stands."""
+    return ("steps", index) if _has_settings(file) else (index,)
+
+
+def _has_settings(file: YamlFile) -> bool:
+    return isinstance(file.data, dict) and "steps" in file.data
 
 
 def form_error(file: YamlFile, faults: Faults) -> ArchitectureFileError:

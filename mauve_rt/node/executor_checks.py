@@ -3,7 +3,7 @@
 import math
 
 from mauve_rt._kernel import ComponentDescription
-from mauve_rt.model.steps import STEP_KINDS
+from mauve_rt.model.steps import MAX_MISSED, STEP_KINDS
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor_requests import Code, RecordingOrder, RefusalError, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
@@ -25,6 +25,9 @@ def check_form(request: Request) -> None:
     """
     if not math.isfinite(request.timeout_s) or not 0.0 <= request.timeout_s <= MAX_TIMEOUT_S:
         text = f"bad timeout: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {request.timeout_s:g}"
+        raise RefusalError(Code.INVALID, text)
+    if not 0 <= request.max_missed <= MAX_MISSED:
+        text = f"bad max_missed: expected 0 to {MAX_MISSED:,} releases, found {request.max_missed:,}"
         raise RefusalError(Code.INVALID, text)
     if request.clock_ns < 0:
         text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"

@@ -195,6 +195,7 @@ class Control:
                 dry_run=request.dry_run,
                 expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
+                max_missed=request.max_missed,
             )
         except MauveError as error:
             if error_code(error) == "wrong_revision":  # of what changed meanwhile, in our own count

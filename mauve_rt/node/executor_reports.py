@@ -20,12 +20,28 @@ class Following:
         measured = self.committed.report(max(0, min(left_ns, wait_ns)))
         is_over = measured.is_complete or left_ns <= wait_ns
         return replace(
-            outcome, report=reports_of(self.steps, measured), pending=None if is_over else outcome.pending
+            outcome,
+            message=message_of(self.steps, measured),
+            report=reports_of(self.steps, measured),
+            pending=None if is_over else outcome.pending,
         )
 
 
 def message_of(steps: tuple[Step, ...], measured: TransactionReport) -> str:
-    """What was done, in one line."""
+    """What was done, in one line, and which components are known to have missed releases for it."""
+    missed: dict[str, int] = {}
+    for report in measured.steps:  # every step of a component tells of all that it missed
+        if report.missed_releases > missed.get(report.component, 0):
+            missed[report.component] = report.missed_releases
+    told = [f"component '{name}' missed {_releases(count)}" for name, count in missed.items()]
+    return "; ".join([_done(steps, measured), *told])
+
+
+def _releases(count: int) -> str:
+    return f"{count:,} release{'s' if count > 1 else ''}"
+
+
+def _done(steps: tuple[Step, ...], measured: TransactionReport) -> str:
     if len(steps) > 1:
         figures = f"prepared in {measured.prepare_ns / 1e6:.3g} ms"
         if measured.blackout_ns > 0:

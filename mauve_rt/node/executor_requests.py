@@ -138,6 +138,7 @@ class Request:
     cause: str = ""
     dry_run: bool = False
     timeout_s: float = 0.0  # 0: the default
+    max_missed: int = 0  # releases that each component may miss for it
     clock_ns: int = 0  # of a start: reference instant of the grid, 0: the deployment's
 
     def __str__(self) -> str:

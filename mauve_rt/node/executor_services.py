@@ -152,12 +152,12 @@ def _start(ros: Any) -> Request:
 
 def _replace_core(ros: Any) -> Request:
     step = Step("replace_core", ros.component, ros.core)
-    return Request(steps=(step,), timeout_s=ros.commit_timeout_s, **_common(ros))
+    return Request(steps=(step,), **_commit(ros), **_common(ros))
 
 
 def _reconfigure(ros: Any) -> Request:
     steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
-    return Request(steps=steps, dry_run=ros.dry_run, timeout_s=ros.commit_timeout_s, **_common(ros))
+    return Request(steps=steps, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
 
 
 def _start_recording(ros: Any) -> Request:
@@ -173,6 +173,10 @@ def _start_recording(ros: Any) -> Request:
 
 def _stop_recording(ros: Any) -> Request:
     return Request(recording=RecordingOrder(start=False), **_common(ros))
+
+
+def _commit(ros: Any) -> dict[str, Any]:
+    return {"timeout_s": ros.commit_timeout_s, "max_missed": ros.max_missed}
 
 
 def _common(ros: Any) -> dict[str, Any]:

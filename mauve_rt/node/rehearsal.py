@@ -10,7 +10,7 @@ from mauve_rt._kernel import Simulation
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.rules import RulesFile
-from mauve_rt.model.steps import Step
+from mauve_rt.model.steps import Change, Step, place_of_step
 from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.node import executor_requests as requests
 from mauve_rt.node.executor_control import Control
@@ -61,17 +61,18 @@ def rehearsal(model: ArchitectureModel) -> Iterator[Rehearsal]:
         simulation.shutdown()
 
 
-def try_steps(path: Path, steps: Sequence[Step], model: ArchitectureModel) -> None:
-    """Whether the executor of `model` would take the steps of a file at its start.
+def try_change(path: Path, change: Change, model: ArchitectureModel) -> None:
+    """Whether the executor of `model` would take the transaction of a file at its start.
 
     Raises:
         ArchitectureFileError: at the step that it would refuse.
     """
     with rehearsal(model) as executor:
         try:
-            executor.carry_out(steps, dry_run=True)
+            executor.carry_out(change.steps, dry_run=True)
         except RefusedStepError as error:
-            problem = YamlFile(path).problem((error.index,), str(error))
+            file = YamlFile(path)
+            problem = file.problem(place_of_step(file, error.index), str(error))
             raise ArchitectureFileError(path, [problem]) from None
 
 

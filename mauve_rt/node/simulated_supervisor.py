@@ -80,6 +80,7 @@ class SimulatedSupervisor:
                 requested_by=self.name,
                 cause=request.cause,
                 dry_run=request.dry_run,
+                max_missed=request.max_missed,
             )
         )
         outcome = Outcome(

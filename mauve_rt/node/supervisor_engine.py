@@ -157,7 +157,13 @@ class RuleEngine:
 
     def _send(self, life: RuleLife, kind: Kind, now_s: float, view: ArchitectureView) -> None:
         cause = life.cause(kind, now_s)
-        request = Request(self._number(), tuple(life.steps(kind)), view.revision, cause)
+        request = Request(
+            self._number(),
+            tuple(life.steps(kind)),
+            view.revision,
+            cause,
+            max_missed=life.max_missed(kind),
+        )
         life.untouched = False
         self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
         self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))

@@ -17,6 +17,7 @@ class Request:
     expected_revision: int
     cause: str
     dry_run: bool = False
+    max_missed: int = 0
 
 
 @dataclass(frozen=True)

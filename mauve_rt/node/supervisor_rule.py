@@ -132,6 +132,12 @@ class RuleLife:
             return self.rule.do
         return self.rule.undo.do if self.rule.undo else []
 
+    def max_missed(self, kind: Kind) -> int:
+        """How many releases each component may miss for it."""
+        if kind == "do":
+            return self.rule.max_missed
+        return self.rule.undo.max_missed if self.rule.undo else 0
+
     def cause(self, kind: Kind, now_s: float) -> str:
         """Why, in words for the executor's record."""
         lasted = f" for {now_s - self._since_s:.2f} s" if kind == "undo" else ""

@@ -91,6 +91,15 @@ def test_a_steps_file_by_itself(check: Check) -> None:
     assert [line.partition(" ")[0] for line in errors] == ["steps:3:10:"]
 
 
+def test_steps_beside_what_may_be_missed_are_a_steps_file_too(check: Check) -> None:
+    whole = "max_missed: 1\nsteps:\n" + STEPS
+    good = "steps: 3 steps, tried on robot: no error found"
+    status, out, errors = check(robot=ROBOT, steps=whole)
+    assert (status, out[1:], errors) == (0, [good], [])
+    (error,) = check(robot=ROBOT, steps=whole.replace("one, name: count", "two, name: count"))[2]
+    assert error.startswith("steps:5:3: step 2 ")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from mauve_rt._kernel import ComponentDescription
 from mauve_rt.model import load_architecture
 from mauve_rt.node import executor_control
 from mauve_rt.node.executor_control import Control
+from mauve_rt.node.executor_reports import message_of
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request, Step
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.trace.records import Kind
@@ -104,6 +106,50 @@ def _wait(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.005)
+
+
+class _Spy:
+    """A deployer that writes down by which options it was asked."""
+
+    def __init__(self, deployer: Any) -> None:
+        self._deployer = deployer
+        self.options: list[dict[str, int]] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._deployer, name)
+
+    def make(self, transaction: Any, **options: int) -> Any:
+        self.options.append(options)
+        return self._deployer.make(transaction, **options)
+
+
+def test_what_may_be_missed_is_the_request_s(
+    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spy = _Spy(runtime.deployer)
+    monkeypatch.setattr(runtime, "_deployer", spy)
+    step = Step("replace_core", "counter", "executor_tests/Backwards")
+    for max_missed in (0, 3):
+        outcome = control.handle(Request(steps=(step,), max_missed=max_missed))
+        assert outcome.success, outcome.message
+    assert [options["max_missed"] for options in spy.options] == [0, 3]
+    for max_missed in (-1, -(2**63), 2**62):
+        refused = control.handle(Request(steps=(step,), max_missed=max_missed))
+        assert refused.code is Code.INVALID
+        assert refused.message.startswith("bad max_missed: expected 0 to 1,000,000 releases, found ")
+    assert len(spy.options) == 2
+
+
+def test_releases_that_were_missed_are_in_the_message() -> None:
+    steps = (Step("replace_core", "a", "p/B"), Step("set_property", "a", "x", "1"), Step("stop", "b"))
+    nothing = SimpleNamespace(component="a", missed_releases=0, from_core="p/A", to_core="p/B")
+    two = SimpleNamespace(component="a", missed_releases=2)
+    unknown = SimpleNamespace(component="b", missed_releases=NOT_MEASURED)
+    measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0)
+    assert message_of(steps[:1], measured) == "component 'a' runs p/B, before p/A"
+    measured.steps = [two, two, unknown]
+    done = "3 steps are in force; prepared in 0 ms"
+    assert message_of(steps, measured) == f"{done}; component 'a' missed 2 releases"
 
 
 def test_a_transaction_adds_wires_and_starts_and_another_one_removes(

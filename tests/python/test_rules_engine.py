@@ -23,6 +23,7 @@ def rule(
     target: str = "exploration",
     undo: bool | list[dict[str, object]] = True,
     undo_for_s: float = 3.0,
+    undo_max_missed: int = 0,
     usual: str = USUAL,
     **changes: object,
 ) -> Rule:
@@ -33,7 +34,8 @@ def rule(
     }
     if undo:
         back = [{"kind": "replace_core", "target": target, "name": usual}]
-        content["undo"] = {"for_s": undo_for_s, "do": back if undo is True else undo}
+        do = back if undo is True else undo
+        content["undo"] = {"for_s": undo_for_s, "do": do, "max_missed": undo_max_missed}
     return Rule(**content | changes)
 
 
@@ -171,6 +173,18 @@ def test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough():
     assert world.cores() == [LOCAL, USUAL]
     assert world.asked_at_s[1] - back_s >= 3.0
     assert world.said() == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
+
+
+def test_what_components_may_miss_for_it_is_asked_with_each_action():
+    world = started(rule(max_missed=2, undo_max_missed=1))
+    world.talking = False
+    world.run(2.0)
+    world.talking = True
+    world.run(4.0)
+    assert [(request.steps[0].name, request.max_missed) for request in world.requests] == [
+        (LOCAL, 2),
+        (USUAL, 1),
+    ]
 
 
 def test_a_dwell_lets_a_short_silence_pass():

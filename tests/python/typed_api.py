@@ -182,7 +182,7 @@ def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
     deployer.commit(transaction, dry_run=True)
     assert_type(str(architecture.describe()), str)
     return deployer.commit(
-        transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50)
+        transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50), max_missed=1
     )
 
 

@@ -101,6 +101,7 @@ struct TransactionOptions {
   CommitTimeouts timeouts{};
   bool dry_run{false};                 // check and prepare everything, then throw it away
   std::uint64_t expected_revision{0};  // of the architecture; 0: any
+  std::int64_t max_missed{0};          // releases that a participant may be held past
 };
 
 struct TransactionReport {
