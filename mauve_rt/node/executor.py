@@ -27,6 +27,7 @@ from mauve_rt.node.process import (
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
 _SPIN_S = 0.2  # how long a stop may go unnoticed
+_ANSWER_S = 0.5  # for requests to come to their answers by themselves, everything being stopped
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -112,15 +113,12 @@ def _autostart(node: Any, stop: threading.Event) -> int:
 
 
 def _spin(node: Any, stop: threading.Event) -> int:
-    from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThread  # noqa: PLC0415
+    from mauve_rt.node.executor_services import is_change  # noqa: PLC0415
+    from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThreads  # noqa: PLC0415
 
-    threads = (
-        ServiceThread(node, node.control_group, node.watch, name="changes"),
-        ServiceThread(node, node.direct_group, node.watch, name="stops"),
-    )
-    for thread in threads:
-        thread.start()
-    executor = OtherGroupsExecutor(node.control_group, node.direct_group, num_threads=node.THREADS)
+    requests = ServiceThreads(node, node.control_group, node.watch, is_change=is_change)
+    requests.start()
+    executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
     executor.add_node(node)
     while not stop.is_set() and not node.watch.broken.is_set():
         try:
@@ -128,8 +126,7 @@ def _spin(node: Any, stop: threading.Event) -> int:
         except BaseException as error:  # noqa: BLE001 - a malformed request must not end the process
             node.watch.tell("taking a message or request", error)
     node.quiesce()  # ends what a request may be waiting for
-    for thread in threads:
-        thread.stop()
+    requests.stop(wait_s=_ANSWER_S, message="the executor ends; what was not in force by then never will be")
     # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
     executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
     executor.shutdown(timeout_sec=0)

@@ -26,6 +26,7 @@ from mauve_rt.node.executor_requests import (
     RequestLog,
     Step,
     code_of,
+    reused_id,
 )
 from mauve_rt.node.executor_runtime import Runtime
 from mauve_rt.node.executor_steps import Bound, Plan
@@ -78,7 +79,7 @@ class Control:
     | member       | written by                    | guarded by                                      |
     | ------------ | ----------------------------- | ----------------------------------------------- |
     | `_log`       | every request                 | `_answered`, for a moment                       |
-    | `_under_way` | every request with an id      | `_answered`; who repeats an id waits in it      |
+    | `_under_way` | every request with an id      | `_answered`; who repeats a request waits in it  |
     | `_taken`     | changes                       | `_changing`                                     |
     | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
     | the bag      | orders, in `_recordings`      | `_changing`                                     |
@@ -105,7 +106,7 @@ class Control:
         self._taken: dict[str, int] = {}  # bytes, by name of what requests added and nobody removed
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
-        self._under_way: set[str] = set()
+        self._under_way: dict[str, Request] = {}
         self._answered = threading.Condition()
         self._changing = threading.Lock()
 
@@ -113,24 +114,26 @@ class Control:
         """Do what is asked, or nothing at all. Never raises: every request gets its outcome."""
         identity = request.request_id
         with self._answered:
-            self._answered.wait_for(lambda: identity not in self._under_way)
+            self._answered.wait_for(lambda: self._under_way.get(identity) != request)
+            if identity in self._under_way:
+                return replace(reused_id(request, self._under_way[identity]), revision=self._runtime.revision)
             known = self._log.find(request)
             if known is not None:
                 if known.code is Code.REQUEST_ID_REUSED:
                     return replace(known, revision=self._runtime.revision)
                 return replace(known, replayed=True)
             if identity:
-                self._under_way.add(identity)
+                self._under_way[identity] = request
         outcome: Outcome | None = None
         try:
-            with nullcontext() if _is_direct(request) else self._changing:
+            with nullcontext() if request.is_direct else self._changing:
                 outcome = self._outcome(request)
             return outcome
         finally:
             with self._answered:
                 if outcome is not None:
                     self._log.add(request, replace(outcome, pending=None))
-                self._under_way.discard(identity)
+                self._under_way.pop(identity, None)
                 self._answered.notify_all()
 
     def _outcome(self, request: Request) -> Outcome:
@@ -161,9 +164,9 @@ class Control:
         self, request: Request, parts: Sequence[ComponentDescription], *, kernel_revision: int
     ) -> Outcome:
         check_time(request, self._runtime)
-        taken = {} if _is_direct(request) else self._still_taken(parts)
+        taken = {} if request.is_direct else self._still_taken(parts)
         plan = Plan(request.steps, self._runtime, parts, limits=self._limits, taken=taken)
-        if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):
+        if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):  # be it a dry run
             step = request.steps[0]
             for part in self._runtime.components():  # of this moment: a stop may just have begun
                 if part.name == step.target:
@@ -259,11 +262,6 @@ class Control:
                     continue  # a stop that timed out stays pending
                 raise
             return
-
-
-def _is_direct(request: Request) -> bool:
-    """Whether it is carried out without a transaction, beside whatever else there is."""
-    return len(request.steps) == 1 and request.steps[0].kind in ("start", "stop") and not request.dry_run
 
 
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:

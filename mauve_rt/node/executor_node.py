@@ -35,10 +35,9 @@ NODE_NAME = "executor"
 class ExecutorNode(LifecycleNode):
     """Services, topics and states of one `Runtime`.
 
-    Changes, stops and starts, lifecycle transitions, listing and recorded topics have a callback group each,
-    so that a stop that waits for a component delays none of the others, and no preparation delays a stop.
-    Changes, in `control_group`, and stops and starts, in `direct_group`, are for a `ServiceThread` each,
-    the others for an executor with a thread for each: `THREADS`. Messages and calls of bound resources do not
+    Requests to change, stop and start, lifecycle transitions, listing and recorded topics have a callback
+    group each, so that none delays the others. Requests, in `control_group`, are for `ServiceThreads`, the
+    others for an executor with a thread for each: `THREADS`. Messages and calls of bound resources do not
     come by here: they have threads of their own, in C++.
     """
 
@@ -55,7 +54,6 @@ class ExecutorNode(LifecycleNode):
         super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
         self.control_group = control_group = MutuallyExclusiveCallbackGroup()
-        self.direct_group = MutuallyExclusiveCallbackGroup()
         query_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         # A signal may come while a transition starts or ends threads: nobody else may do that then.
@@ -85,7 +83,6 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
             warnings=self._name_watch.warnings,
             control_group=control_group,
-            direct_group=self.direct_group,
             query_group=query_group,
         )
         ParameterServices(

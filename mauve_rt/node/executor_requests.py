@@ -22,6 +22,7 @@ __all__ = [
     "RequestLog",
     "Step",
     "code_of",
+    "reused_id",
 ]
 
 KEPT_REQUESTS = 1024
@@ -147,6 +148,11 @@ class Request:
         words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
         return f"{words} (dry run)" if self.dry_run else words
 
+    @property
+    def is_direct(self) -> bool:
+        """Whether it is carried out without a transaction, beside whatever else there is."""
+        return len(self.steps) == 1 and self.steps[0].kind in ("start", "stop") and not self.dry_run
+
     def texts(self) -> Iterator[str]:
         """All that is of no fixed size."""
         yield from (self.request_id, self.requested_by, self.cause)
@@ -230,9 +236,7 @@ class RequestLog:
         digest, first, outcome = known
         if digest == request.digest():
             return outcome
-        shown_id = cut(request.request_id, _SHOWN_STEP)
-        message = f"request_id '{shown_id}' was used before, for: {first}; take a new id"
-        return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
+        return reused_id(request, first)
 
     def add(self, request: Request, outcome: Outcome) -> None:
         """Remember an outcome; the oldest one is forgotten when there are too many."""
@@ -240,6 +244,13 @@ class RequestLog:
             self._entries[_key(request)] = (request.digest(), cut(str(request), _SHOWN_STEP), outcome)
             while len(self._entries) > self._kept:
                 self._entries.popitem(last=False)
+
+
+def reused_id(request: Request, first: "Request | str") -> Outcome:
+    """The refusal of a request by the id of another one."""
+    shown_id, words = cut(request.request_id, _SHOWN_STEP), cut(str(first), _SHOWN_STEP)
+    message = f"request_id '{shown_id}' was used before, for: {words}; take a new id"
+    return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
 
 
 def _key(request: Request) -> bytes:

@@ -1,5 +1,6 @@
 """An executor's services, such as ~/list_components and ~/replace_core: `executor_control`'s ROS face."""
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -33,13 +34,13 @@ _CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "repl
 class Services:
     """The services of a node.
 
-    Requests for changes wait for each other in `control_group`, those to stop or start in `direct_group`, and
-    lists in `query_group`. Who asked is answered first; then another thread tells of it on ~/state and
-    ~/events.
+    Requests for changes wait for each other (`is_change`); those to stop or start wait for nobody. They are
+    in `control_group`, lists in `query_group`. Who asked is answered first; then another thread tells of it
+    on ~/state and ~/events.
 
-    | member    | written by              | guarded by               |
-    | --------- | ----------------------- | ------------------------ |
-    | `_untold` | the two request groups  | each has one of its own  |
+    | member    | written by                | guarded by                      |
+    | --------- | ------------------------- | ------------------------------- |
+    | `_untold` | who carries out a request | each thread has one of its own  |
     """
 
     def __init__(
@@ -54,7 +55,6 @@ class Services:
         warnings: Callable[[], list[str]],
         watch: Watch,
         control_group: CallbackGroup,
-        direct_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
         self._warnings = warnings
@@ -65,39 +65,36 @@ class Services:
         self._logger = node.get_logger()
         # The change is made by then: what is wrong here is told, and no refusal of it.
         self._follow = watch.guarded("the parameters", parameters.follow)
-        self._untold: dict[CallbackGroup, deque[Event]] = {
-            group: deque() for group in (control_group, direct_group)
-        }
-        self._control_group = control_group
+        self._untold = _Untold()
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
-        for service, name, translate, group in (
-            (Stop, "~/stop", _stop, direct_group),
-            (Start, "~/start", _start, direct_group),
-            (ReplaceCore, "~/replace_core", _replace_core, control_group),
-            (Reconfigure, "~/reconfigure", _reconfigure, control_group),
-            (StartRecording, "~/start_recording", _start_recording, control_group),
-            (StopRecording, "~/stop_recording", _stop_recording, control_group),
+        for service, name, translate in (
+            (Stop, "~/stop", _stop),
+            (Start, "~/start", _start),
+            (ReplaceCore, "~/replace_core", _replace_core),
+            (Reconfigure, "~/reconfigure", _reconfigure),
+            (StartRecording, "~/start_recording", _start_recording),
+            (StopRecording, "~/stop_recording", _stop_recording),
         ):
-            handler = self._handler(translate, group)
-            self._tell_after(node.create_service(service, name, handler, callback_group=group), group)
+            handler = self._handler(translate)
+            self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
 
     def handle(self, request: Request) -> Outcome:
-        """Carry out a request, and tell of it. In `control_group`."""
-        outcome = self._carry_out(request, self._control_group)
-        self._tell(self._control_group)
+        """Carry out a request, and tell of it."""
+        outcome = self._carry_out(request)
+        self._tell()
         return outcome
 
-    def _carry_out(self, request: Request, group: CallbackGroup) -> Outcome:
+    def _carry_out(self, request: Request) -> Outcome:
         if request.recording is not None and not request.recording.start:
             self._state.flush()  # the bag that ends tells of all that was in it
         outcome = self._control.handle(request)
         if not outcome.replayed:
-            self._untold[group].append(self._state.take_down(request, outcome))
+            self._untold.events.append(self._state.take_down(request, outcome))
             if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
                 self._follow()
         return outcome
 
-    def _tell_after(self, service: Any, group: CallbackGroup) -> None:
+    def _tell_after(self, service: Any) -> None:
         """Let a service tell when it has sent its reply."""
         send_response = service.send_response
 
@@ -105,13 +102,13 @@ class Services:
             try:
                 send_response(response, header)
             finally:
-                self._tell(group)
+                self._tell()
 
         service.send_response = send_and_tell
 
-    def _tell(self, group: CallbackGroup) -> None:
-        while self._untold[group]:
-            event = self._untold[group].popleft()
+    def _tell(self) -> None:
+        while self._untold.events:
+            event = self._untold.events.popleft()
             self._state.tell(event)
             log_request(self._logger, event.request, event.outcome)
 
@@ -124,11 +121,9 @@ class Services:
         response.warnings = self._warnings()
         return response
 
-    def _handler(
-        self, translate: Callable[[Any], Request], group: CallbackGroup
-    ) -> Callable[[Any, Any], Any]:
+    def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
         def handle(ros_request: Any, response: Any) -> Any:
-            outcome = self._carry_out(translate(ros_request), group)
+            outcome = self._carry_out(translate(ros_request))
             response.success = outcome.success
             response.code = int(outcome.code)
             response.message = outcome.message
@@ -140,6 +135,20 @@ class Services:
             return response
 
         return handle
+
+
+class _Untold(threading.local):
+    """What this thread carried out and has not told of yet."""
+
+    def __init__(self) -> None:
+        self.events: deque[Event] = deque()
+
+
+def is_change(ros: Any) -> bool:
+    """Whether a request waits for those before it: all but a stop or a start by itself."""
+    if isinstance(ros, Reconfigure.Request):
+        return not _reconfigure(ros).is_direct
+    return not isinstance(ros, Stop.Request | Start.Request)
 
 
 def _stop(ros: Any) -> Request:

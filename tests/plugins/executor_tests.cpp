@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -159,6 +161,33 @@ struct Reluctant : Counter {
 struct UnspeakableResource : mauve::Resource {
   UnspeakableResource() : Resource("executor_tests/UnspeakableResource", "") {
     throw std::out_of_range("\xc3\x28 is no text");
+  }
+};
+
+/// Returns when there is a file that `label` names, or after a minute; says by a file beside it that it waits.
+inline void await_file(const std::string& label) {
+  namespace fs = std::filesystem;
+  const fs::path awaited = label;
+  std::ofstream(fs::path(awaited).replace_extension(".begun")) << '\n';
+  const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(60);
+  while (!fs::exists(awaited) && mauve::monotonic_now_ns() < until)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+/// Is being configured until there is a file, as PyPatient of executor_tests_cores.py.
+struct Patient : Counter {
+ protected:
+  bool configure_hook() override {
+    await_file(shell().label.value());
+    return true;
+  }
+};
+
+/// Looks at the old core until there is a file.
+struct Clinging : Counter {
+  bool adopt(const mauve::CoreBase&) override {
+    await_file(shell().label.value());
+    return true;
   }
 };
 
@@ -457,6 +486,8 @@ MAUVE_PLUGINS(registry) {
   registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);
   registry.core<Hanging>("executor_tests/Hanging", shell);
+  registry.core<Patient>("executor_tests/Patient", shell);
+  registry.core<Clinging>("executor_tests/Clinging", shell);
   registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
   registry.fsm<GuardedFsm>("executor_tests/GuardedFsm", shell);
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);

@@ -4,8 +4,13 @@ import threading
 import time
 from pathlib import Path
 
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from std_msgs.msg import Float64
 
+from mauve_msgs.srv import ReplaceCore, Stop
 from mauve_rt.cores import Core
 
 
@@ -89,6 +94,29 @@ class PyHeld(Core):
             time.sleep(0.001)
         if sample.value.data < -1e6:
             raise ValueError("set to something unheard of")
+
+
+class PyAsking(PyCounter):
+    """Asks its own executor for what its label says while it is configured, as nobody should."""
+
+    def configure(self) -> None:
+        """Wait for the answer."""
+        super().configure()
+        name, _, component = self.shell.label.value.partition(" ")
+        kind = {"stop": Stop, "replace_core": ReplaceCore}[name]
+        context = Context()
+        rclpy.init(context=context)
+        node = Node("asking", context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        client = node.create_client(kind, f"/robot_1/executor/{name}")
+        request = kind.Request(component=component, cause="asked by a part that is being configured")
+        if name == "replace_core":
+            request.core = "executor_tests/Backwards"
+        client.wait_for_service()
+        executor.spin_until_future_complete(client.call_async(request))  # without a time-out
+        node.destroy_node()
+        context.try_shutdown()
 
 
 class PyPatient(PyCounter):

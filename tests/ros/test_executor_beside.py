@@ -7,46 +7,24 @@ from typing import Any
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from preparations import NODE, Preparation, declare
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 from mauve_rt.node.executor_requests import NOT_MEASURED, Code
 
-NODE = "/robot_1/executor"
 PATIENT = "executor_tests/PyPatient"
-
-
-class Preparation:
-    """A replacement of the counter's core, which is being prepared until finish()."""
-
-    def __init__(self, graph: Any, folder: Path) -> None:
-        self._graph = graph
-        self._awaited = folder / "go"
-        label = ReconfigurationStep(
-            kind="set_property", target="counter", name="label", value=f"'{self._awaited}'"
-        )
-        assert graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[label]).success
-        core = {"component": "counter", "core": PATIENT, "request_id": "slow"}
-        self.reply = graph.ask_later(ReplaceCore, f"{NODE}/replace_core", **core)
-        graph.spin_until(self._awaited.with_suffix(".begun").exists, "the preparation")
-
-    def finish(self) -> Any:
-        """Its reply."""
-        self._awaited.touch()
-        self._graph.spin_until(self.reply.done, "the change")
-        return self.reply.result()
+BACKWARDS = "executor_tests/Backwards"
 
 
 @pytest.fixture
 def preparation(
     architecture: Path, start_executor: Callable[..., Any], graph: Any, tmp_path: Path
 ) -> Callable[[], Preparation]:
-    text = architecture.read_text(encoding="utf-8")
-    text = text.replace("executor_tests/PyCounter,", f"executor_tests/PyCounter, {PATIENT},")
-    architecture.write_text(text, encoding="utf-8")
+    declare(architecture, PATIENT)
     start_executor("-p", f"architecture:={architecture}")
-    return lambda: Preparation(graph, tmp_path)
+    return lambda: Preparation(graph, tmp_path, PATIENT)
 
 
 def _part(graph: Any, name: str) -> Any:
@@ -88,16 +66,54 @@ def test_a_stop_of_its_own_component_calls_the_change_off(
     assert (counter.state, counter.core) == (ComponentInfo.STOPPED, "executor_tests/Counter")
 
 
-def test_a_repeated_id_waits_for_the_outcome_it_repeats(
+def test_a_stop_by_reconfigure_waits_for_no_preparation(
     preparation: Callable[[], Preparation], graph: Any
 ) -> None:
     change = preparation()
-    other = graph.ask_later(Stop, f"{NODE}/stop", component="sleepy", request_id="slow")
-    assert graph.ask(ListComponents, f"{NODE}/list_components").components
-    assert change.finish().success
-    graph.spin_until(other.done, "the answer of the second")
-    assert other.result().code == Code.REQUEST_ID_REUSED
+    behind = graph.ask_later(ReplaceCore, f"{NODE}/replace_core", component="sleepy", core=BACKWARDS)
+    for kind in ("stop", "start"):
+        step = ReconfigurationStep(kind=kind, target="sleepy")
+        assert graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[step]).success
     assert _part(graph, "sleepy").state == ComponentInfo.RUNNING
+    assert not change.reply.done()
+    assert not behind.done(), "a change waits for the one before it"
+    assert change.finish().success
+    graph.spin_until(behind.done, "the change behind it")
+    assert behind.result().success
+
+
+def test_a_stop_waits_for_no_stop_of_another_component(
+    preparation: Callable[[], Preparation], graph: Any
+) -> None:
+    voice = graph.voice(Float64, "/robot_1/set")
+    held = {"component": "counter", "core": "executor_tests/Held"}
+    assert graph.ask(ReplaceCore, f"{NODE}/replace_core", **held).success
+    graph.spin_until(lambda: _part(graph, "counter").current_state == "Count", "a state that lasts")
+    slow = [
+        graph.ask_later(Stop, f"{NODE}/stop", component="counter", timeout_s=10.0) for _ in range(3)
+    ]  # one after the other they would take half a minute
+    assert graph.ask(Stop, f"{NODE}/stop", component="sleepy").success
+    assert not any(reply.done() for reply in slow)
+    voice.publish(Float64(data=1.0))
+    graph.spin_until(lambda: all(reply.done() for reply in slow), "the others")
+    assert _part(graph, "counter").state == ComponentInfo.STOPPED
+
+
+def test_a_repeated_request_waits_for_the_outcome_it_repeats(
+    preparation: Callable[[], Preparation], graph: Any
+) -> None:
+    change = preparation()
+    again = graph.ask_later(ReplaceCore, f"{NODE}/replace_core", **change.request)
+    other = graph.ask(Stop, f"{NODE}/stop", component="sleepy", request_id="slow")
+    assert other.code == Code.REQUEST_ID_REUSED
+    assert f"replace_core counter {PATIENT}" in other.message
+    assert _part(graph, "sleepy").state == ComponentInfo.RUNNING
+    assert graph.ask(Stop, f"{NODE}/stop", component="sleepy").success, "a stop waits for none of them"
+    assert not change.reply.done()
+    reply = change.finish()
+    assert reply.success
+    graph.spin_until(again.done, "the answer to the second")
+    assert (again.result().success, again.result().revision) == (True, reply.revision)
 
 
 def test_the_reply_comes_before_the_release_that_its_event_tells(
