@@ -27,6 +27,7 @@ class PythonCore final : public DynamicCore {
   bool adopt(const CoreBase& old) override;
   void take(CoreBase& old) noexcept override;
   time_ns_t budget_ns() const noexcept override;
+  time_ns_t reckoned_budget_ns() const noexcept override { return ms_to_ns(2); }
 
   /// The object of a Python core, else None. Under the interpreter's lock.
   static py::object object_of(const CoreBase& core);
@@ -44,7 +45,7 @@ class PythonCore final : public DynamicCore {
   std::shared_ptr<ShellLink> link_{std::make_shared<ShellLink>()};
   mutable PythonObject object_;              // made at prepare, when shell and context are known
   mutable std::vector<py::object> methods_;  // bound methods by slot
-  mutable time_ns_t budget_ns_{ms_to_ns(2)};
+  mutable time_ns_t budget_ns_{0};
   std::unique_ptr<std::string> take_failure_;
 };
 

@@ -231,6 +231,7 @@ StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& tim
   Commit commit(1, {&action});
   Participant& place = commit.participants().front();
   place.task = &task_;
+  place.replaces_parts = true;
   bool made = false;
   try {
     made = carry_out(commit, timeouts.commit_ns, nullptr);
@@ -261,7 +262,7 @@ StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   report.phase_nominal_ns = grid.phase_error(place.release_nominal_ns);
   report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
   if (grid.period_ns != 0)
-    report.missed_releases = (place.release_nominal_ns - place.pending_ns) / grid.period_ns;
+    report.missed_releases = place.lost + (place.release_nominal_ns - place.pending_ns) / grid.period_ns;
   return report;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <mutex>
+#include <stdexcept>
 
 #include "mauve_rt/commit.hpp"
 #include "mauve_rt/error.hpp"
@@ -68,21 +69,137 @@ void Conductor::run() noexcept {
       continue;
     }
     order_.store(kNone, std::memory_order_relaxed);  // relaxed: the next order comes only after finished_
-    in_time_ = mauve::conduct(*commit_, timeout_ns_);
+    mauve::conduct(*commit_, timeout_ns_);
     finished_.store(1, std::memory_order_release);
     futex_wake_all(finished_);
   }
 }
 
-bool Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
+void Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
   commit_ = &commit;
   timeout_ns_ = timeout_ns;
   finished_.store(0, std::memory_order_relaxed);  // relaxed: the order publishes it
+  under_way_.lend(commit);
   order_.store(kConduct, std::memory_order_release);
   futex_wake_all(order_);
   while (finished_.load(std::memory_order_acquire) == 0) futex_wait_until(finished_, 0, kForever);
-  return in_time_;
+  under_way_.recall(kForever);
 }
+
+void Conductor::withdraw() noexcept {
+  under_way_.use([](Commit& commit) {
+    commit.hurry();
+    commit.call_off(Commit::Off::shut_down);
+  });
+}
+
+void conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
+  constexpr time_ns_t kLook = ms_to_ns(20);  // only while an adopt or take lasts
+  const time_ns_t until = monotonic_now_ns() + timeout_ns;
+  for (Participant* place : commit.in_order()) {
+    if (place->in_flight) place->task->post(*place);
+  }
+  if (!commit.wait_settled(until)) commit.call_off(Commit::Off::timed_out);
+  for (Participant& place : commit.participants()) {
+    while (place.in_flight && !place.task->retract(monotonic_now_ns() + kLook)) {
+      if (monotonic_now_ns() < commit.patience_ends_ns(until)) continue;
+      if (commit.abandon() && commit.maker() == &place)
+        break;  // its place is empty; it comes back from there or not
+    }
+  }
+}
+
+namespace {
+
+/// Whose adopt or take it was that did not end, and on whose thread. That component is given up; those that waited for
+/// its take are as well, as nobody knows what they are made of now.
+[[noreturn]] void give_up(Commit& commit) {
+  Task& stuck = *commit.maker()->task;
+  const CommitAction* action = commit.under_way();
+  const std::string whose = action->task != nullptr ? action->task->name() : stuck.name();
+  const std::string call = commit.is_taking() ? "take" : "adopt";
+  const std::string what =
+      call + " of " + whose + "'s new part does not end, on the thread of " + stuck.name();
+  for (Participant& place : commit.participants()) {
+    if (place.task == &stuck || (commit.is_taking() && place.in_flight)) place.task->condemn(what);
+  }
+  throw Error(
+      ErrorCode::faulted, what,
+      {.component = stuck.name(),
+       .found = std::string(to_string(stuck.state())),
+       .remedy = "remove the component, and add it anew; " +
+                 std::string(commit.is_taking() ? "what is changed is not known" : "nothing was changed")});
+}
+
+/// Who was never at the gate, or is still in a long state; nullptr: all came, but never together.
+const Participant* one_still_running(Commit& commit, time_ns_t timeout_ns) {
+  for (const Participant& place : commit.participants()) {
+    if (place.in_flight && !place.came.load(std::memory_order_relaxed)) return &place;
+  }
+  for (const Participant& place : commit.participants()) {
+    if (!place.in_flight || place.arrived.load(std::memory_order_relaxed)) continue;
+    const StateAge age = place.task->state_age();
+    if (!age.is_wait && age.age_ns > timeout_ns / 2) return &place;
+  }
+  return nullptr;
+}
+
+[[noreturn]] void throw_timeout(Commit& commit, time_ns_t timeout_ns) {
+  if (const Participant* running = one_still_running(commit, timeout_ns)) {
+    running->task->throw_state_running("the component did not reach a wait in time; nothing was changed",
+                                       timeout_ns, "try again, or allow a longer commit timeout");
+  }
+  for (const Participant& place : commit.participants()) {
+    if (!place.in_flight || commit.declared_ns() == 0 || place.passed.load(std::memory_order_relaxed) == 0)
+      continue;
+    throw Error(
+        ErrorCode::timeout, "the declared budget fits in no wait of the component; nothing was changed",
+        {.component = place.task->name(),
+         .element = "budget_ns",
+         .expected = "less than what is left of a wait",
+         .found = std::to_string(commit.declared_ns() / 1000) + " us for adopt and take of all new cores",
+         .remedy = "declare a shorter budget, or allow releases to be missed (max_missed)"});
+  }
+  throw Error(ErrorCode::timeout, "the components were never in their waits together; nothing was changed",
+              {.remedy = "allow a longer commit timeout, or some releases to be missed (max_missed)"});
+}
+
+[[noreturn]] void throw_withdrawn(const Task* by) {
+  ErrorDetail detail{.element = "state", .remedy = "look at the architecture again, then decide again"};
+  if (by != nullptr) {
+    detail.component = by->name();
+    detail.found = std::string(to_string(by->state()));
+  }
+  throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
+              detail);
+}
+
+/// How long an adopt took, in place of what it would have thrown.
+[[noreturn]] void throw_late_adopt(const CommitAction& action) {
+  const bool is_declared = action.declared_ns() != 0;
+  throw std::runtime_error("it took " + std::to_string(action.adopt_ns / 1000) + " us, and its " +
+                           (is_declared ? "declared budget is " : "budget is reckoned at ") +
+                           std::to_string(action.budget_ns() / 1000) + " us");
+}
+
+/// Throws what a commit that was called off, or whose adopt was late, is to answer.
+void throw_if_off(Commit& commit, time_ns_t timeout_ns) {
+  switch (commit.off()) {
+    case Commit::Off::withdrawn:
+      throw_withdrawn(commit.off_by());
+    case Commit::Off::shut_down:
+      throw Error(ErrorCode::wrong_revision, "the architecture is being shut down; nothing was changed",
+                  {.remedy = "deploy it again first"});
+    case Commit::Off::timed_out:
+    case Commit::Off::overran:
+      if (commit.refused_by() != nullptr) throw_late_adopt(*commit.refused_by());
+      throw_timeout(commit, timeout_ns);
+    case Commit::Off::not_yet:
+      if (commit.adopt_was_late()) throw_late_adopt(*commit.refused_by());
+  }
+}
+
+}  // namespace
 
 bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
   // Whoever commands two tasks takes them in the order of their numbers, so that no two wait for each other.
@@ -102,28 +219,20 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
     if (place.in_flight && !place.task->is_simulated()) ++running;
   }
   commit.expect(running);
-  bool in_time = true;
   if (running == 0) {
     for (Participant& place : commit.participants()) place.task->hold_parked(place);
-    commit.make_change();
+    commit.make_alone();
+  } else if (conductor != nullptr) {
+    conductor->conduct(commit, timeout_ns);
   } else {
-    in_time = conductor != nullptr ? conductor->conduct(commit, timeout_ns) : conduct(commit, timeout_ns);
+    conduct(commit, timeout_ns);
   }
+  if (commit.is_abandoned()) give_up(commit);
   for (Participant& place : commit.participants()) {
     if (!place.in_flight || place.task->is_simulated()) place.task->finish_parked(place, commit.committed());
   }
+  throw_if_off(commit, timeout_ns);
   if (commit.refusal()) std::rethrow_exception(commit.refusal());
-  for (const Participant& place : commit.participants()) {
-    if (commit.was_refused() && place.task->state() == ComponentState::faulted) check_state(*place.task);
-    if (!in_time && place.in_flight && !place.arrived.load(std::memory_order_relaxed)) {
-      place.task->throw_state_running("the component did not reach a wait in time; nothing was changed",
-                                      timeout_ns, "try again, or allow a longer commit timeout");
-    }
-  }
-  if (!in_time || commit.was_refused()) {
-    throw Error(ErrorCode::timeout, "the components were never in their waits together; nothing was changed",
-                {.remedy = "try again, or allow a longer commit timeout"});
-  }
   return commit.committed();
 }
 

@@ -135,7 +135,13 @@ void PartsChange::take() noexcept {
 }
 
 time_ns_t PartsChange::budget_ns() const noexcept {
-  return parts_.core != nullptr ? parts_.core->budget_ns() : CommitAction::budget_ns();
+  if (parts_.core == nullptr) return CommitAction::budget_ns();
+  const time_ns_t declared = parts_.core->budget_ns();
+  return declared != 0 ? declared : parts_.core->reckoned_budget_ns();
+}
+
+time_ns_t PartsChange::declared_ns() const noexcept {
+  return parts_.core != nullptr ? parts_.core->budget_ns() : 0;
 }
 
 void PartsChange::retire() noexcept {

@@ -164,8 +164,11 @@ void Task::start_at(time_ns_t instant_ns) {
 
 void Task::post_start(time_ns_t instant_ns) noexcept {
   start_at_ns_ = instant_ns;
-  // A stop bit that came too late for the last run must not end this one: store, not or.
-  control_.store(kStart, std::memory_order_release);
+  {
+    const std::lock_guard lock(order_mutex_);
+    // A stop bit that came too late for the last run must not end this one: store, not or.
+    control_.store(kStart, std::memory_order_release);
+  }
   if (simulated_) return resume();
   futex_wake_all(control_);
 }
@@ -214,29 +217,39 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
                .remedy = remedy});
 }
 
-void Task::stop(time_ns_t timeout_ns) {
-  const std::lock_guard lock(command_mutex_);
-  auto seen = static_cast<std::uint32_t>(ComponentState::running);
-  // acq_rel: only who turns RUNNING into STOPPING goes on; a fault in between wins
-  const bool running = state_.compare_exchange_strong(
-      seen, static_cast<std::uint32_t>(ComponentState::stopping), std::memory_order_acq_rel);
-  if (!running && static_cast<ComponentState>(seen) != ComponentState::stopping) {
+/// The state and the bit go together: a stop that is late must not end the run that follows.
+void Task::order_stop() {
+  const std::lock_guard lock(order_mutex_);
+  auto seen = state_.load(std::memory_order_acquire);
+  while (settled(static_cast<ComponentState>(seen)) == ComponentState::running) {
+    // acq_rel: a fault in between wins
+    if (state_.compare_exchange_weak(seen, static_cast<std::uint32_t>(ComponentState::stopping),
+                                     std::memory_order_acq_rel)) {
+      seen = static_cast<std::uint32_t>(ComponentState::stopping);
+    }
+  }
+  if (static_cast<ComponentState>(seen) != ComponentState::stopping) {
     throw Error(ErrorCode::not_running, "the component is not running",
                 {.component = name_,
                  .expected = "RUNNING",
                  .found = std::string(to_string(static_cast<ComponentState>(seen)))});
   }
+  control_.fetch_or(kStop, std::memory_order_seq_cst);  // seq_cst: before the look for a commit
+}
+
+void Task::stop(time_ns_t timeout_ns) {
+  const time_ns_t until = monotonic_now_ns() + timeout_ns;
+  order_stop();
   changes_.bump();
-  control_.fetch_or(kStop, std::memory_order_acq_rel);
+  withdraw_commit();
   if (simulated_) resume();
   futex_wake_all(control_);
-  const time_ns_t until = monotonic_now_ns() + timeout_ns;
   // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
   const auto is_going = [](std::uint32_t found) {
     const auto state = static_cast<ComponentState>(found);
     return state != ComponentState::stopped && state != ComponentState::faulted;
   };
-  for (seen = state_.load(std::memory_order_acquire); is_going(seen);
+  for (auto seen = state_.load(std::memory_order_acquire); is_going(seen);
        seen = state_.load(std::memory_order_acquire)) {
     if (futex_wait_until(state_, seen, until)) continue;
     if (!is_going(state_.load(std::memory_order_acquire))) break;

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A task's part in commits (commit.hpp).
+#include <pthread.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/task.hpp"
 
@@ -7,36 +13,60 @@ namespace mauve {
 
 namespace {
 
-constexpr int kMaxDeferrals = 3;
+constexpr int kTries = 3;
 
 }  // namespace
 
 void Task::post(Participant& place) noexcept {
-  commit_budget_ns_.store(place.commit->budget_ns(), std::memory_order_relaxed);
-  place_.store(&place, std::memory_order_seq_cst);
-  control_.fetch_or(kCommit, std::memory_order_acq_rel);
+  place_.lend(place);
+  control_.fetch_or(kCommit, std::memory_order_seq_cst);
   futex_wake_all(control_);
+  if (ended_.load(std::memory_order_seq_cst) != 0) withdraw_commit();  // nobody is left to refuse it
 }
 
-void Task::retract() noexcept {
+bool Task::retract(time_ns_t until_ns) noexcept {
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-  // seq_cst, as the machine's two: either it finds the place empty, or we find it at the commit and wait.
-  place_.store(nullptr, std::memory_order_seq_cst);
-  while (at_commit_.load(std::memory_order_seq_cst) != 0) futex_wait_until(at_commit_, 1, kForever);
+  return place_.recall(until_ns);
 }
 
-/// With less time left than the change may take, it is better made after the release that is due; but not put
-/// off for ever.
-bool Task::may_commit_now() const noexcept {
-  const time_ns_t left = due_ns() - clock_->now_ns();
-  return left > commit_budget_ns_.load(std::memory_order_relaxed) || deferrals_ >= kMaxDeferrals;
+void Task::withdraw_commit() noexcept {
+  place_.use([this](Participant& place) { place.commit->call_off(Commit::Off::withdrawn, this); });
 }
 
-void Task::come_to_commit() noexcept {
-  at_commit_.store(1, std::memory_order_seq_cst);
-  if (Participant* place = place_.load(std::memory_order_seq_cst)) visit(*place);
-  at_commit_.store(0, std::memory_order_seq_cst);
-  futex_wake_all(at_commit_);
+/// With less time left than the change may take it is better made after the release that is due. A budget that is only
+/// reckoned puts it off some times, not for ever.
+time_ns_t Task::leaves_gate_at(const Participant& place) const noexcept {
+  const time_ns_t due = due_ns();
+  if (due == kForever) return kForever;
+  const Commit& commit = *place.commit;
+  const time_ns_t needed = deferrals_ < kTries ? commit.budget_ns() : commit.declared_ns();
+  return due + commit.may_miss(place) * grid_.period_ns - needed;
+}
+
+bool Task::may_commit_now() noexcept {
+  if (left_gate_) return false;
+  const time_ns_t now = clock_->now_ns();
+  bool may = false;
+  place_.use([&](Participant& place) { may = now < std::min(due_ns(), leaves_gate_at(place)); });
+  return may;
+}
+
+/// A release while a commit is posted, in whose wait the budget did not fit.
+void Task::pass_commit() noexcept {
+  ++deferrals_;
+  place_.use([this](Participant& place) {
+    place.passed.store(static_cast<std::uint32_t>(deferrals_), std::memory_order_relaxed);
+    place.commit->note_came(place);
+  });
+}
+
+/// Throws when adopt and take of the new core took longer than it declared: the change is in, and its first fault.
+void Task::come_to_commit() {
+  place_.use([this](Participant& place) { visit(place); });
+  const time_ns_t took = std::exchange(overlong_ns_, 0);
+  if (took == 0 || waiting_ == nullptr) return;
+  throw std::runtime_error("adopt and take took " + std::to_string(took / 1000) +
+                           " us, longer than the new core declares (budget_ns)");
 }
 
 /// Not by a plain store: a watchdog's FAULTED, or a STOPPING, of this moment has to stay.
@@ -50,24 +80,50 @@ void Task::visit(Participant& place) noexcept {
   const time_ns_t due = due_ns();
   place.parked_ns = clock_->now_ns();
   place.pending_ns = due;
+  place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
+  place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid_.period_ns;
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
-  const Commit::Answer answer = commit.arrive();
-  if (answer == Commit::Answer::wait) {
-    const bool in_good_time = due - place.parked_ns > commit.budget_ns();
-    if (!commit.wait_others(in_good_time ? due - commit.budget_ns() : due)) {
-      place.arrived.store(false, std::memory_order_relaxed);
-      left_gate_ = true;
-      boundary_ns_ = place.parked_ns;
-      exchange_state(ComponentState::held, ComponentState::running);
-      return;
-    }
+  const Commit::Answer answer = commit.meet(place);
+  if (answer == Commit::Answer::abandoned) {
+    is_abandoned_ = true;
+    return;
+  }
+  exchange_state(ComponentState::held, ComponentState::running);
+  if (answer == Commit::Answer::left) {
+    left_gate_ = true;
+    place.arrived.store(false, std::memory_order_relaxed);
+    return go_on_unchanged(place);
   }
   deferrals_ = 0;
   left_gate_ = false;
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-  exchange_state(ComponentState::held, ComponentState::running);
-  if (answer != Commit::Answer::closed) continue_after(place);
+  if (answer == Commit::Answer::off) return go_on_unchanged(place);
+  overlong_ns_ = place.overlong_ns;
+  continue_after(place);
+  commit.gone_on(answer == Commit::Answer::made_it);
+}
+
+/// Instants that passed at the gate, or in adopt and take, are skipped whatever the overrun policy; returns how many.
+/// One that it was not to miss, and that has passed by less than a period, is released late as after any wait.
+std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
+  const time_ns_t period = grid_.period_ns;
+  const time_ns_t late = now_ns - clock_ns();
+  if (!event_settled_ || period == 0 || late <= 0 || place.parked_ns > clock_ns()) return 0;
+  if (late < period && place.holds_until_ns == place.pending_ns) return 0;
+  const std::int64_t lost = (late + period - 1) / period;
+  set_clock_ns(clock_ns() + lost * period);
+  return lost;
+}
+
+void Task::go_on_unchanged(Participant& place) noexcept {
+  boundary_ns_ = clock_->now_ns();
+  const std::int64_t lost = skip_lost(place, boundary_ns_);
+  if (lost == 0) return;
+  place.lost += lost;
+  const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
+  trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
+  trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), 0, lost);
 }
 
 void Task::continue_after(Participant& place) noexcept {
@@ -88,7 +144,9 @@ void Task::continue_after(Participant& place) noexcept {
     }
   }
   place.armed_ns = boundary_ns_ = clock_->now_ns();
-  trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0);
+  const bool keeps_instant = !committed || place.afterwards == Afterwards::go_on;
+  const std::int64_t lost = keeps_instant ? skip_lost(place, place.armed_ns) : 0;
+  trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
   if (committed && place.afterwards == Afterwards::stop) park_stopped();
 }
 
@@ -107,12 +165,29 @@ void Task::finish_parked(Participant& place, bool committed) noexcept {
 }
 
 void Task::refuse_commit() noexcept {
-  if ((control_.load(std::memory_order_acquire) & kCommit) == 0) return;
-  at_commit_.store(1, std::memory_order_seq_cst);
-  if (Participant* place = place_.load(std::memory_order_seq_cst)) place->commit->refuse();
+  if ((control_.load(std::memory_order_seq_cst) & kCommit) == 0) return;
+  withdraw_commit();
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-  at_commit_.store(0, std::memory_order_seq_cst);
-  futex_wake_all(at_commit_);
+}
+
+/// FAULTED first: whoever waits for the component goes on, whatever becomes of the rest.
+void Task::condemn(const std::string& what) {
+  std::uint32_t nobody = 0;
+  if (!condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) return;
+  {
+    const std::lock_guard lock(fault_mutex_);
+    fault_ = {.what = what, .where = current_state(), .when_ns = clock_->now_ns()};
+  }
+  publish_state(ComponentState::faulted);
+  const sched_param ordinary{};
+  pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
+  for (const auto& port : shell_->ports()) port->close();
+  write_outputs(false);
+}
+
+void Task::leave_behind(std::shared_ptr<void> used) {
+  const std::lock_guard lock(fault_mutex_);
+  left_behind_.push_back(std::move(used));
 }
 
 bool Task::wait_release(const Participant& place, time_ns_t until_ns) noexcept {

@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <stdexcept>
+#include <utility>
 
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
@@ -18,11 +19,8 @@ void Task::resume() noexcept {
     if ((control & kStop) != 0) return park_stopped();
     if ((control & kCommit) != 0 && may_commit_now()) {
       come_to_commit();
+      if (std::exchange(is_abandoned_, false)) return park_condemned();
       if (waiting_ == nullptr) return;
-      // Less than a period past its instant it is released late, as after any wait: the wait was entered in time.
-      const time_ns_t period = grid_.period_ns;
-      if (event_settled_ && period != 0 && boundary_ns_ - clock_ns() >= period)
-        handle_overrun(*waiting_, boundary_ns_);
       tell_wait();
     }
     if (!event_settled_ && (control & kEvent) != 0) settle_event();
@@ -72,7 +70,7 @@ void Task::release(time_ns_t actual_ns) noexcept {
   statistics_.wakeup.record(actual_ns - clock_ns());
   boundary_ns_ = actual_ns;
   trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns);
-  if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) ++deferrals_;
+  if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) pass_commit();
   left_gate_ = false;
   if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
   if (Participant* place = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
@@ -169,6 +167,7 @@ void Task::signal_event() noexcept {
     if (waiting_ != nullptr && !event_settled_) settle_event();
   } else if ((before & kEvent) == 0) {
     futex_wake_all(control_);
+    if (place_.is_lent()) place_.use([](Participant& place) { place.commit->poke(); });
   }
 }
 
@@ -275,6 +274,7 @@ void Task::park(ComponentState state) noexcept {
   present_.tell({.name = current_.load(std::memory_order_relaxed)});
   deferrals_ = 0;
   left_gate_ = false;
+  overlong_ns_ = 0;
   control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_release);
   publish_state(state);

@@ -117,7 +117,9 @@ void Task::thread_main() noexcept {
     resume();
   }
   counters_.detach();
-  ended_.store(1, std::memory_order_release);
+  // seq_cst: a commit posted this moment is found here, or post() finds that the thread has ended
+  ended_.store(1, std::memory_order_seq_cst);
+  refuse_commit();
   futex_wake_all(ended_);
 }
 

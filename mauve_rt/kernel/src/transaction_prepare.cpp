@@ -177,7 +177,24 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   }
 }
 
+/// The thread of a component that was given up may come back to what it was working with.
+void TransactionCommit::Work::leave_behind() {
+  struct Used {
+    std::vector<std::unique_ptr<CommitAction>> actions;
+    std::vector<std::unique_ptr<PartsChange>> parts;
+    std::unique_ptr<Commit> commit;
+  };
+  if (commit_ == nullptr || !commit_->is_abandoned()) return;
+  Task& task = *commit_->maker()->task;
+  auto used = std::make_shared<Used>();
+  for (Change& change : changes_) used->parts.push_back(std::move(change.parts));
+  used->actions = std::move(actions_);
+  used->commit = std::move(commit_);
+  task.leave_behind(std::move(used));
+}
+
 void TransactionCommit::Work::discard() noexcept {
+  leave_behind();
   for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);
   for (const auto& resource : prepared_resources_) resource->cleanup();

@@ -87,10 +87,12 @@ void TransactionCommit::Work::gather() {
     if (change.parts != nullptr) actions.push_back(change.parts.get());
   }
   commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
+  commit_->set_max_missed(options_.max_missed);
   auto place = commit_->participants().begin();
   for (const Change& change : changes_) {
     place->task = &change.draft->component->task();
     place->afterwards = afterwards_of(change);
+    place->replaces_parts = change.parts != nullptr;
     if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
     if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
     if (change.retreat != nullptr) change.retreat->set_place(*place);
@@ -108,7 +110,8 @@ void TransactionCommit::Work::carry_out_commit() {
       return;
     }
   } catch (const Error& failure) {
-    if (commit_->refused_by() == nullptr) rethrow_at(step_of(failure.detail().component), failure);
+    const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->off() == Commit::Off::not_yet;
+    if (!is_adopts_own) rethrow_at(step_of(failure.detail().component), failure);
     throw_refused(failure.what());
   } catch (const std::exception& failure) {
     throw_refused(failure.what());

@@ -50,6 +50,7 @@ class TransactionCommit::Work {
   void retire();
   void keep_for_report();
   static void renew_fallback(Change& change);
+  void leave_behind();
   void discard() noexcept;
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 

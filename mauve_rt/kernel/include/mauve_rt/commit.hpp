@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "mauve_rt/lent.hpp"
 #include "mauve_rt/time.hpp"
 
 namespace mauve {
@@ -25,8 +26,10 @@ class CommitAction {
   virtual bool adopt() { return true; }
   /// Makes the change; cannot fail. [rt]
   virtual void take() noexcept = 0;
-  /// The time adopt and take need together. [rt]
+  /// The time adopt and take need together, declared or reckoned. [rt]
   virtual time_ns_t budget_ns() const noexcept { return us_to_ns(5); }
+  /// What of it was declared and is held against them; 0: it is only reckoned. [rt]
+  virtual time_ns_t declared_ns() const noexcept { return 0; }
   /// What the trace calls it. [rt]
   virtual std::uint32_t trace_id() const noexcept { return 0; }
 
@@ -48,10 +51,14 @@ class Commit;
 ///
 /// | member            | written by                                      | read by              | order                    |
 /// | ----------------- | ----------------------------------------------- | -------------------- | ------------------------ |
-/// | task ... clock    | requester, before it is posted                  | anyone after         | the task's slot          |
-/// | arrived           | the component's thread                          | requester            | relaxed: for a message   |
-/// | parked, pending   | the component's thread, before it arrives       | who makes the change | the gate                 |
-/// | armed             | the component's thread, before it lets go       | requester, after it  | the task's at_commit_    |
+/// | task ... in_flight| requester, before it is posted                  | anyone after         | the task's place         |
+/// | came, arrived,    | the component's thread                          | requester            | relaxed: for a message   |
+/// | passed            |                                                 |                      |                          |
+/// | leaves_at_ns      | the component's thread, before it arrives       | who comes last       | relaxed: the gate        |
+/// | parked, pending,  | the component's thread, before it arrives       | who makes the change | the gate                 |
+/// | holds_until_ns    |                                                 |                      |                          |
+/// | overlong_ns       | who makes the change                            | component's thread   | the gate                 |
+/// | armed, lost       | the component's thread, before it lets go       | requester, after it  | the task's place         |
 /// | release_*         | the component's thread, before released         | requester, after it  | through released         |
 /// | released (futex)  | the component's thread                          | requester            | release/acquire          |
 struct Participant {
@@ -62,11 +69,18 @@ struct Participant {
   Commit* commit{nullptr};
   Afterwards afterwards{Afterwards::go_on};
   std::optional<time_ns_t>
-      start_clock_ns{};    // of a restart: the grid's reference, when it is not the deployment's
-  time_ns_t budget_ns{0};  // what adopt and take of its own core declare
-  bool in_flight{false};   // it was running when the commit began
+      start_clock_ns{};        // of a restart: the grid's reference, when it is not the deployment's
+  time_ns_t budget_ns{0};      // what adopt and take of its own core need
+  bool replaces_parts{false};  // its outputs are written as the ports' on_commit says
+  bool in_flight{false};       // it was running when the commit began
 
-  std::atomic<bool> arrived{false};
+  std::atomic<bool> came{false};           // it was at the gate, or would have been but for the budget
+  std::atomic<bool> arrived{false};        // it is at the gate
+  std::atomic<std::uint32_t> passed{0};    // its releases since, before which the budget did not fit
+  std::atomic<time_ns_t> leaves_at_ns{0};  // for its pending instant
+  time_ns_t holds_until_ns{0};             // the last of the instants that it may miss, or the pending one
+  time_ns_t overlong_ns{0};  // what adopt and take of its core took, when that was more than they declared
+  std::int64_t lost{0};      // instants that passed while it waited in vain
   time_ns_t parked_ns{0};
   time_ns_t armed_ns{0};
   time_ns_t pending_ns{0};  // the instant pending at the park; 0: the component was parked already
@@ -85,16 +99,30 @@ struct Participant {
 /// One change under way: its participants, its actions and the gate where the participants meet.
 ///
 /// A component comes to the gate in its wait. While others are missing it leaves again for its pending instant and comes
-/// back in the wait after, so that it misses no release; when half of the time is gone, those who come stay. The last
-/// one to come carries out all actions; then all go on.
+/// back in the wait after, so that it misses no release, until all have met. The last one to come carries out all
+/// actions; then all go on. Nobody stays past its pending instant, unless the request allows some to be missed: these
+/// are spent only when everybody has been there once, since who is in a long state would not come for them.
 ///
-/// | member       | written by                                            | read by           | order                           |
-/// | ------------ | ----------------------------------------------------- | ----------------- | ------------------------------- |
-/// | gate_(futex) | who comes, leaves, makes the change, or withdraws it  | all of these      | acq_rel: hands over all results |
-/// | expected_    | requester, before the first participant is posted     | participants      | the task's slot                 |
-/// | results      | who makes the change                                  | all, after kDone  | gate_                           |
+/// The gate goes from gathering to adopting (the last has come) to taking to done. Until taking begins the commit can be
+/// called off by anyone, also while an adopt lasts; whether it was, one compare-exchange decides.
+///
+/// | member          | written by                                            | read by           | order                           |
+/// | --------------- | ----------------------------------------------------- | ----------------- | ------------------------------- |
+/// | gate_ (futex)   | who comes, leaves, makes the change, or calls it off  | all of these      | acq_rel: hands over all results |
+/// | settled_ (futex)| who calls it off; the last to go on                   | who conducts      | release: all has been written   |
+/// | expected_ ...   | requester, before the first participant is posted     | participants      | the task's place                |
+/// | going_          | each that goes on after the change                    | the same          | acq_rel: one is the last        |
+/// | came_           | participants                                          | participants      | relaxed: a count                |
+/// | maker_, began_, | who comes last, before adopting begins                | all               | relaxed: gate_ publishes them   |
+/// | adopting_       | who makes the change                                  | requester, a text | release/acquire                 |
+/// | off_, off_by_   | who calls it off first                                | requester, at end | the tasks' places               |
+/// | patience_ns_    | who shuts down                                        | who conducts      | relaxed: a lone number          |
+/// | results         | who makes the change                                  | all, after kDone  | gate_                           |
 class Commit {
  public:
+  /// An adopt is given so long, at least, before its component is given up: machines stall.
+  static constexpr time_ns_t kPatience = ms_to_ns(100);
+
   Commit(std::size_t participants, std::vector<CommitAction*> actions);
   /// Gives up waiting for the releases that follow; the tasks that go on must exist still.
   ~Commit();
@@ -110,6 +138,10 @@ class Commit {
   const std::vector<CommitAction*>& actions() const noexcept { return actions_; }
   /// Time needed for all actions. [rt]
   time_ns_t budget_ns() const noexcept { return budget_ns_; }
+  /// What of it was declared. [rt]
+  time_ns_t declared_ns() const noexcept { return declared_ns_; }
+  /// How many releases each participant may be held past, all in all. [non-rt], before it is posted.
+  void set_max_missed(std::int64_t releases) noexcept { max_missed_ = releases; }
 
   /// Whether it was made; else nothing was changed. [non-rt], after it ended.
   bool committed() const noexcept { return committed_; }
@@ -117,56 +149,109 @@ class Commit {
   const std::exception_ptr& refusal() const noexcept { return refusal_; }
   /// The action whose adopt refused, or nullptr. [non-rt], after it ended.
   const CommitAction* refused_by() const noexcept { return refused_by_; }
+  /// Whether that was for the time its adopt took. [non-rt], after it ended.
+  bool adopt_was_late() const noexcept { return adopt_was_late_; }
 
   // ---- for those who come to the gate
 
-  enum class Answer : std::uint8_t { made_it, wait, closed };
-  /// Comes to the gate: made_it when it was the last and made the change, closed when the commit is off. [rt]
-  Answer arrive() noexcept;
-  /// Waits for the others; false when it left the gate at the instant, before the change was begun. [rt]
-  bool wait_others(time_ns_t leave_at_ns) noexcept;
-  /// Calls the commit off because a participant cannot come any more. [rt]
-  void refuse() noexcept;
+  enum class Answer : std::uint8_t {
+    made_it,    // it was the last, and the change is made or refused
+    done,       // so it is, by another
+    left,       // it has to go, and may come again
+    off,        // the commit was called off
+    abandoned,  // it has lasted so long that the component was given up
+  };
+  /// Comes to the gate, and waits there for the others or makes the change. [rt]
+  Answer meet(Participant& place) noexcept;
+  /// Called by each that was there when the change was made, once it is armed. [rt]
+  void gone_on(bool made_it) noexcept;
+  /// Notes that it was there, or would have been but for the budget. [rt]
+  void note_came(Participant& place) noexcept;
+  /// How many more releases it may be held past, now. [rt]
+  std::int64_t may_miss(const Participant& place) const noexcept;
+  /// Lets those at the gate look whether they have to go. [rt]
+  void poke() noexcept;
 
-  // ---- for who conducts it
+  // ---- for who conducts it, and who wants it not to happen
 
+  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, overran, shut_down };
+  /// Calls it off, without waiting for anybody: withdrawn by a task that is stopped or faulted, e.g. False when the
+  /// change was made already, or is being taken this moment. [rt]
+  bool call_off(Off why, const Task* task = nullptr) noexcept;
+  /// Lets an adopt that lasts have no more than kPatience from now on. [rt]
+  void hurry() noexcept;
   /// How many are to come. [non-rt]
-  void expect(std::uint32_t parties) noexcept { expected_ = parties; }
-  /// Makes the change: all adopt, then all take. [rt]
-  void make_change() noexcept;
-  /// From now on those who come stay. [rt]
-  void be_strict() noexcept;
-  /// Sleeps until it ended or was refused, at most until the instant; whether it did. [rt]
-  bool wait_end(time_ns_t until_ns) noexcept;
-  /// Calls it off; false when the change was being made already: it has ended by the return. [rt]
-  bool withdraw() noexcept;
-  bool was_refused() const noexcept { return (gate_.load(std::memory_order_acquire) & kRefused) != 0; }
+  void expect(std::uint32_t parties) noexcept;
+  /// Makes the change where nobody is to come. [rt]
+  void make_alone() noexcept;
+  /// Sleeps until all have gone on, or it was called off, at most until the instant; whether it did. [rt]
+  bool wait_settled(time_ns_t until_ns) noexcept;
+  /// The instant at which an adopt or take that still lasts is given up. [rt]
+  time_ns_t patience_ends_ns(time_ns_t timeout_at_ns) const noexcept;
+  /// Gives up who makes the change, if anybody does still; whether it is given up now. [rt]
+  bool abandon() noexcept;
+
+  /// Why it was called off. [non-rt], after it ended.
+  Off off() const noexcept;
+  const Task* off_by() const noexcept { return off_by_.load(std::memory_order_relaxed); }
+  bool is_abandoned() const noexcept { return (gate_.load(std::memory_order_acquire) & kAbandoned) != 0; }
+  bool is_taking() const noexcept { return (gate_.load(std::memory_order_acquire) & kTaking) != 0; }
+  /// Who makes the change, and the part that is being made. [non-rt], once abandoned.
+  Participant* maker() const noexcept { return maker_.load(std::memory_order_relaxed); }
+  const CommitAction* under_way() const noexcept { return adopting_.load(std::memory_order_acquire); }
 
  private:
-  static constexpr std::uint32_t kCount = 0xFFFF, kClosed = 0x10000, kDone = 0x20000, kWithdrawn = 0x40000,
-                                 kStrict = 0x80000, kRefused = 0x100000;
+  static constexpr std::uint32_t kCount = 0xFFFF, kAdopting = 1U << 16U, kTaking = 1U << 17U,
+                                 kDone = 1U << 18U, kOff = 1U << 19U, kAbandoned = 1U << 20U,
+                                 kPoke = 1U << 24U;
+
+  std::optional<Answer> arrive(Participant& place) noexcept;
+  bool have_time(const Participant& last, time_ns_t now_ns) const noexcept;
+  Answer wait_others(Participant& place) noexcept;
+  Answer make_change() noexcept;
+  bool adopt_all(const Clock& clock) noexcept;
+  bool begin_taking() noexcept;
+  void take_all(const Clock& clock) noexcept;
+  void borrow_priority() noexcept;
+  void repay_priority() noexcept;
+  void settle() noexcept;
 
   std::vector<Participant> participants_;
   std::vector<Participant*> order_;
   std::vector<CommitAction*> actions_;
   time_ns_t budget_ns_{0};
+  time_ns_t declared_ns_{0};
+  std::int64_t max_missed_{0};
   std::uint32_t expected_{0};
+  int own_priority_{0};  // of who makes the change, while it works at another's; 0: it does not
   bool committed_{false};
+  bool adopt_was_late_{false};
   std::exception_ptr refusal_{};
   const CommitAction* refused_by_{nullptr};
+  std::atomic<Participant*> maker_{nullptr};
+  std::atomic<time_ns_t> began_ns_{0};
+  std::atomic<const CommitAction*> adopting_{nullptr};
+  std::atomic<std::uint32_t> came_{0};
+  std::atomic<Off> off_{Off::not_yet};
+  std::atomic<const Task*> off_by_{nullptr};
+  std::atomic<time_ns_t> patience_ns_{kForever};
   alignas(64) std::atomic<std::uint32_t> gate_{0};
+  std::atomic<std::uint32_t> going_{0};
+  alignas(64) std::atomic<std::uint32_t> settled_{
+      0};  // a line of its own: whoever sleeps on it is no participant
 };
 
 /// Posts a commit to its running participants, in their order, and sees it to its end. Runs no user code. [rt]
-/// Returns once no participant refers to the commit any more; false when it was called off for want of time.
-bool conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+/// Returns once no participant refers to the commit any more, but for one whose adopt or take does not end.
+void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
 
 /// The thread that conducts commits, SCHED_FIFO above all components where that is granted.
 ///
 /// | member          | written by | read by    | order                                 |
 /// | --------------- | ---------- | ---------- | ------------------------------------- |
 /// | order_ (futex)  | requester  | the thread | release/acquire: hands over commit_   |
-/// | finished_(futex)| the thread | requester  | release/acquire: hands over in_time_  |
+/// | finished_(futex)| the thread | requester  | release/acquire: the commit's end     |
+/// | under_way_      | the thread | anyone     | its own: lent.hpp                     |
 class Conductor {
  public:
   /// [setup] Without the right to SCHED_FIFO it is an ordinary thread.
@@ -176,7 +261,9 @@ class Conductor {
   Conductor& operator=(const Conductor&) = delete;
 
   /// conduct() on the thread; one caller at a time. [non-rt]
-  bool conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+  void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+  /// Calls off the commit under way, if there is one, and does not wait for its end; any thread. [rt]
+  void withdraw() noexcept;
 
  private:
   static constexpr std::uint32_t kNone = 0, kConduct = 1, kEnd = 2;
@@ -187,15 +274,17 @@ class Conductor {
   pthread_t thread_{};
   Commit* commit_{nullptr};
   time_ns_t timeout_ns_{0};
-  bool in_time_{false};
+  Lent<Commit> under_way_;
   std::atomic<std::uint32_t> order_{kNone};
   std::atomic<std::uint32_t> finished_{0};
 };
 
 /// Carries out a commit on tasks of any state and waits for its end: by the conductor when it has one, else by the
 /// calling thread; at once when every participant is parked or simulated. [non-rt]
-/// Throws Error: timeout naming the state still running, faulted; rethrows what adopt threw; returns whether every
-/// adopt agreed. Unless it returns true nothing was changed.
+/// Throws Error: timeout naming the state still running; wrong_revision when a participant was stopped or faulted
+/// meanwhile; faulted when an adopt did not end and its component was given up (Commit::is_abandoned: the commit and all
+/// its actions must then outlive that component's thread). Rethrows what adopt threw; returns whether every adopt agreed.
+/// Unless it returns true nothing was changed.
 bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor);
 
 }  // namespace mauve

@@ -72,6 +72,7 @@ class PartsChange final : public CommitAction {
   bool adopt() override;
   void take() noexcept override;
   time_ns_t budget_ns() const noexcept override;
+  time_ns_t declared_ns() const noexcept override;
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 
  private:

@@ -24,9 +24,12 @@ class CoreBase : public Configurable {
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
   /// Moves the old core's state over; cannot fail. [rt]
   virtual void take(CoreBase& /*old*/) noexcept {}
-  /// The time adopt and take need together; a commit with less left before the next release waits for the one
-  /// after.
-  virtual time_ns_t budget_ns() const noexcept { return us_to_ns(200); }
+  /// The time adopt and take need together, held against them: an adopt that takes longer refuses the change, after a
+  /// longer take the component is FAULTED. A commit with less left before a release waits for the one after.
+  /// 0: none declared.
+  virtual time_ns_t budget_ns() const noexcept { return 0; }
+  /// What is reckoned with where none is declared.
+  virtual time_ns_t reckoned_budget_ns() const noexcept { return us_to_ns(200); }
 
   virtual void set_context(const Context* context) noexcept { context_ = context; }
   void set_implementation(std::string name) { implementation_ = std::move(name); }

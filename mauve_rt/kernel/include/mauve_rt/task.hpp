@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -82,9 +83,8 @@ struct ChangeSignal {
 /// | ---------------------- | ------------------------------------- | ------------ | ---------------------------------- |
 /// | control_ (futex)       | commanders set bits, machine clears   | machine      | acq_rel: a bit hands over its data |
 /// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
-/// | place_                 | who conducts a commit                 | machine      | seq_cst with at_commit_            |
-/// | commit_budget_ns_      | who conducts, before place_           | machine      | relaxed: control_ orders it        |
-/// | at_commit_ (futex)     | machine, around its use of place_     | conductor    | seq_cst: who retracts sees the use |
+/// | place_                 | who conducts a commit                 | machine,     | its own: lent.hpp; who retracts    |
+/// |                        |                                       | stop, events | waits for all who use it           |
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
@@ -101,7 +101,9 @@ struct ChangeSignal {
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
 /// | boundary_ns_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
-/// | command_mutex_         | ordinary threads, a command each      | -            | -                                  |
+/// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
+/// | command_mutex_         | ordinary threads: start, commits      | -            | -                                  |
+/// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task {
  public:
   Task(std::string name, std::uint16_t number, ChangeSignal& changes);
@@ -153,6 +155,7 @@ class Task {
   /// Throws Error: already_running, faulted, not_configured.
   void start(std::optional<time_ns_t> clock_ns = std::nullopt);
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
+  /// A commit that the component takes part in is called off, unless its change is being made; waits for nobody else.
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
   void stop(time_ns_t timeout_ns = s_to_ns(1));
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
@@ -162,8 +165,19 @@ class Task {
 
   /// Asks the machine to come to the commit's gate in its next wait. [rt]
   void post(Participant& place) noexcept;
-  /// After this the machine does not refer to the participant any more, but for its next release. [rt]
-  void retract() noexcept;
+  /// After this nobody refers to the participant any more, but the machine for its next release; false when somebody
+  /// did still at the instant. [rt]
+  bool retract(time_ns_t until_ns) noexcept;
+  /// Calls off the commit that the component takes part in, if any, unless its change is being made; any thread. [rt]
+  void withdraw_commit() noexcept;
+  /// Whether an event came that the wait under way waits for. [rt], the machine's thread
+  bool has_event() const noexcept {
+    return !event_settled_ && (control_.load(std::memory_order_acquire) & kEvent) != 0;
+  }
+  /// Marks the component FAULTED whose thread is in an adopt or take that does not end, or waits for one. [non-rt]
+  void condemn(const std::string& what);
+  /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
+  void leave_behind(std::shared_ptr<void> used);
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
   void write_outputs(bool commit) noexcept;
   /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
@@ -237,6 +251,7 @@ class Task {
 
   // commands
   void post_start(time_ns_t instant_ns) noexcept;
+  void order_stop();
   time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
   void begin_trace(bool trace);
 
@@ -257,9 +272,13 @@ class Task {
   void settle_event() noexcept;
   void handle_overrun(const State& state, time_ns_t now_ns);
   void release(time_ns_t actual_ns) noexcept;
-  bool may_commit_now() const noexcept;
-  void come_to_commit() noexcept;
+  time_ns_t leaves_gate_at(const Participant& place) const noexcept;
+  bool may_commit_now() noexcept;
+  void pass_commit() noexcept;
+  void come_to_commit();
   void visit(Participant& place) noexcept;
+  void go_on_unchanged(Participant& place) noexcept;
+  std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
   void exchange_state(ComponentState from, ComponentState to) noexcept;
   void continue_after(Participant& place) noexcept;
   void refuse_commit() noexcept;
@@ -276,9 +295,9 @@ class Task {
              std::int64_t c = 0) noexcept {
     if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
   }
-  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0,
-                std::int64_t b = 0) noexcept {
-    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b);
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
+                std::int64_t c = 0) noexcept {
+    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
   }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
   void set_clock_ns(time_ns_t instant) noexcept {
@@ -302,6 +321,7 @@ class Task {
   Grid grid_;
 
   std::mutex command_mutex_;
+  PiMutex order_mutex_;
   pthread_t thread_{};
   pthread_barrier_t* barrier_{nullptr};
   std::atomic<bool> has_thread_{false};
@@ -309,15 +329,14 @@ class Task {
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
   Fault fault_;
+  std::vector<std::shared_ptr<void>> left_behind_;
 
   alignas(64) std::atomic<std::uint32_t> control_{0};
   std::atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
   std::atomic<std::uint32_t> parked_{1};
   std::atomic<std::uint32_t> ready_{0};
   std::atomic<std::uint32_t> ended_{0};
-  std::atomic<Participant*> place_{nullptr};
-  std::atomic<time_ns_t> commit_budget_ns_{0};
-  std::atomic<std::uint32_t> at_commit_{0};
+  Lent<Participant> place_;
   time_ns_t start_at_ns_{0};
   std::atomic<std::uint32_t> current_{0};         // the state's name in the trace; 0: none yet
   std::atomic<time_ns_t> execution_began_ns_{0};  // 0: no execution state with a bound under way
@@ -338,6 +357,8 @@ class Task {
   int deferrals_{0};            // releases a commit was put off for want of time
   bool is_cold_{false};         // started, and not woken ahead of its first release yet
   bool left_gate_{false};       // it came to the gate in this wait, and left for its instant
+  bool is_abandoned_{false};    // what it did or waited for at the gate lasted too long
+  time_ns_t overlong_ns_{0};    // what adopt and take of its core took, when that was more than they declared
 };
 
 }  // namespace mauve
