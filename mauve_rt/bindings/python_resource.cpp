@@ -36,6 +36,7 @@ class PythonResource final : public Resource {
 }  // namespace
 
 py::object PythonCallPort::call(const py::args& args, const py::kwargs& kwargs) const {
+  if (is_previewed()) return stand_in<PythonCallPort>().call(args, kwargs);
   const PythonService* service = service_;  // another thread may change the connection while Python runs
   if (service == nullptr) {
     throw Error(ErrorCode::not_configured, "the call port is not connected",

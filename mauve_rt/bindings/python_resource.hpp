@@ -36,6 +36,9 @@ class PythonCallPort final : public PortBase {
     return dynamic_cast<const PythonService*>(&service) != nullptr;
   }
   void attach(ServiceBase* service) noexcept override { service_ = static_cast<PythonService*>(service); }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<PythonCallPort>(name(), type());
+  }
 
  private:
   const PythonService* service_{nullptr};

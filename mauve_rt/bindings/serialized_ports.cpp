@@ -12,6 +12,7 @@ class SerializedReadPort final : public PortBase {
 
   std::string_view representation() const noexcept override { return kSerializedRepresentation; }
   bool read_serialized(Message& message, DataStatus& status, time_ns_t& time_ns) override {
+    if (is_previewed()) return stand_in<SerializedReadPort>().read_serialized(message, status, time_ns);
     status = service_ != nullptr ? service_->read(message, time_ns, seen_) : DataStatus::none;
     if (status == DataStatus::none || message.empty()) message = zero_;
     return true;
@@ -24,6 +25,9 @@ class SerializedReadPort final : public PortBase {
   void attach(ServiceBase* service) noexcept override {
     service_ = static_cast<SerializedReadService*>(service);  // fits() was asked
     seen_ = 0;
+  }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<SerializedReadPort>(name(), type(), zero_);
   }
 
  private:
@@ -45,7 +49,7 @@ class SerializedWritePort final : public PortBase {
     if (service_ != nullptr) service_->write(zero_, stamp_ns());
   }
   bool write_serialized(std::span<const std::byte> message) override {
-    if (service_ == nullptr || is_closed()) return true;
+    if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(message, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
     if (is_closed() && output_.on_stop == OutputPolicy::set_zero) write_zero();
@@ -58,6 +62,9 @@ class SerializedWritePort final : public PortBase {
   }
   void attach(ServiceBase* service) noexcept override {
     service_ = static_cast<SerializedWriteService*>(service);
+  }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<SerializedWritePort>(name(), type(), output_, zero_);
   }
 
  private:

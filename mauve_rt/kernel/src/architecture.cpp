@@ -8,6 +8,7 @@
 #include "mauve_rt/plugin.hpp"
 
 #include "lookup.hpp"
+#include "prefault.hpp"
 
 namespace mauve {
 
@@ -28,6 +29,10 @@ void require_new(bool known, const std::string& what, const std::string& name) {
 }
 
 }  // namespace
+
+Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
+  note_allocated_before();  // whatever comes after may be what its components own
+}
 
 Architecture::~Architecture() {
   for (const auto& component : components_) {

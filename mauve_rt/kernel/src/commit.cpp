@@ -29,7 +29,10 @@ Commit::~Commit() {
 
 void Commit::order_participants() {
   order_.clear();
-  for (Participant& place : participants_) order_.push_back(&place);
+  for (Participant& place : participants_) {
+    place.period_ns = place.task->grid().period_ns;
+    order_.push_back(&place);
+  }
   std::sort(order_.begin(), order_.end(), [](const Participant* a, const Participant* b) {
     const auto rank = [](const Participant& place) {
       return std::tuple(-place.budget_ns, -place.task->grid().period_ns, place.task->number());

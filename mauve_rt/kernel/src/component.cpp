@@ -7,6 +7,7 @@
 #include "mauve_rt/futex.hpp"
 
 #include "lookup.hpp"
+#include "prefault.hpp"
 
 namespace mauve {
 
@@ -186,6 +187,7 @@ void Component::replace_core(std::unique_ptr<CoreBase> core) {
 void Component::configure_core() {
   require_parked("configure_core");
   bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+  if (task_.has_thread()) prefault_allocated();
 }
 
 void Component::bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding) {
@@ -251,18 +253,37 @@ StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& tim
   return report_of(place, timeouts.phase_ns);
 }
 
+namespace {
+
+/// The instants of the grid before the change that lie between the pending one and the release that follows.
+std::int64_t missed_releases(const Participant& place, time_ns_t release_ns) noexcept {
+  if (place.period_ns == 0 || release_ns <= place.pending_ns) return 0;
+  return (release_ns - place.pending_ns + place.period_ns - 1) / place.period_ns;
+}
+
+std::string why_missed(const Participant& place) {
+  const auto in_us = [](time_ns_t duration_ns) { return std::to_string(duration_ns / us_to_ns(1)) + " us"; };
+  if (place.start_clock_ns) return "it starts on the clock that was asked for";
+  if (place.afterwards != Afterwards::restart || place.resumes_ns == place.pending_ns)
+    return "it was held past its pending instant";
+  return "the pending instant, of a period of " + in_us(place.period_ns) +
+         ", is none of the new one's: it starts at the first of " + in_us(place.grid.period_ns) + " after it";
+}
+
+}  // namespace
+
 StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
   report.component = place.task->name();
   report.blackout_ns = place.armed_ns - place.parked_ns;
-  const Grid& grid = place.task->grid();
   if (place.pending_ns == 0 || place.afterwards == Afterwards::stop) return report;
-  report.phase_nominal_ns = grid.phase_error(place.pending_ns);
-  if (!place.task->wait_release(place, monotonic_now_ns() + phase_timeout_ns)) return report;
-  report.phase_nominal_ns = grid.phase_error(place.release_nominal_ns);
-  report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
-  if (grid.period_ns != 0)
-    report.missed_releases = place.lost + (place.release_nominal_ns - place.pending_ns) / grid.period_ns;
+  const bool released = place.task->wait_release(place, monotonic_now_ns() + phase_timeout_ns);
+  const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;
+  report.phase_nominal_ns = place.grid.phase_error(nominal_ns - place.grid_place_ns);
+  if (released)
+    report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
+  report.missed_releases = place.lost + missed_releases(place, nominal_ns);
+  if (report.missed_releases != 0) report.remark = why_missed(place);
   return report;
 }
 
@@ -347,6 +368,7 @@ bool Component::configure_hook() {
   task_.set_machine(*parts_.shell, *parts_.fsm, &binding_, period_ns);
   update_listening(*parts_.fsm);
   show();
+  if (task_.has_thread()) prefault_allocated();
   task_.set_state(ComponentState::stopped);
   return true;
 }
@@ -381,6 +403,7 @@ void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
   out->cleanup();
   fallback_core_ = std::move(out);
   prepare_fallback();
+  if (task_.has_thread()) prefault_allocated();
 }
 
 void Component::update_listening(const FsmBase& fsm) {

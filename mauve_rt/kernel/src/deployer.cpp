@@ -6,6 +6,8 @@
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
 
+#include "prefault.hpp"
+
 namespace mauve {
 
 namespace {
@@ -74,6 +76,7 @@ void Deployer::deploy() {
     for (const auto& component : components) component->task().end_thread(kForever);
     throw;
   }
+  prefault_allocated();
   barrier_->arrive();
   conductor_ = std::make_unique<Conductor>();
 

@@ -98,6 +98,21 @@ void PortBase::disconnect() noexcept {
   swap(none);
 }
 
+void PortBase::preview(const PortConnection& connection) {
+  stand_in_ = make_stand_in();
+  stand_in_->set_context(context_);
+  stand_in_->attach(connection.service);
+  stand_in_->connection_ = connection;
+  previewer_.store(pthread_self(), std::memory_order_relaxed);
+}
+
+void PortBase::end_preview() noexcept {
+  previewer_.store(kNobody, std::memory_order_relaxed);
+  if (stand_in_ == nullptr) return;
+  stand_in_->attach(nullptr);
+  stand_in_.reset();
+}
+
 ConnectedTo PortBase::connected_to() const {
   constexpr std::size_t kUsualLength = 64;  // nothing is allocated under the lock then
   ConnectedTo shown;

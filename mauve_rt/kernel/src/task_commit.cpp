@@ -126,6 +126,13 @@ void Task::go_on_unchanged(Participant& place) noexcept {
   trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), 0, lost);
 }
 
+/// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
+time_ns_t Task::restart_instant(const Participant& place) const noexcept {
+  if (place.start_clock_ns) return next_instant(place.start_clock_ns);
+  const time_ns_t earliest = event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
+  return grid_.period_ns == 0 ? earliest : grid_.first_not_before(earliest);
+}
+
 void Task::continue_after(Participant& place) noexcept {
   const Commit& commit = *place.commit;
   const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
@@ -137,7 +144,9 @@ void Task::continue_after(Participant& place) noexcept {
   }
   const bool committed = commit.committed();
   if (committed && place.afterwards != Afterwards::stop) {
-    if (place.afterwards == Afterwards::restart) start_machine(next_instant(place.start_clock_ns));
+    if (place.afterwards == Afterwards::restart) start_machine(restart_instant(place));
+    place.grid = grid_;
+    place.grid_place_ns = grid_place_ns_;
     if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
       earlier->released.store(Participant::kSuperseded, std::memory_order_release);
       futex_wake_all(earlier->released);
@@ -146,6 +155,7 @@ void Task::continue_after(Participant& place) noexcept {
   place.armed_ns = boundary_ns_ = clock_->now_ns();
   const bool keeps_instant = !committed || place.afterwards == Afterwards::go_on;
   const std::int64_t lost = keeps_instant ? skip_lost(place, place.armed_ns) : 0;
+  place.resumes_ns = due_ns();
   trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
   if (committed && place.afterwards == Afterwards::stop) park_stopped();
 }

@@ -54,6 +54,7 @@ void Task::start_machine(time_ns_t instant_ns) noexcept {
   is_cold_ = true;
   event_settled_ = true;
   set_clock_ns(instant_ns);
+  grid_place_ns_ = 0;
   current_.store(waiting_->trace_id, std::memory_order_relaxed);
   tell_wait();
   parked_.store(0, std::memory_order_release);
@@ -69,7 +70,7 @@ void Task::release(time_ns_t actual_ns) noexcept {
   statistics_.releases.fetch_add(1, std::memory_order_relaxed);
   statistics_.wakeup.record(actual_ns - clock_ns());
   boundary_ns_ = actual_ns;
-  trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns);
+  trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns, grid_place_ns_);
   if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) pass_commit();
   left_gate_ = false;
   if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
@@ -130,6 +131,10 @@ void Task::enter_wait(const State& state) {
   next_ = state.next;
   if (state.event == nullptr) {
     set_clock_ns(clock_ns() + state.duration_ns);
+    if (const time_ns_t period = grid_.period_ns; period != 0) {
+      grid_place_ns_ += state.duration_ns % period;
+      if (grid_place_ns_ >= period) grid_place_ns_ -= period;
+    }
     trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
     if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
     return tell_wait();

@@ -10,6 +10,7 @@
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/task.hpp"
 
+#include "prefault.hpp"
 #include "thread_attributes.hpp"
 
 namespace mauve {
@@ -20,16 +21,6 @@ constexpr time_ns_t kReadyTimeout = s_to_ns(1);
 /// How long before its first release a thread wakes once: what it needs is in the caches then, and the first releases of
 /// components deployed together come closer than those of threads that wake from a long sleep (here 2 times).
 constexpr time_ns_t kWarmUp = us_to_ns(300);
-constexpr std::size_t kPrefaultedStackBytes = std::size_t{64} * 1024;
-
-/// Touches pages of the stack so that none faults later; at most half of it. (pthread_getattr_np would tell what is
-/// left, but it allocates: a 64 MiB arena of the allocator for the thread alone.)
-[[gnu::noinline]] void prefault_stack(std::size_t stack_bytes) noexcept {
-  constexpr std::size_t kPage = 4096;
-  const std::size_t size = std::min(kPrefaultedStackBytes, stack_bytes / 2);
-  auto* pages = static_cast<volatile char*>(__builtin_alloca(size));
-  for (std::size_t offset = 0; offset < size; offset += kPage) pages[offset] = 0;
-}
 
 thread_local Task* task_of_this_thread = nullptr;
 
@@ -94,7 +85,6 @@ void* Task::thread_entry(void* self) noexcept {
 
 void Task::thread_main() noexcept {
   pthread_setname_np(pthread_self(), name_.substr(0, 15).c_str());
-  prefault_stack(settings_.stack_bytes);
   task_of_this_thread = this;
   TraceRing::set_for_this_thread(ring_.get());
   prctl(PR_SET_TIMERSLACK, 1UL);  // of use where SCHED_FIFO was refused
@@ -156,6 +146,10 @@ void Task::read_back_thread() {
   pthread_attr_t attributes;
   if (pthread_getattr_np(thread_, &attributes) == 0) {
     pthread_attr_getguardsize(&attributes, &facts_.guard_bytes);
+    void* stack = nullptr;
+    std::size_t stack_bytes = 0;
+    // All of it, at its full declared length: no state of the component is to wait for a page.
+    if (pthread_attr_getstack(&attributes, &stack, &stack_bytes) == 0) prefault(stack, stack_bytes);
     pthread_attr_destroy(&attributes);
   }
   cpu_set_t cpus;

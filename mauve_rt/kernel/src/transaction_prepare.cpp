@@ -2,6 +2,7 @@
 // What a transaction makes ready before its commit, and throws away when there is none.
 #include <algorithm>
 
+#include "prefault.hpp"
 #include "transaction_work.hpp"
 
 namespace mauve {
@@ -23,24 +24,33 @@ void set_all(Shell& shell, const std::map<std::string, DraftProperty>& propertie
   }
 }
 
-/// While it lives the calling thread reads the properties of a shell as they will be.
+/// While it lives the calling thread finds the properties and the wiring of a shell as they will be.
 class Preview {
  public:
-  Preview(const Shell& shell, const std::map<std::string, DraftProperty>& properties) {
-    for (const auto& [name, property] : properties) {
-      PropertyBase* previewed = shell.find_property(name);
-      previewed->preview(property.value);
-      previewed_.push_back(previewed);
-    }
-  }
+  Preview() = default;
   ~Preview() {
-    for (PropertyBase* property : previewed_) property->end_preview();
+    for (PropertyBase* property : properties_) property->end_preview();
+    for (PortBase* port : ports_) port->end_preview();
   }
   Preview(const Preview&) = delete;
   Preview& operator=(const Preview&) = delete;
 
+  void begin(const Shell& shell, const DraftComponent& draft) {
+    for (const auto& [name, property] : draft.properties) {
+      properties_.push_back(shell.find_property(name));
+      properties_.back()->preview(property.value);
+    }
+    for (const auto& port : shell.ports()) {
+      const auto wire = draft.wires.find(port->name());
+      const bool is_wired = wire != draft.wires.end();
+      ports_.push_back(port.get());
+      port->preview(is_wired ? port->prepare(*wire->second.service, wire->second.resource) : PortConnection{});
+    }
+  }
+
  private:
-  std::vector<PropertyBase*> previewed_;
+  std::vector<PropertyBase*> properties_;
+  std::vector<PortBase*> ports_;
 };
 
 }  // namespace
@@ -67,6 +77,17 @@ void TransactionCommit::Work::prepare() {
       prepare_change(component);
     }
   }
+  prefault_parts();
+}
+
+void TransactionCommit::Work::prefault_parts() {
+  const bool has_new_parts =
+      std::any_of(changes_.begin(), changes_.end(), [](const Change& change) {
+        return change.parts != nullptr && change.draft->component->task().has_thread();
+      }) || std::any_of(prepared_added_.begin(), prepared_added_.end(), [](const DraftComponent* added) {
+        return added->component->task().has_thread();
+      });
+  if (has_new_parts) prefault_allocated();
 }
 
 void TransactionCommit::Work::prepare_resource(DraftResource& added) {
@@ -122,7 +143,8 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
       if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
     }
   }
-  const Preview preview(change.parts->shell(), draft.properties);
+  Preview preview;
+  preview.begin(change.parts->shell(), draft);
   change.parts->prepare();
 }
 
@@ -145,8 +167,8 @@ void TransactionCommit::Work::prepare_wiring(Change& change) {
 void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
                                                 ServiceBase& service) {
   if (service.resource() == nullptr) return;
-  const FsmBase& fsm = change.parts != nullptr ? change.parts->fsm() : change.draft->component->fsm();
-  for (const auto& state : fsm.states()) {
+  if (change.parts != nullptr && change.parts->restarts()) return;  // a new fsm has listened there since its prepare()
+  for (const auto& state : change.draft->component->fsm().states()) {
     if (state->event == nullptr || &state->event->port() != &port) continue;
     listener_changes_.push_back(&keep(*change.draft->component,
                                       std::make_unique<ListenerChange>(*service.resource(), *state->event)));

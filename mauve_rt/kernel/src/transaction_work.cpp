@@ -220,6 +220,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     step.missed_releases = found->second.missed_releases;
     step.phase_nominal_ns = found->second.phase_nominal_ns;
     step.phase_actual_ns = found->second.phase_actual_ns;
+    step.remark = found->second.remark;
     report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
   }
   return report;

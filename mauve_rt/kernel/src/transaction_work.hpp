@@ -40,6 +40,7 @@ class TransactionCommit::Work {
   void prepare_parts(Change& change);
   void prepare_wiring(Change& change);
   void prepare_properties(Change& change);
+  void prefault_parts();
   void prepare_listening(const Change& change, const PortBase& port, ServiceBase& service);
   // commit
   void gather();

@@ -52,7 +52,7 @@ struct ListChange {
 class Architecture final : public Configurable {
  public:
   /// With a registry, parts can be named as well as given by type.
-  explicit Architecture(PluginRegistry* registry = nullptr) : registry_(registry) {}
+  explicit Architecture(PluginRegistry* registry = nullptr);
   ~Architecture() override;
 
   std::string description() const override { return "architecture"; }

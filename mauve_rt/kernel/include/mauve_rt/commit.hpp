@@ -41,7 +41,8 @@ class CommitAction {
 /// What becomes of a component when the change is in.
 enum class Afterwards : std::uint8_t {
   go_on,    // at its pending instant; a parked one stays parked
-  restart,  // in its initial state, at the next instant of its grid; a parked one starts
+  restart,  // in its initial state, at the pending instant if that is on its new grid, else at the grid's next; a
+            // parked one starts
   stop,     // parked, its outputs written
 };
 
@@ -58,7 +59,9 @@ class Commit;
 /// | parked, pending,  | the component's thread, before it arrives       | who makes the change | the gate                 |
 /// | holds_until_ns    |                                                 |                      |                          |
 /// | overlong_ns       | who makes the change                            | component's thread   | the gate                 |
-/// | armed, lost       | the component's thread, before it lets go       | requester, after it  | the task's place         |
+/// | period            | requester, before it is posted                  | requester            | its own                  |
+/// | armed, lost, grid | the component's thread, before it lets go       | requester, after it  | the task's place         |
+/// | resumes, ..place  |                                                 |                      |                          |
 /// | release_*         | the component's thread, before released         | requester, after it  | through released         |
 /// | released (futex)  | the component's thread                          | requester            | release/acquire          |
 struct Participant {
@@ -84,6 +87,10 @@ struct Participant {
   time_ns_t parked_ns{0};
   time_ns_t armed_ns{0};
   time_ns_t pending_ns{0};  // the instant pending at the park; 0: the component was parked already
+  time_ns_t period_ns{0};   // g before the change
+  Grid grid{};              // after it
+  time_ns_t resumes_ns{0};  // the instant that it goes on at
+  time_ns_t grid_place_ns{0};  // where that belongs within a period (Task::grid_place_ns_)
 
   time_ns_t release_nominal_ns{0};  // of the release that follows
   time_ns_t release_actual_ns{0};

@@ -25,6 +25,7 @@ struct StepReport {
   std::int64_t missed_releases{0};
   time_ns_t phase_nominal_ns{0};
   time_ns_t phase_actual_ns{kNotMeasured};
+  std::string remark{};  // why releases were missed; empty when none was
 };
 
 struct CommitTimeouts {

@@ -31,7 +31,7 @@ class LatestValue final : public NewestResource {
   explicit LatestValue(std::uint32_t max_readers = kDefaultMaxReaders)
       : NewestResource("latest_value", type_name<T>()),
         max_readers_(checked(max_readers)),
-        register_(max_readers + 1) {
+        register_(max_readers + 2) {
     offer(read);
     offer(write);
   }
@@ -106,7 +106,7 @@ class LatestValue final : public NewestResource {
   }
 
   std::uint32_t max_readers_;
-  LatestRegister<T> register_;  // one reader more: the serialized face
+  LatestRegister<T> register_;  // two readers more: the serialized face, and a port that is previewed
   PiMutex write_mutex_;
   PiMutex serial_mutex_;
 

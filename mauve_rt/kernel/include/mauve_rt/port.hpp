@@ -29,6 +29,8 @@ class ReadPort final : public PortBase {
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
   Sample<T> read() noexcept {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<ReadPort>().read_once();
     Sample<T> sample = find();
     status_ = sample.status;
     reader_.time_ns = sample.time_ns;
@@ -36,6 +38,8 @@ class ReadPort final : public PortBase {
   }
   /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
   DataStatus read(T& value, time_ns_t* time_ns = nullptr) noexcept {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<ReadPort>().read_once(value, time_ns);
     time_ns_t time = reader_.time_ns;
     status_ = find(value, time);
     reader_.time_ns = time;
@@ -44,9 +48,13 @@ class ReadPort final : public PortBase {
   }
 
   /// What the last read found, without reading; none before the first one. [rt]
-  DataStatus status() const noexcept { return status_; }
+  DataStatus status() const noexcept { return is_previewed() ? stand_in<ReadPort>().status_ : status_; }
   /// How old what the last read found is by the component's clock; 0 when there was nothing. [rt]
-  time_ns_t age_ns() const noexcept { return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns; }
+  time_ns_t age_ns() const noexcept {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<ReadPort>().age_ns();
+    return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns;
+  }
 
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
@@ -67,8 +75,22 @@ class ReadPort final : public PortBase {
     reader_ = {};
     status_ = DataStatus::none;
   }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<ReadPort>(name(), default_);
+  }
 
  private:
+  /// A stand-in's read keeps nothing of the service: it is one reader more than that may be made for.
+  template <typename... Place>
+  auto read_once(Place&&... place) noexcept {
+    const auto found = read(std::forward<Place>(place)...);
+    if (service_ == nullptr) return found;
+    const ReaderState known = reader_;
+    service_->let_go(reader_);
+    reader_.seen = known.seen;
+    reader_.time_ns = known.time_ns;
+    return found;
+  }
   Sample<T> find() noexcept {
     if constexpr (std::is_trivially_copyable_v<T>) {
       if (latest_ != nullptr) return latest_->sample(default_, reader_);
@@ -105,7 +127,7 @@ class WritePort final : public PortBase {
 
   /// False when the resource had no room. [rt]
   bool write(const T& value) noexcept {
-    if (service_ == nullptr || is_closed()) return true;
+    if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(value, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
     if (is_closed() && output_.on_stop == OutputPolicy::set_zero) write_zero();
@@ -127,6 +149,9 @@ class WritePort final : public PortBase {
     return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
   }
   void attach(ServiceBase* service) noexcept override { service_ = static_cast<WriteService<T>*>(service); }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<WritePort>(name(), output_);
+  }
 
  private:
   WriteService<T>* service_{nullptr};
@@ -147,6 +172,8 @@ class CallPort<R(Args...)> final : public PortBase {
   /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected, which only a port that
   /// belongs to no component can be.
   R operator()(Args... args) {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<CallPort>()(std::forward<Args>(args)...);
     if (service_ == nullptr) throw std::logic_error("call port '" + name() + "' is not connected");
     const ServiceSpan span(trace_id());
     return service_->call(std::forward<Args>(args)...);
@@ -158,6 +185,9 @@ class CallPort<R(Args...)> final : public PortBase {
   }
   void attach(ServiceBase* service) noexcept override {
     service_ = static_cast<CallService<R(Args...)>*>(service);
+  }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<CallPort>(name(), type());
   }
 
  private:
@@ -175,7 +205,7 @@ class EventPort final : public PortBase {
   }
   /// [rt]
   void raise() noexcept {
-    if (service_ != nullptr && !is_closed()) service_->raise(stamp_ns());
+    if (service_ != nullptr && !is_closed() && !is_previewed()) service_->raise(stamp_ns());
   }
 
  protected:
@@ -183,6 +213,7 @@ class EventPort final : public PortBase {
     return dynamic_cast<const EventService*>(&service) != nullptr;
   }
   void attach(ServiceBase* service) noexcept override { service_ = static_cast<EventService*>(service); }
+  std::unique_ptr<PortBase> make_stand_in() const override { return std::make_unique<EventPort>(name()); }
 
  private:
   EventService* service_{nullptr};

@@ -2,7 +2,10 @@
 // What all ports are, whatever they carry: a name, a kind, a type, and one connection that can be exchanged.
 #pragma once
 
+#include <pthread.h>
+
 #include <atomic>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,6 +49,8 @@ struct ConnectedTo {
 /// | context_    | [setup]                        | component                 | -                                    |
 /// | optional_   | [setup]                        | any                       | -                                    |
 /// | closed_     | the watchdog                   | component                 | release/acquire: its zeros stay last |
+/// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
+/// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
 class PortBase {
  public:
   PortBase(std::string name, PortKind kind, std::string type)
@@ -65,10 +70,10 @@ class PortBase {
   bool is_required() const noexcept { return kind_ == PortKind::call || !optional_; }
   /// Lets it go unconnected; a call port stays required. [setup]
   void make_optional() noexcept { optional_ = true; }
-  bool is_connected() const noexcept { return connection_.service != nullptr; }
+  bool is_connected() const noexcept { return connection().service != nullptr; }
   /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
-  ServiceBase* service() const noexcept { return connection_.service; }
-  const std::string& resource_name() const noexcept { return connection_.resource; }
+  ServiceBase* service() const noexcept { return connection().service; }
+  const std::string& resource_name() const noexcept { return connection().resource; }
   /// Where it leads to, also while that is being changed. [non-rt]
   ConnectedTo connected_to() const;
 
@@ -87,6 +92,12 @@ class PortBase {
   /// [non-rt] The component is parked.
   void disconnect() noexcept;
   void set_context(const Context* context) noexcept { context_ = context; }
+
+  /// Until end_preview() the calling thread has a port of its own in place of this one, connected as told; all others
+  /// have the present one. So the parts that a transaction puts in are configured with the wiring that it makes. What
+  /// that thread writes or raises goes nowhere: until the commit nothing is changed. [non-rt]
+  void preview(const PortConnection& connection);
+  void end_preview() noexcept;
 
   /// Writes the type's default value; a port that is no write port does nothing. [rt]
   virtual void write_zero() noexcept {}
@@ -108,6 +119,18 @@ class PortBase {
   virtual bool fits(const ServiceBase& service) const noexcept = 0;
   /// Lets go of the old service and takes the new one, which fits, or none. [rt]
   virtual void attach(ServiceBase* service) noexcept = 0;
+  /// Another port of this type, for a preview; not connected.
+  virtual std::unique_ptr<PortBase> make_stand_in() const = 0;
+  bool is_previewed() const noexcept {
+    // Relaxed: only the thread that stored its own id here finds it, and that one has made the stand-in itself.
+    const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
+    return previewer != kNobody && pthread_equal(previewer, pthread_self()) != 0;
+  }
+  /// The port that the previewing thread has in place of this one.
+  template <typename Port>
+  Port& stand_in() const noexcept {
+    return static_cast<Port&>(*stand_in_);
+  }
   std::uint32_t trace_id() const noexcept { return connection_.trace_id; }
   /// Component's logical clock, or the real one outside of any. [rt]
   time_ns_t stamp_ns() const noexcept {
@@ -116,6 +139,12 @@ class PortBase {
   bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire); }
 
  private:
+  static constexpr pthread_t kNobody{};  // as glibc never calls a thread
+
+  const PortConnection& connection() const noexcept {
+    return is_previewed() ? stand_in_->connection_ : connection_;
+  }
+
   std::string name_;
   PortKind kind_;
   std::string type_;
@@ -124,6 +153,8 @@ class PortBase {
   const Context* context_{nullptr};
   bool optional_{false};
   std::atomic<bool> closed_{false};
+  std::unique_ptr<PortBase> stand_in_;
+  std::atomic<pthread_t> previewer_{kNobody};
 };
 
 }  // namespace mauve

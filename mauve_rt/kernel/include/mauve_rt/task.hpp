@@ -44,7 +44,7 @@ struct TaskSettings {
   time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
   OverrunPolicy overrun{OverrunPolicy::skip};
   std::int64_t max_backlog{10};
-  std::size_t stack_bytes{std::size_t{512} * 1024};  // of which the first 64 KiB are prefaulted
+  std::size_t stack_bytes{std::size_t{512} * 1024};  // prefaulted whole: it is held in memory
   std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
   time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
 };
@@ -124,7 +124,7 @@ class Task {
   /// Whether the core that runs is the fallback. [rt]
   bool has_fallen_back() const noexcept { return fallen_back_.load(std::memory_order_acquire); }
 
-  /// Creates the thread, which prefaults its stack, reads back its rights and meets the barrier (if any), then parks.
+  /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
   /// when told so.
   void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace);
@@ -253,6 +253,7 @@ class Task {
   void post_start(time_ns_t instant_ns) noexcept;
   void order_stop();
   time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
+  time_ns_t restart_instant(const Participant& place) const noexcept;
   void begin_trace(bool trace);
 
   // the thread
@@ -295,8 +296,8 @@ class Task {
              std::int64_t c = 0) noexcept {
     if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
   }
-  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
-                std::int64_t c = 0) noexcept {
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0,
+                std::int64_t b = 0, std::int64_t c = 0) noexcept {
     if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
   }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
@@ -355,6 +356,7 @@ class Task {
   bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
   time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
   int deferrals_{0};            // releases a commit was put off for want of time
+  time_ns_t grid_place_ns_{0};  // where the instant pending belongs: the waits since the initial state, modulo g
   bool is_cold_{false};         // started, and not woken ahead of its first release yet
   bool left_gate_{false};       // it came to the gate in this wait, and left for its instant
   bool is_abandoned_{false};    // what it did or waited for at the gate lasted too long
