@@ -32,9 +32,11 @@ class Simulated : public ::testing::Test {
   static TestCore& core(Component& component) { return component.core_as<TestCore>(); }
   void deploy() {
     architecture.configure();
-    simulation.add(architecture);
+    host_ = &simulation.add(architecture);
     simulation.deploy();
   }
+  /// Once deployed.
+  SimulatedHost& host() const { return *host_; }
   /// Lets this much time pass after the epoch, all in all.
   void run_to(time_ns_t after_epoch_ns) { simulation.run_until(simulation.epoch_ns() + after_epoch_ns); }
   /// A component's activations: its logical clock at each, in ms after the epoch.
@@ -47,6 +49,9 @@ class Simulated : public ::testing::Test {
 
   Architecture architecture;
   Simulation simulation;
+
+ private:
+  SimulatedHost* host_{nullptr};
 };
 
 }  // namespace mauve::testing

@@ -164,10 +164,10 @@ TEST_F(RequiredPorts, NoTransactionLeavesOneUnconnectedInVirtualTime) {
   connect_all();
   architecture_.configure();
   Simulation simulation;
-  simulation.add(architecture_);
+  SimulatedHost& host = simulation.add(architecture_);
   simulation.deploy();
   simulation.run_until(simulation.now_ns() + ms_to_ns(10));
-  try_transactions([&](Transaction change) { simulation.commit(architecture_, std::move(change)); });
+  try_transactions([&](Transaction change) { host.commit(std::move(change)); });
   const int before = core().answers;
   simulation.run_until(simulation.now_ns() + ms_to_ns(10));
   EXPECT_GT(core().answers, before);

@@ -86,7 +86,7 @@ TEST_F(Rule11Fallback, ItsOwnFaultIsFinal) {
   EXPECT_EQ(ComponentState::faulted, component.task().state());
   EXPECT_TRUE(component.task().is_parked());
   EXPECT_EQ("nor this", component.task().fault().what);
-  EXPECT_THROW(simulation.start(architecture, "c"), Error);
+  EXPECT_THROW(host().start("c"), Error);
   EXPECT_EQ(2, fallback->runs);
 }
 
@@ -94,12 +94,12 @@ TEST_F(Rule11Fallback, CleanupAndConfigureGiveTheDeclaredCoreAnotherChance) {
   Component& component = add_guarded();
   deploy();
   run_to(ms_to_ns(45));
-  simulation.stop(architecture, "c");
+  host().stop("c");
   component.cleanup();
   component.configure();
   EXPECT_EQ("t/Declared", component.shown().core);
   EXPECT_EQ("", component.task().fault().what);
-  simulation.start(architecture, "c");
+  host().start("c");
   run_to(ms_to_ns(55));
   EXPECT_EQ(4.0, newest(out));
   EXPECT_FALSE(component.task().has_fallen_back());
@@ -116,7 +116,7 @@ TEST_F(Rule11Fallback, ACoreThatReplacesItIsGuardedByItAgain) {
   };
   Transaction change;
   change.replace_core("c", std::move(another));
-  simulation.commit(architecture, std::move(change));
+  host().commit(std::move(change));
   EXPECT_FALSE(component.task().has_fallen_back());
   EXPECT_EQ("t/Another", component.shown().core);
   fallback->instants.clear();
@@ -133,7 +133,7 @@ TEST_F(Rule11Fallback, ItFitsANewFsmToo) {
   run_to(ms_to_ns(5));
   Transaction change;
   change.replace_fsm("c", std::make_unique<FreeFsm>(varying({0}, ms_to_ns(3))));
-  simulation.commit(architecture, std::move(change));
+  host().commit(std::move(change));
   run_to(ms_to_ns(20));
   EXPECT_TRUE(component.task().has_fallen_back());
   EXPECT_THAT(instants_ms(component), ElementsAre(13, 16, 19)) << "1, 7 and 10 were the declared core's";
@@ -146,7 +146,7 @@ TEST_F(Rule11Fallback, AnFsmReplacedUnderItKeepsIt) {
   ASSERT_TRUE(component.task().has_fallen_back());
   Transaction change;
   change.replace_fsm("c", std::make_unique<FreeFsm>(varying({0}, ms_to_ns(3))));
-  simulation.commit(architecture, std::move(change));
+  host().commit(std::move(change));
   fallback->instants.clear();
   run_to(ms_to_ns(38));
   EXPECT_THAT(instants_ms(component), ElementsAre(34, 37));
@@ -178,7 +178,7 @@ TEST_F(Rule11Fallback, PartsThatItDoesNotSuitAreRefused) {
       .replace_fsm("c", std::make_unique<OtherFsm>())
       .replace_core("c", std::make_unique<OtherCore>());
   try {
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
     FAIL() << "the component would have lost its fallback unnoticed";
   } catch (const Error& error) {
     EXPECT_EQ(ErrorCode::prepare_failed, error.code());

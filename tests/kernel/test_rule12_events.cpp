@@ -165,7 +165,7 @@ TEST_F(Rule12Events, ARewiredPortListensToItsNewResourceOnly) {
   simulation.at(simulation.epoch_ns() + ms_to_ns(10), [&] {
     Transaction change;
     change.disconnect("c", "input").connect("c", "input", "y", "read");
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
   });
   write_at(5, x);
   write_at(12, x);
@@ -173,7 +173,7 @@ TEST_F(Rule12Events, ARewiredPortListensToItsNewResourceOnly) {
   simulation.at(simulation.epoch_ns() + ms_to_ns(15), [&] {
     Transaction change;
     change.disconnect("c", "input").remove_resource("y");
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
   });
   run_to(ms_to_ns(40));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 5, 14, 34))
@@ -199,7 +199,7 @@ TEST_F(Rule12Events, ARewiredPortMissesNothingFromItsCommitOn) {
     fresh->instants.reserve(10);
     Transaction change;
     change.disconnect("c", "input").connect("c", "input", "y", "read").replace_core("c", std::move(fresh));
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
   });
   run_to(ms_to_ns(15));
   EXPECT_THAT(instants_ms(component), ElementsAre(10)) << "the timeout would have come at 20";
@@ -212,8 +212,8 @@ TEST_F(Rule12Events, AreNoPeriodNorPhase) {
   EXPECT_TRUE(component.fsm().is_sporadic());
   EXPECT_EQ(0, component.task().grid().period_ns);
   simulation.at(simulation.epoch_ns() + ms_to_ns(7), [this] {
-    simulation.stop(architecture, "c");
-    simulation.start(architecture, "c");
+    host().stop("c");
+    host().start("c");
   });
   run_to(ms_to_ns(10));
   EXPECT_THAT(instants_ms(component), ElementsAre(2, 7.200001))

@@ -101,7 +101,7 @@ TEST_F(Rule3Grid, InitialStatesInstantsAreEpochAndOffsetAndMultiplesOfThePeriod)
   EXPECT_EQ(ms_to_ns(10), component.task().grid().period_ns);
   run_to(ms_to_ns(34));
   EXPECT_THAT(instants_ms(component), ElementsAre(4, 14, 24, 34));
-  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(34), simulation.get_time(architecture, "c"));
+  EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(34), host().get_time("c"));
   const auto deployed = records_of(architecture.drain_trace(), TraceKind::deployment);
   ASSERT_EQ(1U, deployed.size());
   EXPECT_EQ(simulation.epoch_ns(), deployed[0].a);
@@ -113,8 +113,8 @@ TEST_F(Rule3Grid, ADeclaredDivisorMakesItFiner) {
   Component& component = add("c", 10, 0.0, {.offset_ns = ms_to_ns(1), .period_ns = ms_to_ns(5)});
   deploy();
   simulation.at(simulation.epoch_ns() + ms_to_ns(12), [this] {
-    simulation.stop(architecture, "c");
-    simulation.start(architecture, "c");
+    host().stop("c");
+    host().start("c");
   });
   run_to(ms_to_ns(26));
   EXPECT_THAT(instants_ms(component), ElementsAre(1, 11, 16, 26)) << "it starts again on epoch + 1 + k * 5";

@@ -32,7 +32,7 @@ TEST_F(Rule5Epoch, AComponentAddedLaterJoinsIt) {
         "later", {.settings = {.offset_ns = us_to_ns(500)},
                   .properties = {{"period_ms", std::int64_t{4}}, {"gain", 0.0}}});
     change.start("later");
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
     core(architecture.component("later")).instants.reserve(100);
   });
   run_to(ms_to_ns(21));
@@ -51,7 +51,7 @@ TEST_F(Rule5Epoch, AComponentAddedBeforeItWaitsForIt) {
   change.add_component<TestShell, TestCore, BudgetFsm>(
       "early", {.properties = {{"period_ms", std::int64_t{6}}, {"gain", 0.0}}});
   change.start("early");
-  simulation.commit(architecture, std::move(change));
+  host().commit(std::move(change));
   core(architecture.component("early")).instants.reserve(100);
   run_to(ms_to_ns(7));
   for (const double instant : instants_ms(architecture.component("early")))

@@ -17,10 +17,10 @@ TEST_F(Rule6Simulated, StartsAtTheFirstInstantLaterThanTheMargin) {
   Component& component = add("c", 10, 0.0, {.offset_ns = ms_to_ns(3)});
   deploy();
   const time_ns_t epoch = simulation.epoch_ns();
-  simulation.at(epoch + ms_to_ns(4), [this] { simulation.stop(architecture, "c"); });
-  simulation.at(epoch + ms_to_ns(23) - kMargin - 1, [this] { simulation.start(architecture, "c"); });
-  simulation.at(epoch + ms_to_ns(24), [this] { simulation.stop(architecture, "c"); });
-  simulation.at(epoch + ms_to_ns(43) - kMargin, [this] { simulation.start(architecture, "c"); });
+  simulation.at(epoch + ms_to_ns(4), [this] { host().stop("c"); });
+  simulation.at(epoch + ms_to_ns(23) - kMargin - 1, [this] { host().start("c"); });
+  simulation.at(epoch + ms_to_ns(24), [this] { host().stop("c"); });
+  simulation.at(epoch + ms_to_ns(43) - kMargin, [this] { host().start("c"); });
   run_to(ms_to_ns(65));
   EXPECT_THAT(instants_ms(component), ElementsAre(3, 23, 53, 63)) << "43 is not later than now + 200 us";
 }
@@ -30,8 +30,8 @@ TEST_F(Rule6Simulated, StartOnAnotherClockTakesItsGrid) {
   deploy();
   const time_ns_t clock = simulation.epoch_ns() + ms_to_ns(2);
   simulation.at(simulation.epoch_ns() + ms_to_ns(5), [=, this] {
-    simulation.stop(architecture, "c");
-    simulation.start(architecture, "c", clock);
+    host().stop("c");
+    host().start("c", clock);
   });
   run_to(ms_to_ns(33));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 12, 22, 32));
@@ -44,13 +44,13 @@ TEST_F(Rule6Simulated, GivesUpThePositionAndTellsTheTimeOfTheInitialState) {
   deploy();
   const time_ns_t epoch = simulation.epoch_ns();
   simulation.at(epoch + ms_to_ns(15), [&] {
-    EXPECT_EQ(epoch, simulation.get_time(architecture, "c")) << "Run1 at 10 is not the initial state";
-    simulation.stop(architecture, "c");
-    simulation.start(architecture, "c");
+    EXPECT_EQ(epoch, host().get_time("c")) << "Run1 at 10 is not the initial state";
+    host().stop("c");
+    host().start("c");
   });
   run_to(ms_to_ns(30));
   EXPECT_THAT(entered, ElementsAre("Run0", "Run1", "Run0", "Run1"));
-  EXPECT_EQ(epoch + ms_to_ns(20), simulation.get_time(architecture, "c"));
+  EXPECT_EQ(epoch + ms_to_ns(20), host().get_time("c"));
 }
 
 TEST_F(Rule6Simulated, AtThousandsOfRandomInstantsActsWhereTheRuleSays) {
@@ -64,9 +64,9 @@ TEST_F(Rule6Simulated, AtThousandsOfRandomInstantsActsWhereTheRuleSays) {
   time_ns_t now = simulation.epoch_ns();
   const auto later = [&] { return now += static_cast<time_ns_t>(1 + random() % ms_to_ns(20)); };
   for (int i = 0; i < 2'000; ++i) {
-    simulation.at(later(), [&] { simulation.stop(architecture, "c"); });
+    simulation.at(later(), [&] { host().stop("c"); });
     for (time_ns_t instant = from; instant < now; instant += grid.period_ns) expected.push_back(instant);
-    simulation.at(later(), [&] { simulation.start(architecture, "c"); });
+    simulation.at(later(), [&] { host().start("c"); });
     from = grid.first_not_before(now + kMargin + 1);
   }
   core(component).instants.reserve(2 * expected.size());

@@ -58,7 +58,7 @@ TEST_F(Rule7Simulated, ThousandsOfCommitsAtRandomInstantsChangeNothingOfTheRhyth
       Transaction change;
       if (i % 2 == 0) change.replace_core("c", std::make_unique<NotingCore>());
       if (i % 2 == 1) change.set_property("c", "gain", static_cast<double>(i % 10));
-      simulation.commit(architecture, std::move(change));
+      host().commit(std::move(change));
       ++commits;
     });
   }
@@ -82,7 +82,7 @@ TEST_F(Rule7Simulated, ANewFsmStartsInItsInitialStateOnItsOwnPeriod) {
   simulation.at(simulation.epoch_ns() + ms_to_ns(11), [this] {
     Transaction change;
     change.replace_fsm("c", std::make_unique<FreeFsm>(varying({0, 0}, ms_to_ns(4))));
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
   });
   run_to(ms_to_ns(21));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 10, 12, 16, 20)) << "the first multiple of 4 after 11";
@@ -102,7 +102,7 @@ TEST_F(Rule7Simulated, RewiringKeepsTheInstantToo) {
   simulation.at(simulation.epoch_ns() + ms_to_ns(15), [this] {
     Transaction change;
     change.disconnect("c", "output").connect("c", "output", "y", "write");
-    simulation.commit(architecture, std::move(change));
+    host().commit(std::move(change));
   });
   run_to(ms_to_ns(30));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 10, 20, 30));

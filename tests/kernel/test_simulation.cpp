@@ -65,8 +65,8 @@ TEST_F(Rule13Simulation, CallbacksComeBeforeTheTasksOfTheirInstant) {
 TEST_F(Rule13Simulation, StopAndStartKeepTheGrid) {
   Component& component = add("c", 5);
   deploy();
-  simulation.at(simulation.epoch_ns() + ms_to_ns(7), [this] { simulation.stop(architecture, "c"); });
-  simulation.at(simulation.epoch_ns() + ms_to_ns(13), [this] { simulation.start(architecture, "c"); });
+  simulation.at(simulation.epoch_ns() + ms_to_ns(7), [this] { host().stop("c"); });
+  simulation.at(simulation.epoch_ns() + ms_to_ns(13), [this] { host().start("c"); });
   run_to(ms_to_ns(21));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 5, 15, 20));
 }
@@ -82,7 +82,7 @@ TEST_F(Rule13Simulation, ATransactionTakesEffectWithinTheWaits) {
   simulation.at(simulation.epoch_ns() + ms_to_ns(6), [&] {
     Transaction change;
     change.replace_core("changed", std::move(fresh)).set_property("kept", "gain", 0.0).stop("kept");
-    report = simulation.commit(architecture, std::move(change));
+    report = host().commit(std::move(change));
   });
   run_to(ms_to_ns(12));
   EXPECT_EQ(ComponentState::stopped, kept.task().state());
@@ -149,7 +149,7 @@ std::vector<TraceRecord> random_run(std::uint64_t seed) {
   }
   architecture.configure();
   Simulation simulation;
-  simulation.add(architecture);
+  SimulatedHost& host = simulation.add(architecture);
   simulation.deploy();
   simulation.every(simulation.epoch_ns() + ms_to_ns(10), ms_to_ns(7), [&] {
     const std::string name = "c" + std::to_string(random() % 8);
@@ -159,7 +159,7 @@ std::vector<TraceRecord> random_run(std::uint64_t seed) {
     } else {
       change.start(name);
     }
-    simulation.commit(architecture, std::move(change));
+    host.commit(std::move(change));
   });
   simulation.run_until(simulation.epoch_ns() + ms_to_ns(300));
   return architecture.drain_trace().records;

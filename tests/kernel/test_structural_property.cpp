@@ -156,18 +156,18 @@ TEST(StructuralCore, APropertyOfTwoPartsNeedsBoth) {
   Simulation simulation;
   architecture.add_component<SizedShell, SizedCore, SizedFsm>("c");
   architecture.configure();
-  simulation.add(architecture);
+  SimulatedHost& host = simulation.add(architecture);
   simulation.deploy();
   Transaction one;
   one.replace_core("c", std::make_unique<SizedCore>()).set_property("c", "label", "large");
-  const Error error = refusal_of([&] { simulation.commit(architecture, std::move(one)); });
+  const Error error = refusal_of([&] { host.commit(std::move(one)); });
   EXPECT_EQ(ErrorCode::structural_property, error.code());
   EXPECT_EQ("a replacement of the fsm in the same transaction", error.detail().expected);
   EXPECT_EQ(2, error.detail().step);
   Transaction both;
   both.replace_core("c", std::make_unique<SizedCore>()).replace_fsm("c", std::make_unique<SizedFsm>());
   both.set_property("c", "label", "large");
-  simulation.commit(architecture, std::move(both));
+  host.commit(std::move(both));
   EXPECT_EQ("large", architecture.component("c").shell_as<SizedShell>().label.value());
 }
 
@@ -180,10 +180,10 @@ TEST_F(StructuralSimulation, TheInstantsFollowTheNewFsm) {
   Transaction alone;
   alone.set_property("c", "period_ms", 5);
   EXPECT_EQ(ErrorCode::structural_property,
-            refusal_of([&] { simulation.commit(architecture, std::move(alone)); }).code());
+            refusal_of([&] { host().commit(std::move(alone)); }).code());
   Transaction beside;
   beside.set_property("c", "period_ms", 5).replace_fsm("c", std::make_unique<BudgetFsm>());
-  simulation.commit(architecture, std::move(beside));
+  host().commit(std::move(beside));
   run_to(ms_to_ns(15));
   EXPECT_THAT(instants_ms(component), ElementsAre(0, 2, 5, 10, 15));
 }
@@ -198,7 +198,7 @@ TEST_F(StructuralSimulation, AFallbackIsConfiguredWithItToo) {
   EXPECT_EQ(4U, fallback->room.size());
   Transaction change;
   change.set_property("c", "size", 9).replace_core("c", std::make_unique<SizedCore>());
-  simulation.commit(architecture, std::move(change));
+  host().commit(std::move(change));
   EXPECT_EQ(9U, fallback->room.size());
 }
 

@@ -5,7 +5,9 @@
 
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
+#include "mauve_rt/host.hpp"
 #include "mauve_rt/plugin.hpp"
+#include "mauve_rt/transaction_commit.hpp"
 
 #include "lookup.hpp"
 #include "prefault.hpp"
@@ -22,12 +24,6 @@ std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, c
   return nullptr;
 }
 
-void require_new(bool known, const std::string& what, const std::string& name) {
-  if (!known) return;
-  throw Error(ErrorCode::duplicate_name, "the name is taken",
-              {.element = what + " " + name, .remedy = "give each " + what + " a name of its own"});
-}
-
 }  // namespace
 
 Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
@@ -37,9 +33,73 @@ Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
 Architecture::~Architecture() {
   for (const auto& component : components_) {
     component->task().end_thread(kForever);
-    component->task().changes().set_listener(nullptr);
+    component->set_architecture(nullptr);
   }
-  cleanup();
+  Configurable::cleanup();
+}
+
+void Architecture::configure() {
+  const auto change = change_lock_.join();
+  Configurable::configure();
+}
+
+void Architecture::cleanup() {
+  const auto change = change_lock_.join();
+  Configurable::cleanup();
+}
+
+std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
+                                                      const TransactionOptions& options) {
+  const std::lock_guard change(change_lock_);
+  Host* host = nullptr;
+  std::unique_lock<std::mutex> use;
+  {
+    const std::lock_guard lock(host_mutex_);
+    host = host_;
+    if (host != nullptr) use = host->use();  // only its end waits for that
+  }
+  auto work = std::make_unique<TransactionCommit>(*this, host, options);
+  work->make(std::move(transaction));
+  return work;
+}
+
+TransactionReport Architecture::commit(Transaction transaction, const TransactionOptions& options) {
+  return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
+}
+
+std::unique_ptr<TransactionCommit> Architecture::make_one(Transaction transaction,
+                                                          const CommitTimeouts& timeouts) {
+  try {
+    return make(std::move(transaction), {.timeouts = timeouts});
+  } catch (const Error& failure) {  // who asked for one thing needs no number for it
+    ErrorDetail detail = failure.detail();
+    detail.step = 0;
+    detail.step_name.clear();
+    throw Error(failure.code(), failure.statement(), detail);
+  }
+}
+
+StepReport Architecture::commit_one(Transaction transaction, const CommitTimeouts& timeouts) {
+  return make_one(std::move(transaction), timeouts)->report(timeouts.phase_ns).steps.front();
+}
+
+Host* Architecture::host() const {
+  const std::lock_guard lock(host_mutex_);
+  return host_;
+}
+
+void Architecture::set_host(Host& host) {
+  const std::lock_guard lock(host_mutex_);
+  if (host_ != nullptr) {
+    throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
+                {.expected = "an architecture that nobody runs", .remedy = "shut its host down first"});
+  }
+  host_ = &host;
+}
+
+void Architecture::release_host(const Host& host) noexcept {
+  const std::lock_guard lock(host_mutex_);
+  if (host_ == &host) host_ = nullptr;
 }
 
 PluginRegistry& Architecture::require_registry() const {
@@ -51,63 +111,42 @@ PluginRegistry& Architecture::require_registry() const {
 Component& Architecture::add_component(const std::string& name, std::unique_ptr<Shell> shell,
                                        std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
                                        const TaskSettings& settings, Component::FsmFactory make_fsm) {
-  require_new(find_in(components(), name) != nullptr, "component", name);
-  const std::size_t numbers_before = numbers();
-  std::shared_ptr<Component> component = make_unlisted(name);
-  try {
-    component->set_settings(settings);
-  } catch (const Error&) {
-    give_back_numbers(numbers_before);
-    throw;
-  }
-  component->set_parts({.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)},
-                       std::move(make_fsm));
-  change_lists({.added_components = {component}});
-  return *component;
+  Parts parts{.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)};
+  commit_one(
+      std::move(Transaction().add_component(name, std::move(parts), {.settings = settings}, make_fsm)));
+  return component(name);
 }
 
 Component& Architecture::add_component(const std::string& name, const std::string& shell,
                                        const std::string& core, const std::string& fsm,
                                        const TaskSettings& settings) {
-  const PluginRegistry& registry = require_registry();
-  return add_component(name, registry.make_shell(shell), registry.make_core(core), registry.make_fsm(fsm),
-                       settings, [&registry, fsm] { return registry.make_fsm(fsm); });
+  commit_one(std::move(
+      Transaction().add_component(name, {.shell = shell, .core = core, .fsm = fsm, .settings = settings})));
+  return component(name);
 }
 
 void Architecture::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
-  require_new(find_in(resources(), name) != nullptr, "resource", name);
-  resource->set_name(name);
-  prepare_outward(*resource, TopicBinding::none);
-  change_lists({.added_resources = {std::move(resource)}});
+  commit_one(std::move(Transaction().add_resource(name, std::move(resource))));
 }
 
-void Architecture::connect(Component& component, const std::string& port_name, Resource& resource,
-                           const std::string& service_name) {
-  PortBase& port = find_port(component.shell(), port_name, component.name());
-  if (port.is_connected()) {
-    throw Error(ErrorCode::duplicate_name, "the port is connected already",
-                {.component = component.name(),
-                 .element = "port " + port_name,
-                 .found = "a connection to " + port.resource_name() + "." + port.service()->name(),
-                 .remedy = "connect each port once"});
-  }
-  ServiceBase& service = find_service(resource, service_name, component.name(), port_name);
-  try {
-    port.connect(service, resource.name());
-  } catch (const Error& failure) {
-    ErrorDetail detail = failure.detail();
-    detail.component = component.name();
-    throw Error(failure.code(), failure.statement(), detail);
-  }
+void Architecture::connect(Component& component, const std::string& port, Resource& resource,
+                           const std::string& service) {
+  connect(component.name(), port, resource.name(), service);
 }
 
-void Architecture::connect(const std::string& component_name, const std::string& port,
-                           const std::string& resource_name, const std::string& service) {
-  connect(component(component_name), port, resource(resource_name), service);
+void Architecture::connect(const std::string& component, const std::string& port, const std::string& resource,
+                           const std::string& service) {
+  commit_one(std::move(Transaction().connect(component, port, resource, service)), {.phase_ns = 0});
 }
 
 void Architecture::publish(const std::string& name) {
+  const std::lock_guard change(change_lock_);
   prepare_outward(resource(name), TopicBinding::publish);
+}
+
+void Architecture::subscribe(const std::string& name) {
+  const std::lock_guard change(change_lock_);
+  resource(name).bind_input();
 }
 
 void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
@@ -132,15 +171,25 @@ std::vector<std::shared_ptr<Resource>> Architecture::resources() const {
 }
 
 std::shared_ptr<Component> Architecture::hold_component(const std::string& name) const {
-  const auto present = components();
-  if (auto found = find_in(present, name)) return found;
-  throw_no_component(name, present);
+  const std::lock_guard lock(list_mutex_);
+  if (auto found = find_in(components_, name)) return found;
+  throw_no_component(name, components_);
 }
 
 std::shared_ptr<Resource> Architecture::hold_resource(const std::string& name) const {
-  const auto present = resources();
-  if (auto found = find_in(present, name)) return found;
-  throw_no_resource(name, present);
+  const std::lock_guard lock(list_mutex_);
+  if (auto found = find_in(resources_, name)) return found;
+  throw_no_resource(name, resources_);
+}
+
+std::shared_ptr<Component> Architecture::find_component(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  return find_in(components_, name);
+}
+
+std::shared_ptr<Resource> Architecture::find_resource(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  return find_in(resources_, name);
 }
 
 Component& Architecture::component(const std::string& name) const { return *hold_component(name); }

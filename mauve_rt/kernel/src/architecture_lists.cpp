@@ -22,6 +22,7 @@ struct Member {
 
 template <typename Item>
 void take_out(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::shared_ptr<Item>>& gone) {
+  if (gone.empty()) return;
   std::erase_if(
       items, [&gone](const auto& item) { return std::find(gone.begin(), gone.end(), item) != gone.end(); });
 }
@@ -59,12 +60,12 @@ void Architecture::give_back_numbers(std::size_t numbers) {
 void Architecture::change_lists(const ListChange& change) {
   {
     const std::lock_guard lock(list_mutex_);
-    for (const auto& component : change.removed_components) component->task().changes().set_listener(nullptr);
+    for (const auto& component : change.removed_components) component->set_architecture(nullptr);
     take_out(components_, change.removed_components);
     take_out(resources_, change.removed_resources);
     append(resources_, change.added_resources);
     append(components_, change.added_components);
-    for (const auto& component : change.added_components) component->task().changes().set_listener(&changes_);
+    for (const auto& component : change.added_components) component->set_architecture(this);
     for (Component* component : change.changed) component->show();
   }
   changes_.bump();

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 
+#include "mauve_rt/architecture.hpp"
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
+#include "mauve_rt/transaction_commit.hpp"
 
 #include "lookup.hpp"
 #include "prefault.hpp"
@@ -22,7 +24,32 @@ Component::Component(std::string name, std::uint16_t number, ChangeSignal& chang
 
 Component::~Component() {
   task_.end_thread(kForever);  // before what it runs is taken away
-  cleanup();
+  Configurable::cleanup();
+}
+
+void Component::set_architecture(Architecture* architecture) noexcept {
+  architecture_.store(architecture, std::memory_order_release);
+  task_.changes().set_listener(architecture != nullptr ? &architecture->changes() : nullptr);
+}
+
+std::unique_lock<ChangeLock> Component::join_change() const {
+  Architecture* architecture = architecture_.load(std::memory_order_acquire);
+  return architecture != nullptr ? architecture->change_lock().join() : std::unique_lock<ChangeLock>();
+}
+
+Architecture& Component::require_listed() const {
+  if (Architecture* architecture = architecture_.load(std::memory_order_acquire)) return *architecture;
+  throw Error(ErrorCode::unknown_component, "the component was removed", {.component = name_});
+}
+
+void Component::configure() {
+  const auto change = join_change();
+  Configurable::configure();
+}
+
+void Component::cleanup() {
+  const auto change = join_change();
+  Configurable::cleanup();
 }
 
 void Component::set_parts(Parts parts, FsmFactory make_fsm) {
@@ -149,17 +176,7 @@ void Component::check_structural(const PropertyBase& property, const PropertyVal
 
 StepReport Component::set_property(const std::string& name, const PropertyValue& value,
                                    const CommitTimeouts& timeouts) {
-  const time_ns_t began = monotonic_now_ns();
-  PropertyBase& property = require_property(name);
-  const PropertyValue checked = property.checked(value);
-  if (is_configured()) check_reconfigurable();
-  check_structural(property, checked);
-  PropertyChange change(property, checked);
-  const time_ns_t prepared = monotonic_now_ns();
-  StepReport report = run_commit(change, timeouts, {});
-  report.step = "set_property " + name + " " + to_string(checked);
-  report.prepare_ns = prepared - began;
-  return report;
+  return require_listed().commit_one(std::move(Transaction().set_property(name_, name, value)), timeouts);
 }
 
 void Component::require_parked(const std::string& what) const {
@@ -172,19 +189,17 @@ void Component::require_parked(const std::string& what) const {
 }
 
 void Component::cleanup_core() {
+  const auto change = join_change();
   require_parked("cleanup_core");
   parts_.core->cleanup();
 }
 
 void Component::replace_core(std::unique_ptr<CoreBase> core) {
-  require_parked("replace_core");
-  parts_.core->cleanup();
-  std::swap(parts_.core, core);
-  core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
-  show();
+  require_listed().commit_one(std::move(Transaction().place_core(name_, std::move(core))));
 }
 
 void Component::configure_core() {
+  const auto change = join_change();
   require_parked("configure_core");
   bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
   if (task_.has_thread()) prefault_allocated();
@@ -211,46 +226,10 @@ CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const
 
 StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts,
                                 const std::function<void()>& committed) {
-  if (!is_configured()) {
-    throw Error(ErrorCode::not_configured, "the component is not configured", {.component = name_});
-  }
-  const time_ns_t began = monotonic_now_ns();
-  const std::string from = core_implementation();
-  const std::string to = core->implementation();
-  PartsChange change(*this, {.shell = {}, .core = std::move(core), .fsm = {}});
-  change.prepare();
-  const time_ns_t prepared = monotonic_now_ns();
-  StepReport report = run_commit(change, timeouts, committed);
-  report.step = "replace_core " + to;
-  report.from_core = from;
-  report.to_core = to;
-  report.prepare_ns = prepared - began;
-  return report;
-}
-
-StepReport Component::run_commit(CommitAction& action, const CommitTimeouts& timeouts,
-                                 const std::function<void()>& committed) {
-  Commit commit(1, {&action});
-  Participant& place = commit.participants().front();
-  place.task = &task_;
-  place.replaces_parts = true;
-  bool made = false;
-  try {
-    made = carry_out(commit, timeouts.commit_ns, nullptr);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& refusal) {
-    throw Error(ErrorCode::adopt_refused, std::string("adopt refused: ") + refusal.what(),
-                {.component = name_, .remedy = "the old core goes on"});
-  }
-  if (!made) {
-    throw Error(ErrorCode::adopt_refused, "adopt refused the old core's state",
-                {.component = name_, .remedy = "the old core goes on"});
-  }
-  show();
+  const auto made =
+      require_listed().make_one(std::move(Transaction().replace_core(name_, std::move(core))), timeouts);
   if (committed) committed();
-  task_.signal_change();
-  return report_of(place, timeouts.phase_ns);
+  return made->report(timeouts.phase_ns).steps.front();
 }
 
 namespace {

@@ -225,7 +225,7 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
   } else if (conductor != nullptr) {
     conductor->conduct(commit, timeout_ns);
   } else {
-    conduct(commit, timeout_ns);
+    commit.call_off(Commit::Off::shut_down);  // a task left behind by a host that is no more
   }
   if (commit.is_abandoned()) give_up(commit);
   for (Participant& place : commit.participants()) {

@@ -44,27 +44,54 @@ class Deployer::Barrier {
 };
 
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
-    : architecture_(architecture), options_(options) {}
+    : Host(architecture), options_(options) {}
 
-Deployer::~Deployer() { shutdown(); }
+Deployer::~Deployer() {
+  shutdown();
+  wait_unused();
+}
 
 void Deployer::prepare_process() {
   int highest = 1;
-  for (const auto& component : architecture_.components()) {
+  for (const auto& component : architecture().components()) {
     highest = std::max(highest, component->task().settings().priority);
   }
   process_.acquire(highest, options_.require_realtime);
 }
 
 void Deployer::deploy() {
-  const std::lock_guard lock(structure_mutex_);
-  if (deployed_) throw Error(ErrorCode::already_running, "the architecture is deployed already");
-  if (!architecture_.is_configured()) {
-    throw Error(ErrorCode::not_configured, "the architecture is not configured",
-                {.remedy = "call configure() first"});
-  }
+  const std::lock_guard change(architecture().change_lock());
+  const std::lock_guard life(life_mutex_);
+  require_deployable();
   prepare_process();
-  const auto components = architecture_.components();
+  architecture().set_host(*this);
+  try {
+    auto conductor = std::make_shared<Conductor>();
+    create_threads();
+    const std::lock_guard lock(conductor_mutex_);
+    conductor_ = std::move(conductor);
+  } catch (...) {
+    architecture().release_host(*this);
+    throw;
+  }
+  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
+  const auto components = architecture().components();
+  start_all(monotonic_now_ns() + deployment_lead_ns(components.size()));
+  for (const auto& component : components) component->task().wait_started();
+  set_deployed(true);
+  watchdog_stop_.store(0, std::memory_order_relaxed);  // relaxed: the thread is created after
+  watchdog_ = std::thread([this] { watch(); });
+}
+
+void Deployer::create_threads() {
+  const auto components = architecture().components();
+  for (const auto& component : components) {
+    Task& task = component->task();
+    if (!task.end_thread(monotonic_now_ns())) {  // left behind by a shutdown
+      task.throw_state_running("the component still executes a state of an earlier deployment", 0,
+                               "wait for its end, then deploy again");
+    }
+  }
   barrier_ = std::make_unique<Barrier>(components.size() + 1);
   try {
     for (const auto& component : components) {
@@ -78,122 +105,44 @@ void Deployer::deploy() {
   }
   prefault_allocated();
   barrier_->arrive();
-  conductor_ = std::make_unique<Conductor>();
-
-  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
-  const time_ns_t epoch_ns = monotonic_now_ns() + deployment_lead_ns(components.size());
-  architecture_.set_deployment_epoch(epoch_ns);
-  for (const auto& component : components) {
-    Task& task = component->task();
-    task.start_at(task.join(epoch_ns));
-  }
-  for (const auto& component : components) component->task().wait_started();
-  deployed_ = true;
-  watchdog_stop_.store(0, std::memory_order_relaxed);  // relaxed: the thread is created after
-  watchdog_ = std::thread([this] { watch(); });
 }
 
 void Deployer::shutdown() noexcept {
-  const std::lock_guard lock(structure_mutex_);
-  if (!deployed_) return;
-  deployed_ = false;  // nobody starts anything from here on
+  const std::lock_guard life(life_mutex_);
+  if (!is_deployed()) return;
+  set_deployed(false);
+  std::shared_ptr<Conductor> conductor;
+  {
+    const std::lock_guard lock(conductor_mutex_);
+    conductor = std::move(conductor_);
+  }
+  conductor->withdraw();
   watchdog_stop_.store(1, std::memory_order_release);
   futex_wake_all(watchdog_stop_);
   watchdog_.join();
-  const time_ns_t stopped_by = monotonic_now_ns() + kStopTimeout;  // all of them together
-  const auto components = architecture_.components();
-  for (auto component = components.rbegin(); component != components.rend(); ++component) {
-    try {
-      if ((*component)->task().state() != ComponentState::running) continue;
-      (*component)->task().stop(std::max<time_ns_t>(0, stopped_by - monotonic_now_ns()));
-    } catch (const Error&) {  // still in a state, or faulted by now: joining its thread is the answer
-    }
-  }
+  stop_all(monotonic_now_ns() + kStopTimeout);
+  conductor->withdraw();  // a commit that had found the host open still
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
-  for (const auto& component : components) component->task().end_thread(until);
-  conductor_.reset();
-  architecture_.changes().bump();
+  for (const auto& component : architecture().components()) component->task().end_thread(until);
+  architecture().release_host(*this);
+  architecture().changes().bump();
 }
 
 void Deployer::watch() noexcept {
   while (watchdog_stop_.load(std::memory_order_acquire) == 0) {
     futex_wait_until(watchdog_stop_, 0, monotonic_now_ns() + kWatchPeriod);
-    for (const auto& component : architecture_.components())
+    for (const auto& component : architecture().components())
       component->task().check_execution(monotonic_now_ns());
   }
 }
 
-void Deployer::require_deployed() const {
-  if (deployed_) return;
-  throw Error(ErrorCode::not_configured, "the architecture is not deployed",
-              {.remedy = "call deploy() first"});
-}
+void Deployer::attach(Task& task) { task.create_thread(nullptr, options_.require_realtime, options_.trace); }
 
-void Deployer::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
-  require_deployed();
-  architecture_.hold_component(component)->task().start(clock_ns);
-}
+bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
 
-void Deployer::stop(const std::string& component, time_ns_t timeout_ns) {
-  require_deployed();
-  architecture_.hold_component(component)->task().stop(timeout_ns);
-}
-
-time_ns_t Deployer::get_time(const std::string& component) const {
-  return architecture_.hold_component(component)->task().get_time();
-}
-
-TransactionHost Deployer::host() {
-  return {.deployed = deployed_,
-          .conductor = conductor_.get(),
-          .attach =
-              [this](Task& task) { task.create_thread(nullptr, options_.require_realtime, options_.trace); },
-          .detach = [](Task& task) { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }};
-}
-
-std::unique_ptr<TransactionCommit> Deployer::make(Transaction transaction,
-                                                  const TransactionOptions& options) {
-  const std::lock_guard lock(structure_mutex_);
-  auto work = std::make_unique<TransactionCommit>(architecture_, host(), options);
-  work->make(std::move(transaction));
-  return work;
-}
-
-TransactionReport Deployer::commit(Transaction transaction, const TransactionOptions& options) {
-  return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
-}
-
-StepReport Deployer::commit_one(Transaction transaction, const CommitTimeouts& timeouts) {
-  try {
-    return commit(std::move(transaction), {.timeouts = timeouts}).steps.front();
-  } catch (const Error& failure) {  // who asked for one thing needs no number for it
-    ErrorDetail detail = failure.detail();
-    detail.step = 0;
-    detail.step_name.clear();
-    throw Error(failure.code(), failure.statement(), detail);
-  }
-}
-
-StepReport Deployer::replace_core(const std::string& component, const std::string& core,
-                                  const CommitTimeouts& timeouts) {
-  Transaction transaction;
-  transaction.replace_core(component, core);
-  return commit_one(std::move(transaction), timeouts);
-}
-
-StepReport Deployer::set_property(const std::string& component, const std::string& name,
-                                  const PropertyValue& value, const CommitTimeouts& timeouts) {
-  Transaction transaction;
-  transaction.set_property(component, name, value);
-  return commit_one(std::move(transaction), timeouts);
-}
-
-std::uint32_t Deployer::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept {
-  const std::atomic<std::uint32_t>& word = architecture_.changes().word;
-  while (word.load(std::memory_order_acquire) == seen) {
-    if (!futex_wait_until(word, seen, until_ns)) break;
-  }
-  return word.load(std::memory_order_acquire);
+std::shared_ptr<Conductor> Deployer::conductor() noexcept {
+  const std::lock_guard lock(conductor_mutex_);
+  return conductor_;
 }
 
 }  // namespace mauve

@@ -35,22 +35,43 @@ bool leads_to(const Wire& wire, const Resource& resource) {
 
 }  // namespace
 
-Draft::Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {
-  for (auto& component : architecture.components()) components_.push_back(present(component));
-  for (auto& resource : architecture.resources()) resources_.push_back({.resource = resource});
+bool Draft::is_removed(const std::string& component) const noexcept {
+  return std::any_of(removed_components_.begin(), removed_components_.end(),
+                     [&](const DraftComponent& each) { return each.name() == component; });
+}
+
+/// Those there will be, as far as is known by now.
+std::vector<std::string> Draft::component_names() const {
+  std::vector<std::string> names;
+  for (const auto& component : architecture_.components()) {
+    if (!is_removed(component->name())) names.push_back(component->name());
+  }
+  for (const DraftComponent& component : components_) {
+    if (component.is_added) names.push_back(component.name());
+  }
+  return names;
+}
+
+DraftComponent* Draft::find(const std::string& name) noexcept {
+  const auto found = by_name_.find(name);
+  return found != by_name_.end() ? found->second : nullptr;
 }
 
 DraftComponent& Draft::touch(const std::string& name) {
-  for (DraftComponent& component : components_) {
-    if (component.name() != name) continue;
-    if (component.state == ComponentState::stopping) {
-      component.component->task().throw_state_running("the component is STOPPING", 0,
-                                                      "try again when it has stopped");
-    }
-    if (component.first_step == 0) component.first_step = step_;
-    return component;
+  DraftComponent* component = find(name);
+  if (component == nullptr) {
+    auto found = is_removed(name) ? nullptr : architecture_.find_component(name);
+    if (found == nullptr) throw_no_component(name, component_names());
+    components_.push_back(present(std::move(found)));
+    component = &components_.back();
+    component->first_step = step_;
+    by_name_.emplace(name, component);
   }
-  throw_no_component(name, components_);
+  if (component->state == ComponentState::stopping) {
+    component->component->task().throw_state_running("the component is STOPPING", 0,
+                                                     "try again when it has stopped");
+  }
+  return *component;
 }
 
 DraftComponent& Draft::change(const std::string& name) {
@@ -64,16 +85,27 @@ DraftComponent& Draft::change(const std::string& name) {
   return component;
 }
 
+std::shared_ptr<Resource> Draft::find_resource(const std::string& name) const {
+  if (const auto added = resources_by_name_.find(name); added != resources_by_name_.end())
+    return added->second->resource;
+  auto present = architecture_.find_resource(name);
+  const bool is_removed = std::find(removed_resources_.begin(), removed_resources_.end(), present) !=
+                          removed_resources_.end();
+  return is_removed ? nullptr : present;
+}
+
 Resource& Draft::resource(const std::string& name) {
-  for (const DraftResource& each : resources_) {
-    if (each.name() == name) return *each.resource;
+  if (const auto found = find_resource(name)) return *found;
+  std::vector<std::string> names = names_of(resources_);
+  for (const auto& present : architecture_.resources()) {
+    if (find_resource(present->name()) == present) names.push_back(present->name());
   }
-  throw_no_resource(name, resources_);
+  throw_no_resource(name, names);
 }
 
 DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
-  const auto names = names_of(components_);
-  if (std::find(names.begin(), names.end(), name) != names.end()) throw_taken("component", name);
+  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
+    throw_taken("component", name);
   DraftComponent added;
   added.component = architecture_.make_unlisted(name);
   added.component->set_settings(settings);
@@ -81,6 +113,7 @@ DraftComponent& Draft::add_component(const std::string& name, const TaskSettings
   added.state = ComponentState::stopped;
   added.first_step = step_;
   components_.push_back(std::move(added));
+  by_name_.emplace(name, &components_.back());
   return components_.back();
 }
 
@@ -90,6 +123,7 @@ void Draft::remove_component(const std::string& name) {
     component.component->check_reconfigurable();
   const auto place = std::find_if(components_.begin(), components_.end(),
                                   [&](const DraftComponent& each) { return &each == &component; });
+  by_name_.erase(name);
   if (component.is_added) {
     components_.erase(place);
   } else {
@@ -98,32 +132,42 @@ void Draft::remove_component(const std::string& name) {
 }
 
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
-  const auto names = names_of(resources_);
-  if (std::find(names.begin(), names.end(), name) != names.end()) throw_taken("resource", name);
+  if (find_resource(name) != nullptr) throw_taken("resource", name);
   resource->set_name(name);
   architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});
+  resources_by_name_.emplace(name, &resources_.back());
+}
+
+/// The ports that will be connected to it.
+std::vector<std::string> Draft::ports_of(const Resource& resource) const {
+  std::vector<std::string> ports;
+  const auto look = [&](const DraftComponent& component) {
+    for (const auto& [port, wire] : component.wires) {
+      if (leads_to(wire, resource)) ports.push_back(component.name() + "." + port);
+    }
+  };
+  for (const DraftComponent& component : components_) look(component);
+  for (const auto& component : architecture_.components()) {
+    if (!by_name_.contains(component->name()) && !is_removed(component->name())) look(present(component));
+  }
+  return ports;
 }
 
 void Draft::remove_resource(const std::string& name) {
   const Resource& removed = resource(name);
-  std::vector<std::string> ports;
-  for (const DraftComponent& component : components_) {
-    for (const auto& [port, wire] : component.wires) {
-      if (leads_to(wire, removed)) ports.push_back(component.name() + "." + port);
-    }
-  }
-  if (!ports.empty()) {
+  if (const std::vector<std::string> ports = ports_of(removed); !ports.empty()) {
     throw Error(ErrorCode::invalid_argument, "the resource is still connected",
                 {.element = "resource " + name,
                  .expected = "no port",
                  .found = join(ports),
                  .remedy = "disconnect these in a step before"});
   }
-  const auto place = std::find_if(resources_.begin(), resources_.end(),
-                                  [&](const DraftResource& each) { return each.resource.get() == &removed; });
-  if (place->added_step == 0) removed_resources_.push_back(place->resource);
-  resources_.erase(place);
+  if (resources_by_name_.erase(name) == 0) {
+    removed_resources_.push_back(architecture_.find_resource(name));
+  } else {
+    resources_.remove_if([&](const DraftResource& each) { return each.resource.get() == &removed; });
+  }
 }
 
 void Draft::connect(DraftComponent& component, const std::string& port_name, const std::string& resource_name,

@@ -45,6 +45,7 @@ struct DraftComponent {
   int shell_step{0};
   int fsm_step{0};
   int core_step{0};
+  bool core_unready{false};  // the new core is put in as it is
   int first_step{0};
 
   const std::string& name() const noexcept { return component->name(); }
@@ -74,10 +75,11 @@ struct DraftResource {
   const std::string& name() const noexcept { return resource->name(); }
 };
 
-/// An overlay of an architecture; nothing of it is in force. Ordinary threads.
+/// An overlay of an architecture: what the steps touch of it, and nothing else, however large it is. Nothing of it is in
+/// force. Ordinary threads, the architecture's change lock held.
 class Draft {
  public:
-  Draft(Architecture& architecture, bool deployed);
+  Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {}
 
   Architecture& architecture() const noexcept { return architecture_; }
   bool is_deployed() const noexcept { return deployed_; }
@@ -91,6 +93,8 @@ class Draft {
   DraftComponent& touch(const std::string& name);
   /// The same for what `reconfigurable: false` and a fault forbid. Throws Error: not_reconfigurable, faulted besides.
   DraftComponent& change(const std::string& name);
+  /// The component that a step has touched, or nullptr.
+  DraftComponent* find(const std::string& name) noexcept;
   /// Throws Error: unknown_resource.
   Resource& resource(const std::string& name);
 
@@ -109,12 +113,18 @@ class Draft {
   /// lead somewhere, ports per service. Throws Error with the step.
   void finish() const;
 
+  /// Those that are there afterwards and were touched, in the order of the steps.
   std::list<DraftComponent>& components() noexcept { return components_; }
   std::list<DraftComponent>& removed_components() noexcept { return removed_components_; }
+  /// Those that are added.
   std::list<DraftResource>& resources() noexcept { return resources_; }
   std::vector<std::shared_ptr<Resource>>& removed_resources() noexcept { return removed_resources_; }
 
  private:
+  bool is_removed(const std::string& component) const noexcept;
+  std::shared_ptr<Resource> find_resource(const std::string& name) const;
+  std::vector<std::string> component_names() const;
+  std::vector<std::string> ports_of(const Resource& resource) const;
   void check_kept_wires(const DraftComponent& component) const;
   static void check_structural(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;
@@ -124,8 +134,10 @@ class Draft {
   bool deployed_;
   int step_{0};
   std::list<DraftComponent> components_;
-  std::list<DraftComponent> removed_components_;  // those that were there before
+  std::map<std::string, DraftComponent*> by_name_;  // of components_
+  std::list<DraftComponent> removed_components_;    // those that were there before
   std::list<DraftResource> resources_;
+  std::map<std::string, DraftResource*> resources_by_name_;
   std::vector<std::shared_ptr<Resource>> removed_resources_;
 };
 

@@ -18,7 +18,13 @@ void Draft::finish() const {
   for (const DraftComponent& component : components_) {
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
-    if (component.first_step != 0 && architecture_.is_configured()) check_required_ports(component);
+    if (architecture_.is_configured()) check_required_ports(component);
+    if (component.core_unready && component.runs) {
+      throw Error(ErrorCode::not_configured, "the core is not configured",
+                  {.component = component.name(),
+                   .remedy = "configure it first, or replace it by a replace_core step",
+                   .step = component.core_step});
+    }
   }
   check_port_counts();
 }

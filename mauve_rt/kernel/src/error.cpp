@@ -82,6 +82,8 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "timeout";
     case ErrorCode::wrong_revision:
       return "wrong_revision";
+    case ErrorCode::would_deadlock:
+      return "would_deadlock";
     case ErrorCode::realtime_denied:
       return "realtime_denied";
     case ErrorCode::plugin:

@@ -63,6 +63,7 @@ const FsmBase& PartsChange::fsm() const noexcept {
 }
 
 void PartsChange::prepare() {
+  if (unready_) return;
   try {
     prepare_parts();
   } catch (const std::exception& failure) {
@@ -107,14 +108,14 @@ void PartsChange::prepare_parts() {
 }
 
 bool PartsChange::adopt() {
-  if (afresh_) return true;
+  if (afresh_ || unready_) return true;
   if (parts_.core != nullptr) return parts_.core->adopt(*component_.parts_.core);
   return kept_core_ == component_.parts_.core.get();  // else a fallback took its place meanwhile
 }
 
 void PartsChange::take() noexcept {
   if (parts_.core != nullptr) {
-    if (!afresh_) parts_.core->take(*component_.parts_.core);
+    if (!afresh_ && !unready_) parts_.core->take(*component_.parts_.core);
     std::swap(parts_.core, component_.parts_.core);
     component_.task_.set_fallen_back(afresh_);
     component_.core_name_.store(core_name_, std::memory_order_relaxed);
@@ -129,9 +130,10 @@ void PartsChange::take() noexcept {
     std::swap(make_fsm_, component_.make_fsm_);
   }
   std::swap(binding_, component_.binding_);
+  taken_ = true;
+  if (unready_) return;
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
-  taken_ = true;
 }
 
 time_ns_t PartsChange::budget_ns() const noexcept {

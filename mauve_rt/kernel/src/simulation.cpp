@@ -13,13 +13,19 @@ namespace mauve {
 
 namespace {
 
-/// Marks and service records go to the ring of the task that runs, as on its own thread.
-class RingOfThread {
+/// The calling thread is the task's own for as long: marks and service records go to its ring.
+class TaskOfThread {
  public:
-  explicit RingOfThread(TraceRing* ring) noexcept { TraceRing::set_for_this_thread(ring); }
-  ~RingOfThread() { TraceRing::set_for_this_thread(nullptr); }
-  RingOfThread(const RingOfThread&) = delete;
-  RingOfThread& operator=(const RingOfThread&) = delete;
+  explicit TaskOfThread(Task& task) noexcept {
+    TraceRing::set_for_this_thread(task.ring());
+    Task::set_simulated_here(&task);
+  }
+  ~TaskOfThread() {
+    TraceRing::set_for_this_thread(nullptr);
+    Task::set_simulated_here(nullptr);
+  }
+  TaskOfThread(const TaskOfThread&) = delete;
+  TaskOfThread& operator=(const TaskOfThread&) = delete;
 };
 
 /// Of the calling thread; 0 when the system does not tell.
@@ -56,51 +62,27 @@ Simulation::Simulation(SimulationOptions options) : options_(options), now_ns_(o
 
 Simulation::~Simulation() { shutdown(); }
 
-void Simulation::add(Architecture& architecture) {
+SimulatedHost& Simulation::add(Architecture& architecture) {
   if (epoch_ns_ != 0) throw Error(ErrorCode::already_running, "the simulation is deployed already");
-  if (!architecture.is_configured()) {
-    throw Error(ErrorCode::not_configured, "the architecture is not configured",
-                {.remedy = "call configure() first"});
-  }
-  const std::size_t stack_bytes = own_stack_bytes();
-  for (const auto& component : architecture.components()) {
-    check_stack(*component, stack_bytes);
-    if (!component->task().has_thread() && !component->task().is_simulated()) continue;
-    throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
-                {.component = component->name(), .remedy = "shut that down first"});
-  }
-  processors_.push_back(
-      std::make_unique<Processor>(Processor{&architecture, SimulatedClock(now_ns_), {}, 0}));
+  auto host = std::make_unique<SimulatedHost>(*this, architecture);
+  host->join();
+  hosts_.push_back(std::move(host));
+  return *hosts_.back();
 }
 
 void Simulation::deploy() {
   if (epoch_ns_ != 0) throw Error(ErrorCode::already_running, "the simulation is deployed already");
   std::size_t components = 0;
-  for (const auto& processor : processors_) components += processor->architecture->components().size();
+  for (const Processor* processor : processors_) components += processor->architecture->components().size();
   epoch_ns_ = now_ns_ + deployment_lead_ns(components);
-  for (const auto& processor : processors_) {
-    processor->architecture->set_deployment_epoch(epoch_ns_);
-    for (const auto& component : processor->architecture->components()) {
-      Task& task = component->task();
-      task.simulate(processor->clock, options_.trace);
-      task.start_at(task.join(epoch_ns_));
-    }
+  for (const auto& host : hosts_) {
+    if (std::find(processors_.begin(), processors_.end(), &host->processor_) != processors_.end())
+      host->begin(epoch_ns_);
   }
 }
 
 void Simulation::shutdown() noexcept {
-  for (const auto& processor : processors_) {
-    const auto components = processor->architecture->components();
-    for (auto component = components.rbegin(); component != components.rend(); ++component) {
-      Task& task = (*component)->task();
-      try {
-        if (!task.is_parked()) task.stop(0);
-      } catch (const Error&) {  // it faulted while stopping: parked all the same
-      }
-      task.end_simulation();
-    }
-  }
-  processors_.clear();
+  for (const auto& host : hosts_) host->shutdown();
   timers_.clear();
 }
 
@@ -152,7 +134,7 @@ void Simulation::run_until(time_ns_t instant_ns) {
     }
     now_ns_ = std::max(now_ns_, next.begin_ns);
     next.processor->clock.advance_to(next.begin_ns);
-    const RingOfThread ring(next.task->ring());
+    const TaskOfThread here(*next.task);
     next.task->resume();
   }
   advance_to(instant_ns);
@@ -176,57 +158,66 @@ void Simulation::advance_to(time_ns_t instant_ns) {
   for (const auto& processor : processors_) processor->clock.advance_to(now_ns_);
 }
 
-Simulation::Processor& Simulation::require(const Architecture& architecture) const {
-  for (const auto& processor : processors_) {
-    if (processor->architecture == &architecture) return *processor;
+SimulatedHost::SimulatedHost(Simulation& simulation, Architecture& architecture)
+    : Host(architecture),
+      simulation_(simulation),
+      processor_{.architecture = &architecture, .clock = SimulatedClock(simulation.now_ns())} {}
+
+SimulatedHost::~SimulatedHost() { shutdown(); }
+
+void SimulatedHost::join() {
+  const std::lock_guard change(architecture().change_lock());
+  require_deployable();
+  const std::size_t stack_bytes = own_stack_bytes();
+  for (const auto& component : architecture().components()) {
+    check_stack(*component, stack_bytes);
+    if (!component->task().has_thread()) continue;
+    throw Error(ErrorCode::already_running, "the component has a thread still",
+                {.component = component->name(), .remedy = "shut its deployer down first"});
   }
-  throw Error(ErrorCode::invalid_argument, "the architecture is not part of the simulation",
-              {.remedy = "add() it first"});
+  architecture().set_host(*this);
+  processor_.clock.advance_to(simulation_.now_ns_);
+  processor_.seen_lists = 0;
+  simulation_.processors_.push_back(&processor_);
 }
 
-void Simulation::start(Architecture& architecture, const std::string& component,
-                       std::optional<time_ns_t> clock_ns) {
-  require(architecture);
-  architecture.hold_component(component)->task().start(clock_ns);
+void SimulatedHost::deploy() {
+  if (architecture().host() != this) join();  // it was shut down
+  require_deployable();
+  if (simulation_.epoch_ns_ == 0) return simulation_.deploy();
+  begin(simulation_.now_ns_ + deployment_lead_ns(architecture().components().size()));
 }
 
-void Simulation::stop(Architecture& architecture, const std::string& component) {
-  require(architecture);
-  architecture.hold_component(component)->task().stop(0);
+void SimulatedHost::begin(time_ns_t epoch_ns) {
+  const std::lock_guard change(architecture().change_lock());
+  for (const auto& component : architecture().components()) attach(component->task());
+  start_all(epoch_ns);
+  set_deployed(true);
 }
 
-time_ns_t Simulation::get_time(const Architecture& architecture, const std::string& component) const {
-  require(architecture);
-  return architecture.hold_component(component)->task().get_time();
+void SimulatedHost::shutdown() noexcept {
+  auto& running = simulation_.processors_;
+  const auto place = std::find(running.begin(), running.end(), &processor_);
+  if (place == running.end()) return;
+  running.erase(place);
+  set_deployed(false);
+  stop_all(0);
+  for (const auto& component : architecture().components()) component->task().end_simulation();
+  processor_.components.clear();
+  architecture().release_host(*this);
 }
 
-TransactionReport Simulation::commit(Architecture& architecture, Transaction transaction,
-                                     const TransactionOptions& options) {
-  Processor& processor = require(architecture);
-  TransactionOptions at_once = options;
-  at_once.timeouts.phase_ns = 0;  // the release that follows comes only when this call has returned
-  TransactionCommit work(architecture,
-                         {.deployed = epoch_ns_ != 0,
-                          .conductor = nullptr,
-                          .attach = [&](Task& task) { task.simulate(processor.clock, options_.trace); },
-                          .detach =
-                              [](Task& task) {
-                                task.end_simulation();
-                                return true;
-                              }},
-                         at_once);
-  work.make(std::move(transaction));
-  TransactionReport report = work.report(0);
-  report.is_complete = true;  // what it lacks nobody will wait for
-  report.prepare_ns = 0;
-  for (StepReport& step : report.steps) step.prepare_ns = 0;
-  return report;
+const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
+  static const RealtimeStatus none{.granted = false,
+                                   .missing = {"simulated time: nothing ran in real time"}};
+  return none;
 }
 
-TraceDrain Simulation::drain_trace(Architecture& architecture) {
-  TraceDrain drain = architecture.drain_trace();
-  drain.monotonic_ns = drain.realtime_ns = require(architecture).clock.now_ns();
-  return drain;
+void SimulatedHost::attach(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }
+
+bool SimulatedHost::detach(Task& task) noexcept {
+  task.end_simulation();
+  return true;
 }
 
 }  // namespace mauve

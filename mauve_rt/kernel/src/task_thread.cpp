@@ -23,6 +23,7 @@ constexpr time_ns_t kReadyTimeout = s_to_ns(1);
 constexpr time_ns_t kWarmUp = us_to_ns(300);
 
 thread_local Task* task_of_this_thread = nullptr;
+thread_local const Task* task_simulated_here = nullptr;
 
 }  // namespace
 
@@ -77,6 +78,12 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
 }
 
 Task* Task::of_this_thread() noexcept { return task_of_this_thread; }
+
+const Task* Task::executing_here() noexcept {
+  return task_of_this_thread != nullptr ? task_of_this_thread : task_simulated_here;
+}
+
+void Task::set_simulated_here(const Task* task) noexcept { task_simulated_here = task; }
 
 void* Task::thread_entry(void* self) noexcept {
   static_cast<Task*>(self)->thread_main();

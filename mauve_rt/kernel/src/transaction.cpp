@@ -66,6 +66,13 @@ Transaction& Transaction::replace_core(const std::string& component, std::unique
   }));
 }
 
+Transaction& Transaction::place_core(const std::string& component, std::unique_ptr<CoreBase> core) {
+  std::string text = "place_core " + component + " " + shown({}, core);
+  return add(step(std::move(text), component, [component, core = std::move(core)](Draft& draft) mutable {
+    place_core_in(draft, component, take(core));
+  }));
+}
+
 Transaction& Transaction::replace_fsm(const std::string& component, const std::string& implementation) {
   std::string text = "replace_fsm " + component + " " + implementation;
   return add(step(std::move(text), component, [component, implementation](Draft& draft) {
@@ -121,16 +128,18 @@ Transaction& Transaction::add_component(const std::string& name, const Component
     Parts made{.shell = registry.make_shell(parts.shell),
                .core = registry.make_core(parts.core),
                .fsm = registry.make_fsm(parts.fsm)};
-    put_component(draft, name, std::move(made), parts, factory_of(draft, parts.fsm));
+    put_component(draft, name, std::move(made), parts, factory_of(draft, parts.fsm), nullptr);
   }));
 }
 Transaction& Transaction::add_component(const std::string& name, Parts parts, const ComponentParts& rest,
-                                        const Component::FsmFactory& make_fsm) {
+                                        const Component::FsmFactory& make_fsm,
+                                        std::unique_ptr<CoreBase> fallback) {
   std::string text = "add_component " + name + " " + shown({}, parts.core);
-  return add(
-      step(std::move(text), name, [name, parts = std::move(parts), rest, make_fsm](Draft& draft) mutable {
+  return add(step(
+      std::move(text), name,
+      [name, parts = std::move(parts), rest, make_fsm, fallback = std::move(fallback)](Draft& draft) mutable {
         Parts all{.shell = take(parts.shell), .core = take(parts.core), .fsm = take(parts.fsm)};
-        put_component(draft, name, std::move(all), rest, make_fsm);
+        put_component(draft, name, std::move(all), rest, make_fsm, std::move(fallback));
       }));
 }
 

@@ -29,6 +29,16 @@ void put_core(Draft& draft, const std::string& component, std::unique_ptr<CoreBa
   }
   changed.fresh.core = std::move(core);
   changed.core_step = draft.step();
+  changed.core_unready = false;
+}
+
+void place_core_in(Draft& draft, const std::string& component, std::unique_ptr<CoreBase> core) {
+  DraftComponent& changed = draft.touch(component);
+  changed.component->check_reconfigurable();
+  changed.component->require_parked("replace_core");
+  changed.fresh.core = std::move(core);
+  changed.core_step = draft.step();
+  changed.core_unready = !changed.is_added;  // an added one is configured as a whole
 }
 
 void put_fsm(Draft& draft, const std::string& component, std::unique_ptr<FsmBase> fsm,
@@ -54,12 +64,13 @@ Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm) {
 }
 
 void put_component(Draft& draft, const std::string& name, Parts parts, const ComponentParts& rest,
-                   Component::FsmFactory make_fsm) {
+                   Component::FsmFactory make_fsm, std::unique_ptr<CoreBase> fallback) {
   DraftComponent& added = draft.add_component(name, rest.settings);
   added.fresh = std::move(parts);
   added.make_fsm = std::move(make_fsm);
   added.component->allow(rest.alternatives, rest.reconfigurable);
-  if (!rest.fallback.empty()) added.component->set_fallback(draft.registry().make_core(rest.fallback));
+  if (fallback == nullptr && !rest.fallback.empty()) fallback = draft.registry().make_core(rest.fallback);
+  if (fallback != nullptr) added.component->set_fallback(std::move(fallback));
   for (const auto& [property, value] : rest.properties) draft.set_property(added, property, value);
 }
 

@@ -2,6 +2,8 @@
 // What a transaction makes ready before its commit, and throws away when there is none.
 #include <algorithm>
 
+#include "mauve_rt/host.hpp"
+
 #include "prefault.hpp"
 #include "transaction_work.hpp"
 
@@ -64,13 +66,11 @@ Action& TransactionCommit::Work::keep(const Component& component, std::unique_pt
 }
 
 void TransactionCommit::Work::prepare() {
-  for (DraftResource& resource : draft_->resources()) {
-    if (resource.added_step != 0) at_step(resource.added_step, [&] { prepare_resource(resource); });
-  }
+  for (DraftResource& resource : draft_->resources())
+    at_step(resource.added_step, [&] { prepare_resource(resource); });
   for (DraftComponent& component : draft_->removed_components())
     at_step(component.first_step, [&] { prepare_removed(component); });
   for (DraftComponent& component : draft_->components()) {
-    if (component.first_step == 0) continue;
     if (component.is_added) {
       at_step(component.first_step, [&] { prepare_added(component); });
     } else {
@@ -103,10 +103,10 @@ void TransactionCommit::Work::prepare_added(DraftComponent& added) {
   connect_all(component.shell(), added.wires);
   if (!architecture_.is_configured()) return;
   component.configure();
-  if (!host_.deployed || options_.dry_run) return;
+  if (!deployed_ || options_.dry_run) return;
   Task& task = component.task();
   task.join(architecture_.deployment_epoch_ns());
-  host_.attach(task);
+  host_->attach(task);
   if (added.runs) changes_.push_back({.draft = &added});
 }
 
@@ -135,6 +135,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   DraftComponent& draft = *change.draft;
   Component& component = *draft.component;
   change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh), std::move(draft.make_fsm));
+  if (draft.core_unready) change.parts->leave_unready();
   if (draft.shell_step != 0) {
     set_all(change.parts->shell(), draft.properties);
     connect_all(change.parts->shell(), draft.wires);
@@ -185,8 +186,7 @@ void TransactionCommit::Work::prepare_properties(Change& change) {
 /// does not wait) is left to be reaped: what is under way goes on without it.
 void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component, bool was_listed) {
   Task& task = component->task();
-  const bool has_machine = task.has_thread() || task.is_simulated();
-  const bool ended = !has_machine || host_.detach(task);
+  const bool ended = host_ != nullptr ? host_->detach(task) : task.end_thread(monotonic_now_ns());
   if (task.is_parked()) {
     for (const auto& port : component->shell().ports()) port->disconnect();
     if (component->is_configured()) component->update_listening();

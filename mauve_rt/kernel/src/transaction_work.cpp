@@ -4,20 +4,25 @@
 
 #include <algorithm>
 
+#include "mauve_rt/host.hpp"
+
 namespace mauve {
 
-TransactionCommit::TransactionCommit(Architecture& architecture, TransactionHost host,
+TransactionCommit::TransactionCommit(Architecture& architecture, Host* host,
                                      const TransactionOptions& options)
-    : work_(std::make_unique<Work>(architecture, std::move(host), options)) {}
+    : work_(std::make_unique<Work>(architecture, host, options)) {}
 TransactionCommit::~TransactionCommit() = default;
 void TransactionCommit::make(Transaction transaction) { work_->make(std::move(transaction)); }
 TransactionReport TransactionCommit::report(time_ns_t phase_timeout_ns) {
   return work_->report(phase_timeout_ns);
 }
 
-TransactionCommit::Work::Work(Architecture& architecture, TransactionHost host,
-                              const TransactionOptions& options)
-    : architecture_(architecture), host_(std::move(host)), options_(options) {}
+TransactionCommit::Work::Work(Architecture& architecture, Host* host, const TransactionOptions& options)
+    : architecture_(architecture),
+      host_(host),
+      deployed_(host != nullptr && host->is_deployed()),
+      is_simulated_(host != nullptr && host->is_simulated()),
+      options_(options) {}
 
 void TransactionCommit::Work::make(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
@@ -37,6 +42,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
     prepare();
     prepare_ns_ = monotonic_now_ns() - began;
     if (options_.dry_run) return discard();
+    require_host_open();
     gather();
     carry_out_commit();
   } catch (...) {
@@ -44,12 +50,26 @@ void TransactionCommit::Work::make(Transaction transaction) {
     throw;
   }
   publish();
+  settle_with_host();
   retire();
   keep_for_report();
 }
 
+/// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
+void TransactionCommit::Work::require_host_open() const {
+  if (!deployed_ || host_->is_deployed()) return;
+  throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
+              {.remedy = "deploy it, then ask again"});
+}
+
+/// Either a shutdown sees the threads of what was added, or they end here.
+void TransactionCommit::Work::settle_with_host() {
+  if (!deployed_ || host_->is_deployed()) return;
+  for (DraftComponent* added : prepared_added_) host_->detach(added->component->task());
+}
+
 void TransactionCommit::Work::draft_steps() {
-  draft_ = std::make_unique<Draft>(architecture_, host_.deployed);
+  draft_ = std::make_unique<Draft>(architecture_, deployed_);
   reports_.resize(transaction_.steps().size());
   int number = 0;
   for (const auto& step : transaction_.steps()) {
@@ -58,11 +78,10 @@ void TransactionCommit::Work::draft_steps() {
     report.step = step->text();
     report.component = step->component();
     at_step(number, [&] { step->draft(*draft_); });
-    for (const DraftComponent& component : draft_->components()) {
-      if (component.core_step != number) continue;
-      if (!component.is_added) report.from_core = component.component->core_implementation();
-      report.to_core = component.fresh.core->implementation();
-    }
+    const DraftComponent* component = draft_->find(report.component);
+    if (component == nullptr || component->core_step != number) continue;
+    if (!component->is_added) report.from_core = component->component->core_implementation();
+    report.to_core = component->fresh.core->implementation();
   }
   try {
     draft_->finish();
@@ -105,11 +124,13 @@ void TransactionCommit::Work::gather() {
 void TransactionCommit::Work::carry_out_commit() {
   if (changes_.empty()) return;
   try {
-    if (carry_out(*commit_, options_.timeouts.commit_ns, host_.conductor)) {
+    const auto conductor = deployed_ ? host_->conductor() : nullptr;
+    if (carry_out(*commit_, options_.timeouts.commit_ns, conductor.get())) {
       committed_ = true;
       return;
     }
   } catch (const Error& failure) {
+    require_host_open();  // else the commit was called off by a shutdown
     const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->off() == Commit::Off::not_yet;
     if (!is_adopts_own) rethrow_at(step_of(failure.detail().component), failure);
     throw_refused(failure.what());
@@ -146,12 +167,12 @@ void TransactionCommit::Work::publish() {
   ListChange lists;
   for (const DraftComponent& component : draft_->components()) {
     if (component.is_added) lists.added_components.push_back(component.component);
-    if (component.first_step != 0) lists.changed.push_back(component.component.get());
+    lists.changed.push_back(component.component.get());
   }
   for (const DraftComponent& component : draft_->removed_components())
     lists.removed_components.push_back(component.component);
   for (const DraftResource& resource : draft_->resources()) {
-    if (resource.added_step != 0) lists.added_resources.push_back(resource.resource);
+    lists.added_resources.push_back(resource.resource);
   }
   lists.removed_resources = draft_->removed_resources();
   architecture_.change_lists(lists);
@@ -164,6 +185,7 @@ void TransactionCommit::Work::renew_fallback(Change& change) {
   const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
   std::unique_ptr<CoreBase> out = change.parts->give_back_core();
   const std::string& fallback = component.fallback_implementation();
+  if (!component.is_configured()) return;
   if (fallback.empty() || !(is_outdated || (out != nullptr && out->implementation() == fallback))) return;
   try {
     component.renew_fallback(std::move(out));
@@ -203,17 +225,21 @@ void TransactionCommit::Work::keep_for_report() {
 }
 
 TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
-  const time_ns_t until = monotonic_now_ns() + phase_timeout_ns;
+  // In virtual time the releases that follow come only when this call has returned.
+  const time_ns_t until = monotonic_now_ns() + (is_simulated_ ? 0 : phase_timeout_ns);
   std::map<std::string, StepReport> measured;
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
-  TransactionReport report{
-      .steps = reports_, .revision = architecture_.revision(), .prepare_ns = prepare_ns_, .blackout_ns = 0};
+  TransactionReport report{.steps = reports_,
+                           .revision = architecture_.revision(),
+                           .prepare_ns = is_simulated_ ? 0 : prepare_ns_,
+                           .blackout_ns = 0};
   for (const auto& [name, place] : places_) {
-    if (committed_ && place->awaits_release()) report.is_complete = false;
+    if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
   }
   for (StepReport& step : report.steps) {
+    if (is_simulated_) step.prepare_ns = 0;
     const auto found = measured.find(step.component);
     if (found == measured.end()) continue;
     step.blackout_ns = found->second.blackout_ns;

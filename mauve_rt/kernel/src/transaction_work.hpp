@@ -16,7 +16,7 @@ namespace mauve {
 
 class TransactionCommit::Work {
  public:
-  Work(Architecture& architecture, TransactionHost host, const TransactionOptions& options);
+  Work(Architecture& architecture, Host* host, const TransactionOptions& options);
 
   void make(Transaction transaction);
   TransactionReport report(time_ns_t phase_timeout_ns);
@@ -45,9 +45,11 @@ class TransactionCommit::Work {
   // commit
   void gather();
   void carry_out_commit();
+  void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
   // after it
   void publish();
+  void settle_with_host();
   void retire();
   void keep_for_report();
   static void renew_fallback(Change& change);
@@ -65,7 +67,9 @@ class TransactionCommit::Work {
   Action& keep(const Component& component, std::unique_ptr<Action> action);
 
   Architecture& architecture_;
-  TransactionHost host_;
+  Host* host_;  // while it is made; nullptr: nobody runs the architecture
+  bool deployed_;
+  bool is_simulated_;
   TransactionOptions options_;
   Transaction transaction_;
   std::size_t numbers_before_{0};

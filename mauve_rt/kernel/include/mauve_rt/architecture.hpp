@@ -10,13 +10,17 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/change_lock.hpp"
 #include "mauve_rt/component.hpp"
 #include "mauve_rt/description.hpp"
 #include "mauve_rt/resource.hpp"
+#include "mauve_rt/transaction.hpp"
 
 namespace mauve {
 
+class Host;
 class PluginRegistry;
+class TransactionCommit;
 
 /// What drain_trace() yields; indices are component numbers, removed components included.
 struct TraceDrain {
@@ -41,12 +45,14 @@ struct ListChange {
   std::vector<Component*> changed{};
 };
 
-/// Components and resources by name. Ordinary threads. Those that change it: one at a time; those that look at it: any.
+/// Components and resources by name. Ordinary threads. Every change is a transaction of one step or more, carried out
+/// by the host that runs the architecture, or by itself while nobody does; they are made one at a time.
 ///
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
-/// | leaving_                        | who changes it        | same    | -                              |
+/// | leaving_                        | who changes it        | same    | change_lock_                   |
+/// | host_                           | hosts                 | anyone  | host_mutex_                    |
 /// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
 /// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
 class Architecture final : public Configurable {
@@ -57,7 +63,22 @@ class Architecture final : public Configurable {
 
   std::string description() const override { return "architecture"; }
 
-  /// Adds a component made of the given types. [setup] Throws Error: duplicate_name, out_of_range (settings).
+  /// Configures resources, then components; does nothing when that was done. [non-rt]
+  void configure();
+  /// Cleans up all, in reverse order. [non-rt] Throws Error (already_running) when a component is not parked.
+  void cleanup();
+
+  /// Carries out a transaction; one at a time. [non-rt]
+  /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
+  TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
+  /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
+  std::unique_ptr<TransactionCommit> make(Transaction transaction, const TransactionOptions& options = {});
+  /// The same of a transaction of one step, whose errors tell no number. [non-rt]
+  StepReport commit_one(Transaction transaction, const CommitTimeouts& timeouts = {});
+  std::unique_ptr<TransactionCommit> make_one(Transaction transaction, const CommitTimeouts& timeouts = {});
+
+  /// Adds a component made of the given types. Once the architecture is configured so is the component, and once it is
+  /// deployed it arrives STOPPED. [non-rt] Throws Error: duplicate_name, out_of_range (settings); as configure() then.
   template <typename ShellType, typename CoreType, typename FsmType>
   Component& add_component(const std::string& name, const TaskSettings& settings = {}) {
     return add_component(name, std::make_unique<ShellType>(), std::make_unique<CoreType>(),
@@ -67,12 +88,12 @@ class Architecture final : public Configurable {
   Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
                            std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
                            const TaskSettings& settings, Component::FsmFactory make_fsm = {});
-  /// Adds a component of registered parts. [setup] Throws Error: unknown_shell, unknown_core, unknown_fsm
+  /// Adds a component of registered parts. [non-rt] Throws Error: unknown_shell, unknown_core, unknown_fsm
   /// besides.
   Component& add_component(const std::string& name, const std::string& shell, const std::string& core,
                            const std::string& fsm, const TaskSettings& settings);
 
-  /// Adds a resource of a given type: add_resource<SharedData<Point>>("goal"). [setup]
+  /// Adds a resource of a given type: add_resource<SharedData<Point>>("goal"). [non-rt]
   template <typename ResourceType, typename... Args>
   ResourceType& add_resource(const std::string& name, Args&&... args) {
     auto resource = std::make_unique<ResourceType>(std::forward<Args>(args)...);
@@ -82,21 +103,27 @@ class Architecture final : public Configurable {
   }
   void add_resource(const std::string& name, std::unique_ptr<Resource> resource);
 
-  /// Connects a port to a service. [setup] Throws Error: unknown_port, unknown_service, type_mismatch,
-  /// duplicate_name.
+  /// Connects a port to a service; of a running component in its next wait. [non-rt] Throws Error: unknown_port,
+  /// unknown_service, type_mismatch, duplicate_name; once configured not_reconfigurable; timeout.
   void connect(Component& component, const std::string& port, Resource& resource, const std::string& service);
   void connect(const std::string& component, const std::string& port, const std::string& resource,
                const std::string& service);
 
-  /// Lets who carries samples out of the architecture know of every write to a resource. [setup]
+  /// Lets who carries samples out of the architecture know of every write to a resource. [non-rt]
   /// Throws Error (invalid_argument) when it has no samples.
   void publish(const std::string& resource);
+  /// Counts who carries samples into the architecture as a writer of a resource. [non-rt] Throws as
+  /// Resource::bind_input().
+  void subscribe(const std::string& resource);
 
   Component& component(const std::string& name) const;  // Throws Error: unknown_component
   Resource& resource(const std::string& name) const;    // Throws Error: unknown_resource
   /// The same, kept alive while the caller holds it, whatever is removed meanwhile. [non-rt]
   std::shared_ptr<Component> hold_component(const std::string& name) const;
   std::shared_ptr<Resource> hold_resource(const std::string& name) const;
+  /// The same; nullptr when there is none. [non-rt]
+  std::shared_ptr<Component> find_component(const std::string& name) const;
+  std::shared_ptr<Resource> find_resource(const std::string& name) const;
   /// All there are now, in the order of declaration. [non-rt]
   std::vector<std::shared_ptr<Component>> components() const;
   std::vector<std::shared_ptr<Resource>> resources() const;
@@ -138,6 +165,17 @@ class Architecture final : public Configurable {
   /// as Resource::bind_input().
   void prepare_outward(Resource& resource, TopicBinding topic);
 
+  // ---- for hosts
+
+  /// Under it all changes are made. [non-rt]
+  ChangeLock& change_lock() noexcept { return change_lock_; }
+  /// Who runs it; nullptr: nobody. [non-rt]
+  Host* host() const;
+  /// [non-rt], the change lock held. Throws Error (already_running) when it has a host.
+  void set_host(Host& host);
+  /// Returns at once: a change that uses the host goes on, and finds it shut down. [non-rt]
+  void release_host(const Host& host) noexcept;
+
   // ---- for transactions
 
   /// A component with a number of its own, not listed yet: its changes are nobody's business. [non-rt]
@@ -169,6 +207,9 @@ class Architecture final : public Configurable {
   void cleanup_hook() override;
 
   PluginRegistry* registry_;
+  ChangeLock change_lock_;
+  mutable std::mutex host_mutex_;
+  Host* host_{nullptr};
   ChangeSignal changes_;
   Notifier publications_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};

@@ -286,8 +286,8 @@ class Conductor {
   std::atomic<std::uint32_t> finished_{0};
 };
 
-/// Carries out a commit on tasks of any state and waits for its end: by the conductor when it has one, else by the
-/// calling thread; at once when every participant is parked or simulated. [non-rt]
+/// Carries out a commit on tasks of any state and waits for its end: by the conductor, or at once by the calling thread
+/// when every participant is parked or simulated. [non-rt]
 /// Throws Error: timeout naming the state still running; wrong_revision when a participant was stopped or faulted
 /// meanwhile; faulted when an adopt did not end and its component was given up (Commit::is_abandoned: the commit and all
 /// its actions must then outlive that component's thread). Rethrows what adopt threw; returns whether every adopt agreed.

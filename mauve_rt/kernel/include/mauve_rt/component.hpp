@@ -2,11 +2,14 @@
 // Component: a shell, a core and an fsm, run by a task; each can be replaced while it runs.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
+#include "mauve_rt/change_lock.hpp"
 #include "mauve_rt/task.hpp"
 
 namespace mauve {
@@ -40,6 +43,7 @@ struct Parts {
   std::unique_ptr<FsmBase> fsm{};
 };
 
+class Architecture;
 class Component;
 
 /// New parts for a component: made ready while the old ones run, put in by a commit, the old ones retired after.
@@ -63,6 +67,8 @@ class PartsChange final : public CommitAction {
   void retire() noexcept;
   /// The new core takes nothing over from the old one: that has failed. [setup]
   void start_afresh() noexcept { afresh_ = true; }
+  /// The new core is put in as it is, neither bound nor configured: Listing 3 of the paper. [setup]
+  void leave_unready() noexcept { unready_ = true; }
 
   /// The core that is not in force now. [setup]
   CoreBase* core() noexcept { return parts_.core.get(); }
@@ -88,6 +94,7 @@ class PartsChange final : public CommitAction {
   const CoreBase* kept_core_{nullptr};  // the one that the binding was made for, when it stays
   std::uint32_t core_name_{0};
   bool afresh_{false};
+  bool unready_{false};
   bool taken_{false};
   std::uint32_t trace_id_;
   std::string what_{};  // the part being prepared
@@ -131,13 +138,14 @@ struct ShownParts {
   bool operator==(const ShownParts&) const = default;
 };
 
-/// One component of an architecture. Its functions are for ordinary threads, those that change it for one at a time;
-/// its parts run on its task.
+/// One component of an architecture. Its functions are for ordinary threads; its parts run on its task. What changes it
+/// is made by its architecture, one change at a time, as a transaction where parts, properties or wiring change.
 ///
 /// | member           | written by                                | read by             | under            |
 /// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
 /// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
+/// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
 /// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
  public:
@@ -145,6 +153,13 @@ class Component final : public Configurable {
 
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Component() override;
+
+  /// The architecture that lists it and hears of its changes; nullptr: none. [non-rt], by the architecture
+  void set_architecture(Architecture* architecture) noexcept;
+
+  /// Both under the architecture's change lock. [non-rt] Throw Error (already_running) unless it is parked.
+  void configure();
+  void cleanup();
 
   /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone. [setup]
   void set_parts(Parts parts, FsmFactory make_fsm = {});
@@ -208,8 +223,11 @@ class Component final : public Configurable {
   StepReport set_property(const std::string& name, const PropertyValue& value,
                           const CommitTimeouts& timeouts = {});
 
-  // Listing 3 of the paper: replacing the core of a stopped component. Throw Error (already_running)
-  // otherwise.
+  /// Throws Error (already_running) unless it is parked; `what` was to be done. [non-rt]
+  void require_parked(const std::string& what) const;
+
+  // Listing 3 of the paper: replacing the core of a stopped component; the new one waits for configure_core(). Throw
+  // Error (already_running) otherwise. [non-rt]
 
   void cleanup_core();
   template <typename CoreType, typename... Args>
@@ -223,8 +241,8 @@ class Component final : public Configurable {
   void configure_core();
 
   /// Replaces the core in flight: prepare, commit inside a wait, retire the old one. [non-rt]
-  /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted; the
-  /// old core then goes on as if nothing had been asked.
+  /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted, not_configured,
+  /// not_reconfigurable; the old core then goes on as if nothing had been asked.
   /// `committed` is called once the new core is in, before the release that follows is waited for.
   StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {},
                        const std::function<void()>& committed = {});
@@ -242,7 +260,8 @@ class Component final : public Configurable {
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
-  void require_parked(const std::string& what) const;
+  std::unique_lock<ChangeLock> join_change() const;
+  Architecture& require_listed() const;
   void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
   void bind_fsm(FsmBase& fsm, Shell& shell) const;
@@ -252,10 +271,9 @@ class Component final : public Configurable {
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();
   void check_fallback(const Shell& shell, const FsmBase& fsm) const;
-  StepReport run_commit(CommitAction& action, const CommitTimeouts& timeouts,
-                        const std::function<void()>& committed);
 
   std::string name_;
+  std::atomic<Architecture*> architecture_{nullptr};
   Task task_;
   Parts parts_;
   FsmFactory make_fsm_;

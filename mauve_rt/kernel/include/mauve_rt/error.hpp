@@ -43,6 +43,7 @@ enum class ErrorCode : std::uint16_t {
   prepare_failed,
   timeout,
   wrong_revision,
+  would_deadlock,
   realtime_denied,
   plugin,
   io,

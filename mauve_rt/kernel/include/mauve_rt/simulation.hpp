@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <set>
-#include <string>
 #include <vector>
 
-#include "mauve_rt/architecture.hpp"
 #include "mauve_rt/futex.hpp"
-#include "mauve_rt/transaction_commit.hpp"
+#include "mauve_rt/host.hpp"
 
 namespace mauve {
 
@@ -38,6 +35,49 @@ struct SimulationOptions {
   time_ns_t begin_ns{s_to_ns(1)};  // the virtual time at which it begins; > 0
 };
 
+class Simulation;
+
+/// The host of one architecture in virtual time; made by Simulation::add(). Preparing a change takes no virtual time:
+/// it is reported as 0, and so is what of a commit comes only when the call has returned. From callbacks, or between
+/// two run_until(). The simulating thread only.
+class SimulatedHost final : public Host {
+ public:
+  SimulatedHost(Simulation& simulation, Architecture& architecture);
+  ~SimulatedHost() override;
+
+  void prepare_process() override {}
+  /// Deploys the simulation, all hosts that were added: it has one epoch for all. After its own shutdown() it begins
+  /// again alone, with an epoch of its own. [setup] Throws Error as Host::deploy().
+  void deploy() override;
+  void shutdown() noexcept override;
+
+  /// Nothing is granted, for nothing runs in real time.
+  const RealtimeStatus& realtime_status() const noexcept override;
+  const Clock& clock() const noexcept override { return processor_.clock; }
+  bool is_simulated() const noexcept override { return true; }
+
+  void attach(Task& task) override;
+  bool detach(Task& task) noexcept override;
+  std::shared_ptr<Conductor> conductor() noexcept override { return nullptr; }
+
+ private:
+  friend class Simulation;
+
+  struct Processor {
+    Architecture* architecture;
+    SimulatedClock clock;
+    std::vector<std::shared_ptr<Component>> components{};  // as of the last look at the architecture's lists
+    std::uint64_t seen_lists{0};
+  };
+
+  /// Takes the architecture, which has no host. Throws Error: not_configured, already_running; out_of_range (stack).
+  void join();
+  void begin(time_ns_t epoch_ns);
+
+  Simulation& simulation_;
+  Processor processor_;
+};
+
 /// Runs architectures without threads, real time or ROS: equal architectures and callbacks, equal traces.
 ///
 /// Every architecture has one virtual processor. On it the task that is due runs to its next wait, without preemption;
@@ -54,12 +94,13 @@ class Simulation {
   Simulation(const Simulation&) = delete;
   Simulation& operator=(const Simulation&) = delete;
 
-  /// Takes in a configured architecture, which outlives the simulation or its shutdown(). Before deploy(). Throws Error: not_configured, already_running (deployed).
-  void add(Architecture& architecture);
+  /// Takes in a configured architecture, which outlives the simulation or its shutdown(), and returns its host, which
+  /// lives as long as the simulation. Before deploy(). Throws Error: not_configured, already_running (deployed).
+  SimulatedHost& add(Architecture& architecture);
   /// Gives all tasks of all architectures one epoch, now + max(20 ms, 1 ms x components), and starts them.
   /// Throws Error (already_running).
   void deploy();
-  /// Stops every component, in reverse order, and lets the architectures go.
+  /// Shuts every host down, and forgets the callbacks.
   void shutdown() noexcept;
 
   /// Calls back once, at the instant or now if that is past.
@@ -73,24 +114,10 @@ class Simulation {
   /// The instant that all grids are counted from; 0 before deploy().
   time_ns_t epoch_ns() const noexcept { return epoch_ns_; }
 
-  // As the functions of Deployer, in virtual time; from callbacks or between two run_until().
-
-  void start(Architecture& architecture, const std::string& component,
-             std::optional<time_ns_t> clock_ns = std::nullopt);
-  void stop(Architecture& architecture, const std::string& component);
-  time_ns_t get_time(const Architecture& architecture, const std::string& component) const;
-  /// Preparing takes no virtual time: it is reported as 0.
-  TransactionReport commit(Architecture& architecture, Transaction transaction,
-                           const TransactionOptions& options = {});
-  TraceDrain drain_trace(Architecture& architecture);
-
  private:
-  struct Processor {
-    Architecture* architecture;
-    SimulatedClock clock;
-    std::vector<std::shared_ptr<Component>> components;  // as of the last look at the architecture's lists
-    std::uint64_t seen_lists{0};
-  };
+  friend class SimulatedHost;
+
+  using Processor = SimulatedHost::Processor;
   struct Timer {
     time_ns_t instant_ns;
     std::uint64_t number;  // of equal instants the one that was set first
@@ -109,12 +136,12 @@ class Simulation {
   static Next next_of(Processor& processor);
   void run_timer();
   void advance_to(time_ns_t instant_ns);
-  Processor& require(const Architecture& architecture) const;
 
   SimulationOptions options_;
   time_ns_t now_ns_;
   time_ns_t epoch_ns_{0};
-  std::vector<std::unique_ptr<Processor>> processors_;
+  std::vector<std::unique_ptr<SimulatedHost>> hosts_;  // those that were shut down too
+  std::vector<Processor*> processors_;                 // of those that were not
   std::set<Timer> timers_;
   std::uint64_t timers_set_{0};
 };

@@ -201,6 +201,10 @@ class Task {
 
   /// The task whose thread this is, or nullptr. [rt]
   static Task* of_this_thread() noexcept;
+  /// The same, or the task whose states the calling thread runs now in a simulation. [rt]
+  static const Task* executing_here() noexcept;
+  /// By who runs a simulated task, around it; nullptr: none. [rt]
+  static void set_simulated_here(const Task* task) noexcept;
   /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
   /// the task's thread. Who sets the word calls signal_awaited() then.
   void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept;

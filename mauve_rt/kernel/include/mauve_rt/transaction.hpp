@@ -44,13 +44,15 @@ class TransactionStep {
   virtual void draft(Draft& draft) = 0;
 };
 
-/// A list of steps, taken in order; nothing happens before Deployer::commit. Ordinary threads.
+/// A list of steps, taken in order; nothing happens before Host::commit or Architecture::commit. Ordinary threads.
 /// Parts are given by registered name or as objects; objects serve one commit.
 class Transaction {
  public:
   /// By name: one of the component's declared alternatives, or the core it was declared with.
   Transaction& replace_core(const std::string& component, const std::string& implementation);
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core);
+  /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
+  Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
   /// The new fsm starts in its initial state, on its own period, on the deployment's epoch.
   Transaction& replace_fsm(const std::string& component, const std::string& implementation);
   Transaction& replace_fsm(const std::string& component, std::unique_ptr<FsmBase> fsm);
@@ -65,9 +67,10 @@ class Transaction {
 
   /// Arrives STOPPED; a start step starts it on the deployment's grid.
   Transaction& add_component(const std::string& name, const ComponentParts& parts);
-  /// With its parts as objects; the names in `rest` stay unused.
+  /// With its parts as objects; the names in `rest` stay unused, but for the fallback's where none is given.
   Transaction& add_component(const std::string& name, Parts parts, const ComponentParts& rest = {},
-                             const Component::FsmFactory& make_fsm = {});
+                             const Component::FsmFactory& make_fsm = {},
+                             std::unique_ptr<CoreBase> fallback = nullptr);
   template <typename ShellType, typename CoreType, typename FsmType>
   Transaction& add_component(const std::string& name, const ComponentParts& rest = {}) {
     return add_component(std::move(name),

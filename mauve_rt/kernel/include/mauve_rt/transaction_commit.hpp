@@ -2,7 +2,6 @@
 // How a transaction is carried out: drafted, prepared, committed in one, retired.
 #pragma once
 
-#include <functional>
 #include <memory>
 
 #include "mauve_rt/architecture.hpp"
@@ -10,21 +9,14 @@
 
 namespace mauve {
 
-/// Where an architecture runs, as far as a transaction needs to know.
-struct TransactionHost {
-  bool deployed{false};
-  Conductor* conductor{nullptr};  // nullptr: the calling thread conducts
-  std::function<void(Task&)>
-      attach{};  // gives a task its thread, or takes it into a simulation; it is parked then
-  std::function<bool(Task&)>
-      detach{};  // the reverse, of a parked task; false when its thread would not end in time
-};
+class Host;
 
-/// Carries out one transaction. Ordinary threads; between architecture changes by others: one make() at a time.
-/// report() takes no part in that: while it waits, others may change what this one did.
+/// Carries out one transaction; made by Architecture::make(). Ordinary threads. make() is called once, under the
+/// architecture's change lock. report() takes no part in that: while it waits, others may change what this one did.
 class TransactionCommit {
  public:
-  TransactionCommit(Architecture& architecture, TransactionHost host, const TransactionOptions& options);
+  /// `host`: who runs the architecture, if anybody does; used by make() only.
+  TransactionCommit(Architecture& architecture, Host* host, const TransactionOptions& options);
   ~TransactionCommit();
   TransactionCommit(const TransactionCommit&) = delete;
   TransactionCommit& operator=(const TransactionCommit&) = delete;
