@@ -20,7 +20,7 @@ class MauveError(Exception):
     'unknown_property', 'unknown_type', 'type_mismatch', 'out_of_range', 'duplicate_name',
     'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed', 'not_configured', 'not_connected',
     'not_running', 'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed',
-    'timeout', 'realtime_denied', 'plugin', 'io', 'internal'.
+    'timeout', 'wrong_revision', 'would_deadlock', 'realtime_denied', 'plugin', 'io', 'internal'.
     """
 
     code: str
@@ -332,7 +332,7 @@ class ArchitectureDescription:
 
 @final
 class Transaction:
-    """A list of steps that come into force as one, or not at all; nothing happens before Deployer.commit.
+    """A list of steps that come into force as one, or not at all; nothing happens before Host.commit.
 
     Parts are classes or registered names. Each step returns the transaction.
     """
@@ -452,15 +452,17 @@ class Architecture:
         'client' (timeout_ns).
         """
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
+    def commit(self, transaction: Transaction) -> TransactionReport:
+        """Carries out a transaction, by the host if there is one; as Host.commit."""
     def set_property(self, component: str, name: str, value: PropertyValue) -> None:
-        """Before configure. Once configured use Deployer.set_property."""
+        """At once before the start, else in the component's next wait."""
     def publish(self, resource: str) -> None:
         """Marks a resource as bound to an outgoing topic.
 
-        Deployer.wait_published yields what is written to it.
+        Host.wait_published yields what is written to it.
         """
     def subscribe(self, resource: str) -> None:
-        """Counts an incoming topic, which uses Deployer.write_resource, as a writer of a resource.
+        """Counts an incoming topic, which uses Host.write_resource, as a writer of a resource.
 
         Refused for a latest_value that has one.
         """
@@ -492,25 +494,26 @@ class TraceDrain:
     monotonic_ns: Final[int]
     realtime_ns: Final[int]
 
-@final
-class Deployer:
-    """Threads of an architecture. Every call releases the interpreter's lock."""
+class Host:
+    """What runs an architecture: a Deployer, on threads, or a SimulatedHost, in virtual time.
 
-    def __init__(
-        self, architecture: Architecture, *, require_realtime: bool = False, trace: bool = True
-    ) -> None: ...
+    An architecture has one host at a time. Every call releases the interpreter's lock. In virtual time nothing
+    happens while the caller waits: waits return at once, and preparing takes no time.
+    """
+
     def prepare_process(self) -> None:
-        """Locks memory, holds /dev/cpu_dma_latency at 0, notes what was denied.
+        """On threads: locks memory, holds /dev/cpu_dma_latency at 0, notes what was denied.
 
         Called by deploy() if not before.
         """
     def deploy(self) -> None:
-        """Creates the threads, meets them at the barrier, publishes the epoch, starts every component.
+        """Publishes the epoch and starts every component; a simulation deploys all its hosts at once.
 
-        Shortens the interpreter's switch interval to 0.1 ms where it is longer, for components in Python.
+        On threads: creates these, meets them at the barrier first. Shortens the interpreter's switch interval to
+        0.1 ms where it is longer, for components in Python.
         """
     def shutdown(self) -> None:
-        """Stops in reverse order (outputs written), joins the threads.
+        """Stops in reverse order (outputs written), joins the threads; waits for nobody's preparation.
 
         The architecture can be deployed again.
         """
@@ -558,9 +561,15 @@ class Deployer:
     def set_property(
         self, component: str, name: str, value: PropertyValue, *, commit_timeout_ns: int = 1_000_000_000
     ) -> StepReport: ...
+    def describe(self) -> ArchitectureDescription:
+        """As Architecture.describe."""
+    def is_deployed(self) -> bool: ...
+    def now_ns(self) -> int:
+        """Now, as the components see it."""
     def realtime_status(self) -> RealtimeStatus: ...
     @property
-    def epoch_ns(self) -> int: ...
+    def epoch_ns(self) -> int:
+        """The instant that all grids are counted from; 0 before deployment."""
     def collect_trace(self, period_ns: int) -> None:
         """Let a native thread empty the rings so often, for drain_trace(); 0: no longer."""
     def drain_trace(self) -> TraceDrain: ...
@@ -585,6 +594,18 @@ class Deployer:
         """Ends every wait_published and wait_change at once (for shutting down)."""
 
 @final
+class Deployer(Host):
+    """The host of threads: one for each component."""
+
+    def __init__(
+        self, architecture: Architecture, *, require_realtime: bool = False, trace: bool = True
+    ) -> None: ...
+
+@final
+class SimulatedHost(Host):
+    """The host of one architecture in virtual time; from Simulation.add, which it keeps."""
+
+@final
 class Simulation:
     """Architectures in virtual time on the calling thread, the same every time.
 
@@ -594,8 +615,11 @@ class Simulation:
     """
 
     def __init__(self, *, trace: bool = True, begin_ns: int = 1_000_000_000) -> None: ...
-    def add(self, architecture: Architecture) -> None:
-        """Takes in a configured architecture, before deploy(); it lives as long as the simulation."""
+    def add(self, architecture: Architecture) -> SimulatedHost:
+        """Takes in a configured architecture, before deploy(), which lives as long as the simulation.
+
+        Returns what runs it, to command and change it by, from callbacks or between two run_until().
+        """
     def deploy(self) -> None:
         """Gives all components one epoch and starts them."""
     def shutdown(self) -> None:
@@ -608,32 +632,6 @@ class Simulation:
     def now_ns(self) -> int: ...
     def epoch_ns(self) -> int:
         """The instant that all grids are counted from; 0 before deploy()."""
-    def start(self, architecture: Architecture, component: str, clock_ns: int | None = None) -> None: ...
-    def stop(self, architecture: Architecture, component: str) -> None: ...
-    def get_time(self, architecture: Architecture, component: str) -> int: ...
-    def commit(
-        self,
-        architecture: Architecture,
-        transaction: Transaction,
-        *,
-        dry_run: bool = False,
-        expected_revision: int = 0,
-    ) -> TransactionReport:
-        """As Deployer.commit, in virtual time."""
-    def replace_core(self, architecture: Architecture, component: str, core: str) -> StepReport:
-        """In the component's present wait. Preparing takes no virtual time."""
-    def set_property(
-        self, architecture: Architecture, component: str, name: str, value: PropertyValue
-    ) -> StepReport: ...
-    def drain_trace(self, architecture: Architecture) -> TraceDrain:
-        """As Deployer.drain_trace; both times of the drain are virtual."""
-    def trace_components(self, architecture: Architecture) -> list[str]: ...
-    def trace_names(self) -> list[str]: ...
-    def take_published(self, architecture: Architecture) -> list[tuple[str, bytes, int]]:
-        """What was written to published resources since the last call; as Deployer.wait_published."""
-    def write_resource(self, architecture: Architecture, resource: str, data: bytes) -> bool:
-        """As Deployer.write_resource, stamped with the virtual time."""
-    def read_resource(self, architecture: Architecture, resource: str) -> tuple[bytes, int, int]: ...
 
 def allocation_counting() -> str:
     """Which C++ allocations the counters see: 'none', 'some' or 'all'.

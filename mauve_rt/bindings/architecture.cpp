@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Architectures and their components.
 #include "component.hpp"
+#include "transaction.hpp"
 
 namespace mauve::bindings {
 
@@ -31,6 +32,19 @@ std::vector<ResourceDescription> describe_resources(PyArchitecture& self) {
   return all;
 }
 
+/// Waits for a change under way without the interpreter's lock, which that may need.
+void commit_one(PyArchitecture& self, Transaction transaction) {
+  const py::gil_scoped_release release;
+  self.architecture.commit_one(std::move(transaction));
+}
+
+/// A whole transaction without a host; where there is one, by it.
+TransactionReport commit(PyArchitecture& self, const PyTransaction& steps) {
+  Transaction transaction = steps.build(self.registry);
+  const py::gil_scoped_release release;
+  return self.architecture.commit(std::move(transaction));
+}
+
 }  // namespace
 
 void bind_architecture(py::module_& module) {
@@ -48,13 +62,18 @@ void bind_architecture(py::module_& module) {
             const PluginRegistry& registry = self.registry;
             std::unique_ptr<CoreBase> fallback_core;
             if (!fallback.is_none()) fallback_core = make_core(fallback, registry);
-            Component& component = self.architecture.add_component(
-                name, make_shell(shell, registry), make_core(core, registry), make_fsm(fsm, registry),
-                task_settings(priority, cpus, offset_ns, period_ns, overrun, max_backlog, stack_bytes,
-                              trace_records, hung_after_ns),
-                fsm_factory(fsm, registry));
-            if (fallback_core != nullptr) component.set_fallback(std::move(fallback_core));
-            component.allow(alternatives, reconfigurable);
+            const ComponentParts rest{
+                .settings = task_settings(priority, cpus, offset_ns, period_ns, overrun, max_backlog,
+                                          stack_bytes, trace_records, hung_after_ns),
+                .alternatives = alternatives,
+                .reconfigurable = reconfigurable};
+            Transaction transaction;
+            transaction.add_component(name,
+                                      Parts{.shell = make_shell(shell, registry),
+                                            .core = make_core(core, registry),
+                                            .fsm = make_fsm(fsm, registry)},
+                                      rest, fsm_factory(fsm, registry), std::move(fallback_core));
+            commit_one(self, std::move(transaction));
             return PyComponent(object, name);
           },
           py::arg("name"), py::arg("shell"), py::arg("core"), py::arg("fsm"), py::kw_only(),
@@ -75,7 +94,9 @@ void bind_architecture(py::module_& module) {
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const py::object& resource) {
-            self.architecture.add_resource(name, make_resource(resource, self.registry));
+            Transaction transaction;
+            transaction.add_resource(name, make_resource(resource, self.registry));
+            commit_one(self, std::move(transaction));
           },
           py::arg("name"), py::arg("resource"))
       .def(
@@ -86,7 +107,9 @@ void bind_architecture(py::module_& module) {
                                                 .overwrite = overwrite,
                                                 .max_readers = max_readers,
                                                 .timeout_ns = timeout_ns};
-            self.architecture.add_resource(name, self.registry.make_resource(kind, type, parameters));
+            Transaction transaction;
+            transaction.add_resource(name, self.registry.make_resource(kind, type, parameters));
+            commit_one(self, std::move(transaction));
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
           py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders,
@@ -97,6 +120,7 @@ void bind_architecture(py::module_& module) {
              const std::string& resource,
              const std::string& service) { self.architecture.connect(component, port, resource, service); },
           py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"), Unlocked())
+      .def("commit", &commit, py::arg("transaction"))
       .def(
           "set_property",
           [](PyArchitecture& self, const std::string& component, const std::string& name,
@@ -110,18 +134,19 @@ void bind_architecture(py::module_& module) {
       .def(
           "publish",
           [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },
-          py::arg("resource"))
+          py::arg("resource"), Unlocked())
       .def(
           "subscribe",
           [](PyArchitecture& self, const std::string& resource) {
-            self.architecture.resource(resource).bind_input();
+            self.architecture.subscribe(resource);
           },
-          py::arg("resource"))
+          py::arg("resource"), Unlocked())
       .def(
           "configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
       .def(
           "cleanup",
           [](PyArchitecture& self) {
+            const auto change = self.architecture.change_lock().join();  // first: a hook may ask for a description
             const std::lock_guard lock(self.describing);
             self.architecture.cleanup();
           },

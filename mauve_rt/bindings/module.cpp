@@ -12,7 +12,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_registry(module);
   bind_architecture(module);
   bind_transaction(module);
-  bind_deployer(module);
+  bind_host(module);
   bind_simulation(module);
   module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;

@@ -25,14 +25,14 @@ void bind_descriptions(py::module_& module);
 void bind_registry(py::module_& module);
 /// Registers Architecture and Component.
 void bind_architecture(py::module_& module);
-/// Registers Deployer, its reports and the trace's drain.
-void bind_deployer(py::module_& module);
+/// Registers Host and Deployer, their reports and the trace's drain.
+void bind_host(py::module_& module);
 /// Registers Transaction and its reports.
 void bind_transaction(py::module_& module);
 /// Registers what parts written in Python see of their shell, and what they declare themselves with.
 void bind_python_shell(py::module_& module);
 void bind_python_fsm(py::module_& module);
-/// Registers Simulation; after the reports.
+/// Registers Simulation and its hosts; after Host.
 void bind_simulation(py::module_& module);
 
 py::handle mauve_error_type();

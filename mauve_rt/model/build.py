@@ -25,23 +25,28 @@ def build(
     loader = PluginLoader(registry, PluginIndex.installed() if index is None else index)
     if problems := Checks(model, loader).problems():
         raise ArchitectureFileError(model.path, problems)
+    transaction, places = _deployment(model, loader)
     architecture = Architecture(registry)
-    for name in model.components:
-        with _errors_at(model, ("components", name)):
-            _add_component(architecture, model, name=name, loader=loader)
-    for name, resource in model.resources.items():
-        with _errors_at(model, ("resources", name)):
-            architecture.add_resource(name, **resource_part(resource, registry))
-            if resource.topic is not None and resource.topic.direction == "publish":
-                architecture.publish(name)
-            elif resource.topic is not None:
-                architecture.subscribe(name)
-    for connection in model.connections:
-        with _errors_at(model, connection.location):
-            architecture.connect(
-                connection.component, connection.port, connection.resource, connection.service
-            )
+    with _errors_at(model, *places):
+        architecture.commit(transaction)
     return architecture
+
+
+def _deployment(model: ArchitectureModel, loader: PluginLoader) -> tuple[Transaction, list[Location]]:
+    """The transaction that makes an empty architecture that of the file, and the place of each step."""
+    transaction = Transaction()
+    places: list[Location] = []
+    for name in model.components:
+        places.append(("components", name))
+        with _errors_at(model, places[-1]):
+            add_component_step(transaction, model, name, loader)
+    for name in model.resources:
+        places.append(("resources", name))
+        add_resource_step(transaction, model, name, loader.registry)
+    for connection in model.connections:
+        places.append(connection.location)
+        transaction.connect(connection.component, connection.port, connection.resource, connection.service)
+    return transaction, places
 
 
 def configure(model: ArchitectureModel, architecture: Architecture) -> None:
@@ -50,7 +55,7 @@ def configure(model: ArchitectureModel, architecture: Architecture) -> None:
     Raises:
         ArchitectureFileError: a component or resource refused; the architecture is unconfigured.
     """
-    with _errors_at(model, ()):
+    with _errors_at(model):
         architecture.configure()
 
 
@@ -96,23 +101,6 @@ def add_resource_step(
     transaction.add_resource(name, **resource_part(resource, registry), topic=direction)
 
 
-def _add_component(
-    architecture: Architecture, model: ArchitectureModel, *, name: str, loader: PluginLoader
-) -> None:
-    component = model.components[name]
-    architecture.add_component(
-        name,
-        component.shell,
-        component.core,
-        component.fsm,
-        **_settings(component, loader),
-        fallback=component.fallback,
-    )
-    for key, value in model.properties(name).items():
-        with _errors_at(model, model.property_place(name, key)):
-            architecture.set_property(name, key, value)
-
-
 def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]:
     """What adding a component by file and by transaction have in common; loads the alternatives."""
     installed = not isinstance(component.alternatives, list)
@@ -140,16 +128,19 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
 
 
 @contextmanager
-def _errors_at(model: ArchitectureModel, place: Location) -> Iterator[None]:
-    """Give an error of the kernel the place in the file that it is about."""
+def _errors_at(model: ArchitectureModel, *places: Location) -> Iterator[None]:
+    """Give an error of the kernel the place in the file that it is about; `places`: those of its steps."""
     try:
         yield
     except ArchitectureFileError:
         raise
     except MauveError as error:
-        at = place or _place_of(model, error)
+        step: int = getattr(error, "step", 0)
+        place = places[max(step, 1) - 1] if places else ()
+        at = _place_of(model, error) if place in ((), ("components", error.component)) else place
         is_section = len(at) == 2  # noqa: PLR2004 - ("components", NAME)
-        problem = (model.key_problem if is_section else model.problem)(at, str(error), code=error.code)
+        text = str(error).removeprefix(f"step {step} ({getattr(error, 'step_name', '')}): ")
+        problem = (model.key_problem if is_section else model.problem)(at, text, code=error.code)
         raise ArchitectureFileError(model.path, [problem]) from error
 
 
@@ -162,8 +153,8 @@ def _place_of(model: ArchitectureModel, error: MauveError) -> Location:
             return (*place, "fsm")
         if error.code == "bad_period":
             return (*place, "period_ns" if component.period_ns else "fsm")
-        is_property = error.element in component.properties
-        return model.property_place(error.component, error.element) if is_property else place
+        name = error.element.removeprefix("property ")
+        return model.property_place(error.component, name) if name in component.properties else place
     for name in (error.component, error.element):
         if name in model.resources:
             return ("resources", name)

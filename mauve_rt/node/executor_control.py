@@ -193,7 +193,7 @@ class Control:
 
     def _commit(self, plan: Plan, request: Request, *, kernel_revision: int) -> Committed:
         try:
-            return self._runtime.deployer.make(
+            return self._runtime.host.make(
                 plan.transaction,
                 dry_run=request.dry_run,
                 expected_revision=kernel_revision if request.expected_revision else 0,
@@ -246,7 +246,7 @@ class Control:
             self._stop(step.target, _timeout_ns(request))
             message = f"component '{step.target}' is stopped"
         else:
-            self._runtime.deployer.start(step.target, request.clock_ns or None)
+            self._runtime.host.start(step.target, request.clock_ns or None)
             message = f"component '{step.target}' is started"
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 
@@ -256,7 +256,7 @@ class Control:
         while True:
             left_ns = deadline_ns - monotonic_ns()
             try:
-                self._runtime.deployer.stop(component, max(0, min(left_ns, _STOP_SLICE_NS)))
+                self._runtime.host.stop(component, max(0, min(left_ns, _STOP_SLICE_NS)))
             except MauveError as error:
                 if error_code(error) == "timeout" and left_ns > _STOP_SLICE_NS and self._runtime.active:
                     continue  # a stop that timed out stays pending

@@ -162,7 +162,7 @@ class ExecutorNode(LifecycleNode):
         with self._starting_or_ending:
             self._runtime.activate()
             self._bound.start()
-            self._state.start(self._runtime.deployer)
+            self._state.start(self._runtime.host)
         self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
 
     def _clean_up(self) -> None:

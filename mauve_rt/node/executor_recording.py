@@ -98,7 +98,7 @@ class Recording:
         with self._lock:
             self.stop()
             recorder = Recorder(
-                self._runtime.deployer,
+                self._runtime.host,
                 bag.absolute(),
                 node_name=self._node.get_fully_qualified_name(),
                 split=split,

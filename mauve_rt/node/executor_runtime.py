@@ -1,4 +1,4 @@
-"""An architecture at work: its deployer, its instance and its revision. Knows nothing of ROS."""
+"""An architecture at work: its host, its instance and its revision. Knows nothing of ROS."""
 
 import threading
 import uuid
@@ -11,6 +11,7 @@ from mauve_rt._kernel import (
     Architecture,
     ComponentDescription,
     Deployer,
+    Host,
     PluginRegistry,
     RealtimeStatus,
     RecentMaxima,
@@ -78,7 +79,7 @@ class Runtime:
         self._trace = trace
         self._declared: Mapping[str, _Declared] = {}
         self._architecture: Architecture | None = None
-        self._deployer: Deployer | None = None
+        self._host: Host | None = None
         self._lock = threading.Lock()
         self._revision = 0
         self._claimed = 0  # the last revision that a request's own change was counted by
@@ -106,7 +107,7 @@ class Runtime:
             ArchitectureFileError: it cannot be built or configured.
             MauveError: real time is required and was not granted.
         """
-        if self._deployer is not None:
+        if self._host is not None:
             return
         model = self.model
         self.index = PluginIndex.installed()
@@ -114,30 +115,31 @@ class Runtime:
             architecture = build(model, self.registry, index=self.index)
         configure(model, architecture)
         require_realtime = self._require_realtime or model.require_realtime
-        deployer = self._make_deployer(architecture, require_realtime=require_realtime)
+        host = self._make_host(architecture, require_realtime=require_realtime)
         try:
-            deployer.prepare_process()
+            host.prepare_process()
         except BaseException:
             architecture.cleanup()
             raise
         with self.loading() as loader:
             self._declared = self._with_cores(model.components, loader)
-        self._architecture, self._deployer = architecture, deployer
+        self._architecture, self._host = architecture, host
         self.observe()
 
-    def _make_deployer(self, architecture: Architecture, *, require_realtime: bool) -> Deployer:
+    def _make_host(self, architecture: Architecture, *, require_realtime: bool) -> Host:
         return Deployer(architecture, require_realtime=require_realtime, trace=self._trace)
 
     def activate(self) -> None:
         """Deploy: every component starts on the grid."""
-        self.deployer.deploy()
+        if not self.host.is_deployed():  # with others of the same simulation
+            self.host.deploy()
         self.active = True
         self.observe()
 
     def deactivate(self) -> None:
         """Write safe outputs, park the components, join their threads."""
         self.active = False
-        self.deployer.shutdown()
+        self.host.shutdown()
         self.observe()
 
     def cleanup(self) -> None:
@@ -148,7 +150,7 @@ class Runtime:
         """
         self.require_parked()
         self._model = None
-        architecture, self._architecture, self._deployer = self._architecture, None, None
+        architecture, self._architecture, self._host = self._architecture, None, None
         self._mark = None
         if architecture is not None:
             architecture.cleanup()
@@ -172,15 +174,15 @@ class Runtime:
 
     @property
     def configured(self) -> bool:
-        """Whether there is a deployer."""
-        return self._deployer is not None
+        """Whether there is a host."""
+        return self._host is not None
 
     @property
-    def deployer(self) -> Deployer:
-        """The deployer, between configure() and cleanup()."""
-        if self._deployer is None:
+    def host(self) -> Host:
+        """What runs the architecture, between configure() and cleanup()."""
+        if self._host is None:
             raise RuntimeError("not configured")
-        return self._deployer
+        return self._host
 
     @property
     def architecture(self) -> Architecture:
@@ -203,13 +205,13 @@ class Runtime:
 
     def realtime_status(self) -> RealtimeStatus | None:
         """What was granted of the real-time rights; None while unconfigured."""
-        deployer = self._deployer
-        return deployer.realtime_status() if deployer is not None else None
+        host = self._host
+        return host.realtime_status() if host is not None else None
 
     def deployment_epoch_ns(self) -> int:
         """The instant all grids count from; 0 while not deployed."""
-        deployer = self._deployer
-        return deployer.epoch_ns if deployer is not None and self.active else 0
+        host = self._host
+        return host.epoch_ns if host is not None and self.active else 0
 
     def resources(self) -> list[str]:
         """Names of the resources there are now; none while unconfigured. From any thread."""

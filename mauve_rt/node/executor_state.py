@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent
-from mauve_rt._kernel import Deployer
+from mauve_rt._kernel import Host
 from mauve_rt.node.executor_events import Event, Events
 from mauve_rt.node.executor_faults import FaultWatch
 from mauve_rt.node.executor_messages import architecture_state, reconfiguration_event
@@ -87,10 +87,10 @@ class StatePublisher:
         """Publish all events there are, with what is known by now."""
         self._queue.flush()
 
-    def start(self, deployer: Deployer) -> None:
+    def start(self, host: Host) -> None:
         """Watch the components, so that changes nobody asked for, such as faults, are published at once."""
         self._ending.clear()
-        look = functools.partial(self._look, deployer, FaultWatch())
+        look = functools.partial(self._look, host, FaultWatch())
         self._thread = self._watch.thread("state", look, ending=self._ending)
         self._thread.start()
 
@@ -107,9 +107,9 @@ class StatePublisher:
         self.stop()
         self._queue.close()
 
-    def _look(self, deployer: Deployer, faults: FaultWatch) -> None:
+    def _look(self, host: Host, faults: FaultWatch) -> None:
         """Wait for a change, and tell of it; one that could not be told is told with the next look."""
-        if not deployer.wait_change(_WAIT_NS) and not self._behind:
+        if not host.wait_change(_WAIT_NS) and not self._behind:
             return
         self._ending.wait(_SETTLED_S)
         self._behind = True

@@ -71,7 +71,7 @@ class SimulatedExecutor:
         self._waiting: list[SentMessage] = []
         self._refused = 0
         self._architecture = b""
-        self._bag = TraceBag(self._runtime.simulated, bag, node_name=self.name, on_error=complain)
+        self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
         for topic in (f"{self.name}/state", f"{self.name}/events"):
             self.record_topic(topic)
 
@@ -83,7 +83,7 @@ class SimulatedExecutor:
             return
 
         def receive(sample: Sample) -> None:
-            self._runtime.simulated.write_resource(resource, sample.data)
+            self._runtime.host.write_resource(resource, sample.data)
 
         self._topics.listen(topic, receive)
         self.record_topic(topic)
@@ -131,7 +131,7 @@ class SimulatedExecutor:
 
     def carry(self) -> None:
         """Publish what was written to the resources that are bound to topics."""
-        for resource, data, time_ns in self._runtime.simulated.take_published():
+        for resource, data, time_ns in self._runtime.host.wait_published(0):
             topic, type_name, qos = self._outgoing[resource]
             sample = Sample(topic, type_name, data, time_ns, qos)
             self._keep(sample)
@@ -140,7 +140,7 @@ class SimulatedExecutor:
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
         waiting, self._waiting = self._waiting, []
-        drain = self._runtime.simulated.drain_trace()
+        drain = self._runtime.host.drain_trace()
         if self._architecture:
             self._bag.tell_architecture(self._architecture, drain)
         self._refused += self._bag.write(drain, waiting, whole=True)

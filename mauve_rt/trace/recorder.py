@@ -65,7 +65,7 @@ class Recorder:
         """Create the bag; nothing is drained before start().
 
         Args:
-            source: the deployer.
+            source: the architecture's host.
             directory: the bag's folder, which must not exist yet.
             node_name: absolute name of the executor's node, e.g. /robot_1/executor; the trace is below it.
             flush_period_s: so much, and what a flush takes, is lost by a kill at most.

@@ -65,7 +65,7 @@ class TraceWords(Protocol):
 
 
 class TraceSource(TraceWords, Protocol):
-    """The part of `mauve_rt._kernel.Deployer` that the recorder uses."""
+    """The part of `mauve_rt._kernel.Host` that the recorder uses."""
 
     def collect_trace(self, period_ns: int) -> None:
         """Empty the rings so often, by a thread without the interpreter, for drain_trace(); 0: no longer."""
@@ -108,7 +108,7 @@ class TraceBag:
         """Create the bag; nothing is drained yet.
 
         Args:
-            words: the deployer's, or a simulation's.
+            words: a host's.
             directory: the bag's folder, which must not exist yet.
             node_name: absolute name of the executor's node; the trace is below it.
             on_error: called at most once for each type that cannot be recorded, with one line.

@@ -126,8 +126,8 @@ class _Spy:
 def test_what_may_be_missed_is_the_request_s(
     runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    spy = _Spy(runtime.deployer)
-    monkeypatch.setattr(runtime, "_deployer", spy)
+    spy = _Spy(runtime.host)
+    monkeypatch.setattr(runtime, "_host", spy)
     step = Step("replace_core", "counter", "executor_tests/Backwards")
     for max_missed in (0, 3):
         outcome = control.handle(Request(steps=(step,), max_missed=max_missed))
@@ -173,14 +173,14 @@ def test_a_transaction_adds_wires_and_starts_and_another_one_removes(
     values = {item.name: item.value for item in second.properties}
     assert (values["step"], values["list_file"]) == (3.0, str(tmp_path / "a.txt"))
     assert runtime.cores_of(second) == ["executor_tests/Backwards"]
-    _wait(lambda: runtime.deployer.read_resource("sum")[1] > 0)
+    _wait(lambda: runtime.host.read_resource("sum")[1] > 0)
     replaced = _ask(control, Step("replace_core", "second", "executor_tests/Backwards"))
     assert replaced.success, replaced.message
     removed = _ask(control, *REMOVE)
     assert removed.success, removed.message
     assert _look(runtime)[:2] == before[:2]
     assert _ask(control, Step("stop", "second")).code is Code.UNKNOWN_COMPONENT
-    assert "second" in runtime.deployer.trace_components()
+    assert "second" in runtime.host.trace_components()
 
 
 def test_a_dry_run_prepares_everything_and_changes_nothing(runtime: Runtime, control: Control) -> None:
@@ -310,9 +310,9 @@ def test_components_stop_in_the_reverse_order_of_the_file(runtime: Runtime) -> N
     names = [part.name for part in runtime.components()]
     _wait(lambda: all(part.releases > 0 for part in runtime.components()))
     runtime.deactivate()
-    records = struct.iter_unpack("<QqqqqIHH", runtime.deployer.drain_trace().records)
+    records = struct.iter_unpack("<QqqqqIHH", runtime.host.drain_trace().records)
     stops = sorted((time_ns, component) for _, time_ns, *_, kind, component in records if kind == Kind.STOP)
-    assert [runtime.deployer.trace_components()[component] for _, component in stops] == names[::-1]
+    assert [runtime.host.trace_components()[component] for _, component in stops] == names[::-1]
 
 
 def test_expected_revision(runtime: Runtime, control: Control) -> None:
@@ -364,7 +364,7 @@ def test_a_core_replaced_by_its_like_counts_as_a_change(runtime: Runtime, contro
 
 def test_a_fallback_core_takes_over_and_tells_the_fault(runtime: Runtime, control: Control) -> None:
     before = runtime.revision
-    assert runtime.deployer.write_resource("poison", POISON)
+    assert runtime.host.write_resource("poison", POISON)
     _wait(lambda: _part(runtime, "brave").fell_back)
     brave = _part(runtime, "brave")
     assert (brave.state, brave.core, brave.fallback) == ("RUNNING", *["executor_tests/Backwards"] * 2)
@@ -384,7 +384,7 @@ def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) 
         Step("start", "weak"),
     )
     assert _ask(control, *steps).success
-    runtime.deployer.write_resource("poison", POISON)
+    runtime.host.write_resource("poison", POISON)
     _wait(lambda: _part(runtime, "weak").state == "FAULTED")
     refused = _ask(control, Step("set_property", "weak", "step", "2.0"))
     assert (refused.code, "remove it" in refused.message) == (Code.FAULTED, True)

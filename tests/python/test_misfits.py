@@ -155,14 +155,14 @@ def test_a_message_of_three_megabytes_passes_in_virtual_time(tmp_path: Path, mis
     architecture = build(model, PluginRegistry())
     configure(model, architecture)
     simulation = Simulation(trace=False)
-    simulation.add(architecture)
+    host = simulation.add(architecture)
     simulation.deploy()
     payload = b"\x00\x01\x00\x00" + bytes(range(1, 251)) * 12_000
     assert len(payload) == 3_000_004
     simulation.run_until(simulation.now_ns() + 50_000_000)
-    assert simulation.write_resource(architecture, "in", payload)
+    assert host.write_resource("in", payload)
     simulation.run_until(simulation.now_ns() + 50_000_000)
-    assert simulation.read_resource(architecture, "out")[0] == payload
+    assert host.read_resource("out")[0] == payload
     simulation.shutdown()
 
 

@@ -25,23 +25,23 @@ def test_rule_13_every_instant_is_run_and_the_trace_is_the_same_every_time():
             stage.add("count", CountShell, CountCore)
             stage.architecture.configure()
             simulation = Simulation()
-            simulation.add(stage.architecture)
+            host = simulation.add(stage.architecture)
             simulation.deploy()
             simulation.run_until(simulation.epoch_ns() + s_to_ns(2))
             assert stage.architecture.component("count").core.count == 1001, "t = 0, 2 ms, ... 2 s"
-            traces.append(simulation.drain_trace(stage.architecture).records)
+            traces.append(host.drain_trace().records)
             simulation.shutdown()
     assert traces[0] == traces[1] != b""
 
 
 def test_rule_13_transactions_and_callbacks_act_at_their_instants(pair: Stage):
     simulation = Simulation()
-    simulation.add(pair.architecture)
+    host = simulation.add(pair.architecture)
     simulation.deploy()
     epoch_ns = simulation.epoch_ns()
     seen: list[int] = []
     steps = Transaction().set_property("count", "step", 10)
-    simulation.at(epoch_ns + 9 * MS, lambda: simulation.commit(pair.architecture, steps))
+    simulation.at(epoch_ns + 9 * MS, lambda: host.commit(steps))
     simulation.every(epoch_ns, 5 * MS, lambda: seen.append(simulation.now_ns() - epoch_ns))
     simulation.run_until(epoch_ns + 12 * MS)
     assert seen == [0, 5 * MS, 10 * MS]
@@ -50,10 +50,10 @@ def test_rule_13_transactions_and_callbacks_act_at_their_instants(pair: Stage):
     assert [(int(s.value.pose.position.x), s.time_ns - epoch_ns) for s in heard] == [
         (1, 0), (2, 2 * MS), (3, 4 * MS), (4, 6 * MS), (5, 8 * MS), (15, 10 * MS), (25, 12 * MS)
     ]  # fmt: skip
-    simulation.stop(pair.architecture, "count")
+    host.stop("count")
     assert pair.architecture.component("count").state == "STOPPED"
     with pytest.raises(MauveError, match="nobody"):
-        simulation.get_time(pair.architecture, "nobody")
+        host.get_time("nobody")
 
 
 def test_what_a_callback_raises_is_raised_by_run_until(pair: Stage):

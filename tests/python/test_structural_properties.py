@@ -80,15 +80,15 @@ def test_threads(paced: Stage):
 def test_virtual_time(paced: Stage):
     paced.architecture.configure()
     simulation = Simulation()
-    simulation.add(paced.architecture)
+    host = simulation.add(paced.architecture)
     simulation.deploy()
     epoch_ns = simulation.epoch_ns()
     simulation.run_until(epoch_ns + 3 * MS)
     with pytest.raises(MauveError) as caught:
-        simulation.set_property(paced.architecture, "paced", "size", 9)
+        host.set_property("paced", "size", 9)
     _refused(caught, "core")
     steps = Transaction().set_property("paced", "period_ms", 5).replace_fsm("paced", PacedFsm)
-    simulation.commit(paced.architecture, steps)
+    host.commit(steps)
     simulation.run_until(epoch_ns + 15 * MS)
     instants = paced.architecture.component("paced").core.instants
     assert [instant - epoch_ns for instant in instants] == [0, 2 * MS, 5 * MS, 10 * MS, 15 * MS]

@@ -188,15 +188,15 @@ def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
 
 def simulate(architecture: Architecture) -> TraceDrain:
     simulation = Simulation(trace=True, begin_ns=s_to_ns(1))
-    simulation.add(architecture)
+    host = simulation.add(architecture)
     simulation.deploy()
-    simulation.at(simulation.epoch_ns() + ms_to_ns(10), lambda: simulation.stop(architecture, "hover"))
-    simulation.every(simulation.now_ns(), ms_to_ns(1), lambda: simulation.get_time(architecture, "hover"))
+    simulation.at(simulation.epoch_ns() + ms_to_ns(10), lambda: host.stop("hover"))
+    simulation.every(simulation.now_ns(), ms_to_ns(1), lambda: host.get_time("hover"))
     simulation.run_until(s_to_ns(2))
-    simulation.start(architecture, "hover")
-    simulation.commit(architecture, Transaction().stop("hover"))
+    host.start("hover")
+    host.commit(Transaction().stop("hover"))
     simulation.shutdown()
-    return simulation.drain_trace(architecture)
+    return host.drain_trace()
 
 
 def run(registry: PluginRegistry) -> StepReport:

@@ -56,15 +56,15 @@ class Bound:
 
     def received(self, resource: str, message_type: Any) -> Any:
         """What a resource holds."""
-        return deserialize_message(self.runtime.deployer.read_resource(resource)[0], message_type)
+        return deserialize_message(self.runtime.host.read_resource(resource)[0], message_type)
 
     def raised(self, resource: str) -> int:
         """How often an event was raised."""
-        return self.runtime.deployer.read_resource(resource)[1]
+        return self.runtime.host.read_resource(resource)[1]
 
     def write(self, resource: str, message: Any) -> bool:
         """Write a message to a resource, as a component would."""
-        return self.runtime.deployer.write_resource(resource, serialize_message(message))
+        return self.runtime.host.write_resource(resource, serialize_message(message))
 
 
 Bind = Callable[[str], Bound]

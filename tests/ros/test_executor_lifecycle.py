@@ -114,6 +114,6 @@ def test_a_cleanup_that_is_refused_closes_nothing(architecture: Path, graph: Any
         assert node._state_machine.current_state[1] == "inactive"
         assert node.has_parameter("counter.step")
         assert graph.node.count_publishers("/robot_1/count") == 1
-        assert runtime.deployer.write_resource("set", NUMBER)  # what the state waits for
+        assert runtime.host.write_resource("set", NUMBER)  # what the state waits for
         graph.spin_until(lambda: not runtime.busy(), "its end")
         assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS

@@ -8,6 +8,13 @@
 
 namespace mauve {
 
+namespace {
+
+/// For so long, all together, each component is stopped only when the one after it has come to rest.
+constexpr time_ns_t kInOrder = ms_to_ns(50);
+
+}  // namespace
+
 void Host::require_deployable() const {
   if (is_deployed()) throw Error(ErrorCode::already_running, "the architecture is deployed already");
   if (architecture_.is_configured()) return;
@@ -88,19 +95,19 @@ void Host::start_all(time_ns_t epoch_ns) {
 
 void Host::stop_all(time_ns_t until_ns) noexcept {
   const auto components = architecture_.components();
-  const auto stop = [](Task& task, time_ns_t timeout_ns) {
+  const auto stop = [](Task& task, time_ns_t by_ns) {
     try {
-      task.stop(timeout_ns);
+      task.stop(std::max<time_ns_t>(0, by_ns - monotonic_now_ns()));
     } catch (const Error&) {  // still in a state, or faulted by now: ending its thread is the answer
     }
   };
-  for (const bool waits : {false, true}) {
-    for (auto component = components.rbegin(); component != components.rend(); ++component) {
-      Task& task = (*component)->task();
-      const ComponentState state = settled(task.state());
-      if (state != ComponentState::running && !(waits && state == ComponentState::stopping)) continue;
-      stop(task, waits ? std::max<time_ns_t>(0, until_ns - monotonic_now_ns()) : 0);
-    }
+  const time_ns_t in_order_until = std::min(until_ns, monotonic_now_ns() + kInOrder);
+  for (auto component = components.rbegin(); component != components.rend(); ++component) {
+    Task& task = (*component)->task();
+    if (settled(task.state()) == ComponentState::running) stop(task, in_order_until);
+  }
+  for (const auto& component : components) {
+    if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);
   }
 }
 

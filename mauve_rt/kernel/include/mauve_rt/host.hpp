@@ -96,7 +96,7 @@ class Host {
   void require_deployed() const;
   /// All grids count from the instant, and every component that is stopped starts on it. [setup]
   void start_all(time_ns_t epoch_ns);
-  /// Asks all to stop, the last one first, then waits for them. [non-rt]
+  /// Stops all, the last one first; who does not come to rest soon keeps none of the others running. [non-rt]
   void stop_all(time_ns_t until_ns) noexcept;
   /// From here on nobody starts anything, and no change of a running architecture is made.
   void set_deployed(bool deployed) noexcept { deployed_.store(deployed, std::memory_order_seq_cst); }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/deployer.hpp"
+// What runs an architecture, bound once: Deployer and SimulatedHost are made differently, and used alike.
+#include "host.hpp"
 
+#include "mauve_rt/deployer.hpp"
 #include "mauve_rt/futex.hpp"
-#include "mauve_rt/trace_collector.hpp"
 
 #include "transaction.hpp"
 
@@ -12,29 +13,26 @@ namespace {
 
 using Unlocked = py::call_guard<py::gil_scoped_release>;
 
-using PublishedSample = std::tuple<std::string, std::vector<std::byte>, time_ns_t>;
-
 py::bytes to_bytes(const void* data, std::size_t size) { return {static_cast<const char*>(data), size}; }
 
-/// A deployer with what its waits have seen, so that Python needs to carry nothing from call to call.
-class PyDeployer {
+/// Threads end without the interpreter's lock, and before the interpreter does.
+class PyDeployer final : public PyHost {
  public:
   PyDeployer(PyArchitecture& architecture, bool require_realtime, bool trace)
-      : registry_(architecture.registry),
-        architecture_(architecture.architecture),
-        deployer_(architecture_, {.require_realtime = require_realtime, .trace = trace}) {
+      : PyHost(architecture),
+        deployer_(std::make_unique<Deployer>(
+            architecture.architecture,
+            DeployerOptions{.require_realtime = require_realtime, .trace = trace})) {
     living().insert(this);
   }
-  ~PyDeployer() {
+  ~PyDeployer() override {
     living().erase(this);
-    const py::gil_scoped_release release;  // a component thread may need the interpreter to come to its end
-    deployer_.shutdown();
+    // A component thread, or a change that is being prepared, may need the interpreter to come to its end.
+    const py::gil_scoped_release release;
+    deployer_.reset();
   }
-  PyDeployer(const PyDeployer&) = delete;
-  PyDeployer& operator=(const PyDeployer&) = delete;
 
-  Deployer& deployer() noexcept { return deployer_; }
-  const PluginRegistry& registry() const noexcept { return registry_; }
+  Host& host() const noexcept override { return *deployer_; }
 
   /// Every deployer there is, under the interpreter's lock: at its end no component thread may want that any
   /// more.
@@ -45,78 +43,11 @@ class PyDeployer {
   static void shut_down_all() {
     const std::set<PyDeployer*> all = living();
     const py::gil_scoped_release release;
-    for (PyDeployer* deployer : all) deployer->deployer().shutdown();
-  }
-
-  std::vector<PublishedSample> wait_published(time_ns_t timeout_ns) {
-    const time_ns_t until = monotonic_now_ns() + timeout_ns;
-    std::vector<PublishedSample> samples;
-    for (;;) {
-      const std::uint32_t word =
-          architecture_.publications().word();  // before the look: what comes after is noticed
-      std::string resource;
-      std::vector<std::byte> message;
-      time_ns_t time_ns = 0;
-      while (architecture_.next_published(resource, message, time_ns))
-        samples.emplace_back(resource, message, time_ns);
-      if (!samples.empty() || woken() || monotonic_now_ns() >= until) return samples;
-      architecture_.publications().wait(word, until);
-    }
-  }
-
-  bool wait_change(time_ns_t timeout_ns) {
-    const time_ns_t until = monotonic_now_ns() + timeout_ns;
-    const std::uint32_t word = deployer_.wait_change(seen_change_, until);
-    const bool changed = word != seen_change_;
-    seen_change_ = word;
-    return changed;
-  }
-
-  void wake() noexcept {
-    woken_.store(true, std::memory_order_release);
-    architecture_.publications().notify();
-    architecture_.changes().bump();
-  }
-
-  bool write_resource(const std::string& name, std::string_view data) {
-    return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)), monotonic_now_ns());
-  }
-
-  py::tuple read_resource(const std::string& name) {
-    Resource& resource = architecture_.resource(name);
-    std::vector<std::byte> message;
-    time_ns_t time_ns = 0;
-    std::uint64_t sequence = 0;
-    {
-      const py::gil_scoped_release release;
-      resource.peek_sample(message, time_ns, sequence);
-    }
-    return py::make_tuple(to_bytes(message.data(), message.size()), sequence, time_ns);
-  }
-
-  std::vector<std::string> trace_components() const { return architecture_.trace_components(); }
-
-  void collect_trace(time_ns_t period_ns) {
-    const std::lock_guard lock(collector_mutex_);
-    collector_.reset();
-    if (period_ns > 0) collector_ = std::make_unique<TraceCollector>(architecture_, period_ns);
-  }
-
-  TraceDrain drain_trace() {
-    const std::lock_guard lock(collector_mutex_);
-    return collector_ != nullptr ? collector_->take() : architecture_.drain_trace();
+    for (PyDeployer* deployer : all) deployer->deployer_->shutdown();
   }
 
  private:
-  bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
-
-  const PluginRegistry& registry_;
-  Architecture& architecture_;
-  Deployer deployer_;
-  std::mutex collector_mutex_;
-  std::unique_ptr<TraceCollector> collector_;  // under collector_mutex_
-  std::atomic<bool> woken_{false};             // release/acquire: set once, for good
-  std::uint32_t seen_change_{0};               // of the one thread that waits for changes
+  std::unique_ptr<Deployer> deployer_;
 };
 
 CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
@@ -124,18 +55,18 @@ CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
 }
 
 /// By its registered name, which the component must declare; or by its class, which is the program's own.
-StepReport replace_core(PyDeployer& self, const std::string& component, const py::object& core,
+StepReport replace_core(PyHost& self, const std::string& component, const py::object& core,
                         time_ns_t commit_timeout_ns, time_ns_t phase_timeout_ns) {
   const CommitTimeouts limits = timeouts(commit_timeout_ns, phase_timeout_ns);
   if (py::isinstance<py::str>(core)) {
     const auto name = core.cast<std::string>();
     const py::gil_scoped_release release;
-    return self.deployer().replace_core(component, name, limits);
+    return self.host().replace_core(component, name, limits);
   }
   Transaction transaction;
   transaction.replace_core(component, make_core(core, self.registry()));
   const py::gil_scoped_release release;
-  return self.deployer().commit(std::move(transaction), {.timeouts = limits}).steps.at(0);
+  return self.host().commit(std::move(transaction), {.timeouts = limits}).steps.at(0);
 }
 
 /// A transaction that is in force, for who asks for its report later.
@@ -155,7 +86,7 @@ class PyCommitted {
   std::unique_ptr<TransactionCommit> work_;
 };
 
-std::unique_ptr<PyCommitted> make(PyDeployer& self, const PyTransaction& steps, bool dry_run,
+std::unique_ptr<PyCommitted> make(PyHost& self, const PyTransaction& steps, bool dry_run,
                                   std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
                                   std::int64_t max_missed) {
   Transaction transaction = steps.build(self.registry());
@@ -164,10 +95,10 @@ std::unique_ptr<PyCommitted> make(PyDeployer& self, const PyTransaction& steps, 
                                    .dry_run = dry_run,
                                    .expected_revision = expected_revision,
                                    .max_missed = max_missed};
-  return std::make_unique<PyCommitted>(self.deployer().make(std::move(transaction), options));
+  return std::make_unique<PyCommitted>(self.host().make(std::move(transaction), options));
 }
 
-TransactionReport commit(PyDeployer& self, const PyTransaction& steps, bool dry_run,
+TransactionReport commit(PyHost& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
                          time_ns_t phase_timeout_ns, std::int64_t max_missed) {
   const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, max_missed);
@@ -211,39 +142,89 @@ void bind_reports(py::module_& module) {
 
 }  // namespace
 
-void bind_deployer(py::module_& module) {
+std::vector<PyHost::PublishedSample> PyHost::wait_published(time_ns_t timeout_ns) {
+  const time_ns_t until = host().is_simulated() ? 0 : monotonic_now_ns() + timeout_ns;
+  std::vector<PublishedSample> samples;
+  for (;;) {
+    const std::uint32_t word = architecture_.publications().word();  // before the look: what comes after is noticed
+    PublishedSample sample;
+    auto& [resource, message, time_ns] = sample;
+    while (architecture_.next_published(resource, message, time_ns)) samples.push_back(sample);
+    if (!samples.empty() || woken() || monotonic_now_ns() >= until) return samples;
+    architecture_.publications().wait(word, until);
+  }
+}
+
+bool PyHost::wait_change(time_ns_t timeout_ns) {
+  const std::uint32_t word = host().wait_change(seen_change_, monotonic_now_ns() + timeout_ns);
+  const bool changed = word != seen_change_;
+  seen_change_ = word;
+  return changed;
+}
+
+void PyHost::wake() noexcept {
+  woken_.store(true, std::memory_order_release);
+  architecture_.publications().notify();
+  architecture_.changes().bump();
+}
+
+bool PyHost::write_resource(const std::string& name, std::string_view data) {
+  return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)), host().now_ns());
+}
+
+py::tuple PyHost::read_resource(const std::string& name) {
+  std::vector<std::byte> message;
+  time_ns_t time_ns = 0;
+  std::uint64_t sequence = 0;
+  {
+    const py::gil_scoped_release release;
+    architecture_.hold_resource(name)->peek_sample(message, time_ns, sequence);
+  }
+  return py::make_tuple(to_bytes(message.data(), message.size()), sequence, time_ns);
+}
+
+void PyHost::collect_trace(time_ns_t period_ns) {
+  const std::lock_guard lock(collector_mutex_);
+  collector_.reset();
+  if (period_ns > 0 && !host().is_simulated())
+    collector_ = std::make_unique<TraceCollector>(architecture_, period_ns);
+}
+
+TraceDrain PyHost::drain_trace() {
+  const std::lock_guard lock(collector_mutex_);
+  return collector_ != nullptr ? collector_->take() : host().drain_trace();
+}
+
+void bind_host(py::module_& module) {
   bind_reports(module);
   py::class_<PyCommitted>(module, "Committed")
       .def("report", &PyCommitted::report, py::arg("phase_timeout_ns") = 0, Unlocked());
-  py::module_::import("atexit").attr("register")(py::cpp_function(&PyDeployer::shut_down_all));
-  py::class_<PyDeployer>(module, "Deployer")
-      .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
-           py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>())
+  py::class_<PyHost>(module, "Host")
       .def(
-          "prepare_process", [](PyDeployer& self) { self.deployer().prepare_process(); }, Unlocked())
+          "prepare_process", [](PyHost& self) { self.host().prepare_process(); }, Unlocked())
       .def("deploy",
-           [](PyDeployer& self) {
+           [](PyHost& self) {
              shorten_switch_interval();
              const py::gil_scoped_release release;
-             self.deployer().deploy();
+             self.host().deploy();
            })
       .def(
-          "shutdown", [](PyDeployer& self) { self.deployer().shutdown(); }, Unlocked())
+          "shutdown", [](PyHost& self) { self.host().shutdown(); }, Unlocked())
       .def(
           "stop",
-          [](PyDeployer& self, const std::string& component, time_ns_t timeout_ns) {
-            self.deployer().stop(component, timeout_ns);
+          [](PyHost& self, const std::string& component, time_ns_t timeout_ns) {
+            self.host().stop(component, timeout_ns);
           },
           py::arg("component"), py::arg("timeout_ns") = s_to_ns(1), Unlocked())
       .def(
           "start",
-          [](PyDeployer& self, const std::string& component, std::optional<time_ns_t> clock_ns) {
-            self.deployer().start(component, clock_ns);
+          [](PyHost& self, const std::string& component, std::optional<time_ns_t> clock_ns) {
+            self.host().start(component, clock_ns);
           },
           py::arg("component"), py::arg("clock_ns") = std::nullopt, Unlocked())
       .def(
           "get_time",
-          [](PyDeployer& self, const std::string& component) { return self.deployer().get_time(component); },
+          [](PyHost& self, const std::string& component) { return self.host().get_time(component); },
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
@@ -255,22 +236,26 @@ void bind_deployer(py::module_& module) {
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(
           "set_property",
-          [](PyDeployer& self, const std::string& component, const std::string& name,
+          [](PyHost& self, const std::string& component, const std::string& name,
              const PropertyValue& value, time_ns_t commit_timeout_ns) {
-            return self.deployer().set_property(component, name, value, timeouts(commit_timeout_ns, 0));
+            return self.host().set_property(component, name, value, timeouts(commit_timeout_ns, 0));
           },
           py::arg("component"), py::arg("name"), py::arg("value"), py::kw_only(),
           py::arg("commit_timeout_ns") = s_to_ns(1), Unlocked())
-      .def("realtime_status", [](PyDeployer& self) { return self.deployer().realtime_status(); })
-      .def_property_readonly("epoch_ns", [](PyDeployer& self) { return self.deployer().epoch_ns(); })
-      .def("collect_trace", &PyDeployer::collect_trace, py::arg("period_ns"), Unlocked())
-      .def("drain_trace", &PyDeployer::drain_trace, Unlocked())
-      .def("trace_components", &PyDeployer::trace_components)
-      .def("trace_names", [](PyDeployer&) { return TraceNames::all(); })
+      .def(
+          "describe", [](PyHost& self) { return self.host().describe(); }, Unlocked())
+      .def("is_deployed", [](PyHost& self) { return self.host().is_deployed(); })
+      .def("now_ns", [](PyHost& self) { return self.host().now_ns(); })
+      .def("realtime_status", [](PyHost& self) { return self.host().realtime_status(); })
+      .def_property_readonly("epoch_ns", [](PyHost& self) { return self.host().epoch_ns(); })
+      .def("collect_trace", &PyHost::collect_trace, py::arg("period_ns"), Unlocked())
+      .def("drain_trace", &PyHost::drain_trace, Unlocked())
+      .def("trace_components", &PyHost::trace_components)
+      .def("trace_names", [](PyHost&) { return Host::trace_names(); })
       .def(
           "wait_published",
-          [](PyDeployer& self, time_ns_t timeout_ns) {
-            std::vector<PublishedSample> samples;
+          [](PyHost& self, time_ns_t timeout_ns) {
+            std::vector<PyHost::PublishedSample> samples;
             {
               const py::gil_scoped_release release;
               samples = self.wait_published(timeout_ns);
@@ -282,10 +267,14 @@ void bind_deployer(py::module_& module) {
             return list;
           },
           py::arg("timeout_ns"))
-      .def("write_resource", &PyDeployer::write_resource, py::arg("resource"), py::arg("data"), Unlocked())
-      .def("read_resource", &PyDeployer::read_resource, py::arg("resource"))
-      .def("wait_change", &PyDeployer::wait_change, py::arg("timeout_ns"), Unlocked())
-      .def("wake", &PyDeployer::wake, Unlocked());
+      .def("write_resource", &PyHost::write_resource, py::arg("resource"), py::arg("data"), Unlocked())
+      .def("read_resource", &PyHost::read_resource, py::arg("resource"))
+      .def("wait_change", &PyHost::wait_change, py::arg("timeout_ns"), Unlocked())
+      .def("wake", &PyHost::wake, Unlocked());
+  py::module_::import("atexit").attr("register")(py::cpp_function(&PyDeployer::shut_down_all));
+  py::class_<PyDeployer, PyHost>(module, "Deployer")
+      .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
+           py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>());
 }
 
 }  // namespace mauve::bindings

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What runs an architecture, as Python holds it.
+#pragma once
+
+#include "mauve_rt/futex.hpp"
+#include "mauve_rt/host.hpp"
+#include "mauve_rt/trace_collector.hpp"
+
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+/// A host with what its waits have seen, so that Python needs to carry nothing from call to call. In virtual time
+/// nothing happens while the caller waits: waits return at once.
+class PyHost {
+ public:
+  using PublishedSample = std::tuple<std::string, std::vector<std::byte>, time_ns_t>;
+
+  explicit PyHost(PyArchitecture& architecture)
+      : registry_(architecture.registry), architecture_(architecture.architecture) {}
+  virtual ~PyHost() = default;
+  PyHost(const PyHost&) = delete;
+  PyHost& operator=(const PyHost&) = delete;
+
+  virtual Host& host() const noexcept = 0;
+  const PluginRegistry& registry() const noexcept { return registry_; }
+
+  std::vector<PublishedSample> wait_published(time_ns_t timeout_ns);
+  bool wait_change(time_ns_t timeout_ns);
+  void wake() noexcept;
+  bool write_resource(const std::string& name, std::string_view data);
+  py::tuple read_resource(const std::string& name);
+  std::vector<std::string> trace_components() const { return host().trace_components(); }
+  /// In virtual time whoever drives it drains in time, without a thread.
+  void collect_trace(time_ns_t period_ns);
+  TraceDrain drain_trace();
+
+ private:
+  bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
+
+  const PluginRegistry& registry_;
+  Architecture& architecture_;
+  std::mutex collector_mutex_;
+  std::unique_ptr<TraceCollector> collector_;  // under collector_mutex_
+  std::atomic<bool> woken_{false};             // release/acquire: set once, for good
+  std::uint32_t seen_change_{0};               // of the one thread that waits for changes
+};
+
+}  // namespace mauve::bindings

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// One test body for every host: an architecture of test components on threads, or in virtual time.
+//
+//   TYPED_TEST(HostConformance, Says) { this->add("c"); this->deploy(); this->run_for(ms_to_ns(10)); ... }
+#pragma once
+
+#include <algorithm>
+
+#include "transaction_fixtures.hpp"
+
+namespace mauve::testing {
+
+/// How an architecture is run; what tests must do differently, and nothing else.
+class OnThreads {
+ public:
+  explicit OnThreads(Architecture& architecture) : architecture_(architecture), deployer_(architecture) {}
+
+  Host& host() { return deployer_; }
+  /// Until every component that runs has been released at all instants up to then.
+  void run_for(time_ns_t duration_ns) {
+    const time_ns_t until = monotonic_now_ns() + duration_ns;
+    std::this_thread::sleep_for(std::chrono::nanoseconds(duration_ns));
+    for (const auto& component : architecture_.components()) {
+      const Task& task = component->task();
+      const auto is_done = [&] {
+        return settled(task.state()) != ComponentState::running || clock_of(*component) > until;
+      };
+      wait_until(is_done, "the component's releases");
+    }
+  }
+
+ private:
+  static time_ns_t clock_of(Component& component) {
+    return component.task().context().clock_ns.load(std::memory_order_relaxed);
+  }
+
+  AwayFromComponents away_;
+  Architecture& architecture_;
+  Deployer deployer_;
+};
+
+class InVirtualTime {
+ public:
+  explicit InVirtualTime(Architecture& architecture) : architecture_(architecture) {}
+
+  /// Of an architecture that is configured by then.
+  Host& host() {
+    if (host_ == nullptr) host_ = &simulation_.add(architecture_);
+    return *host_;
+  }
+  void run_for(time_ns_t duration_ns) { simulation_.run_until(simulation_.now_ns() + duration_ns); }
+
+ private:
+  Architecture& architecture_;
+  Simulation simulation_;
+  SimulatedHost* host_{nullptr};
+};
+
+using EveryHost = ::testing::Types<OnThreads, InVirtualTime>;
+
+class HostNames {
+ public:
+  template <typename Way>
+  static std::string GetName(int /*number*/) {
+    return std::is_same_v<Way, OnThreads> ? "threads" : "virtual";
+  }
+};
+
+/// An architecture of registered test components (transaction_fixtures.hpp), shut down with the fixture.
+template <typename Way>
+class Hosted : public ::testing::Test {
+ protected:
+  Hosted() { register_parts(registry); }
+  ~Hosted() override { run_on_where_sanitized(); }
+
+  static constexpr bool is_virtual = std::is_same_v<Way, InVirtualTime>;
+
+  Component& add(const std::string& name, std::int64_t period_ms = 2, TaskSettings settings = {}) {
+    settings.cpus = {kComponentsCpu};
+    settings.trace_records = std::size_t{1} << 15U;
+    Component& component = architecture.add_component(name, "t/Shell", "t/Core", "t/Fsm", settings);
+    component.allow({"t/Counting", "t/Refusing", "t/Throwing", "t/Unready"}, true);
+    component.set_property("period_ms", period_ms);
+    core(component).instants.reserve(10'000);
+    return component;
+  }
+  static TestCore& core(Component& component) { return component.core_as<TestCore>(); }
+
+  void deploy() {
+    architecture.configure();
+    host().deploy();
+  }
+  Host& host() { return way.host(); }
+  /// Lets so much time pass, the epoch's lead besides.
+  void run_for(time_ns_t duration_ns) {
+    way.run_for(duration_ns + std::max<time_ns_t>(0, host().epoch_ns() - host().now_ns()));
+  }
+  TransactionReport commit(Transaction& transaction, TransactionOptions options = {}) {
+    if (options.timeouts.commit_ns == CommitTimeouts{}.commit_ns) options.timeouts.commit_ns = s_to_ns(10);
+    return host().commit(std::move(transaction), options);
+  }
+  ComponentState state(const std::string& name) const {
+    return settled(architecture.component(name).task().state());
+  }
+  std::uint64_t releases(const std::string& name) const {
+    return architecture.component(name).task().statistics().releases.load();
+  }
+  std::string described() const { return to_string(architecture.describe()); }
+  /// The error of a call that has to be refused.
+  template <typename Call>
+  static Error refusal(Call&& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error;
+    }
+    ADD_FAILURE() << "should have been refused";
+    return {ErrorCode::internal, "no error"};
+  }
+  /// The error of a transaction that has to be refused, and leave all as it is.
+  Error refused(Transaction& transaction, const TransactionOptions& options = {}) {
+    const std::string before = described();
+    Error error = refusal([&] { commit(transaction, options); });
+    EXPECT_EQ(before, described()) << "a refusal changes nothing";
+    return error;
+  }
+
+  PluginRegistry registry;
+  Architecture architecture{&registry};
+  Way way{architecture};
+};
+
+}  // namespace mauve::testing
