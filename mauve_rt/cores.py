@@ -46,8 +46,9 @@ class Core(Configurable, Generic[ShellT]):
     """Base of cores written in Python, for a shell: `class Hover(Core[HoverShell])`."""
 
     budget_ns: ClassVar[int] = 0
-    """The time adopt and take need together: a change with less left before the next release waits. An adopt that takes
-    longer is refused, after a longer take the component is FAULTED. 0: none declared, 2 ms are reckoned with."""
+    """The time adopt and take need together: a change with less left before the next release waits. An adopt
+    that takes longer is refused, after a longer take the component is FAULTED. 0: none declared, 2 ms are
+    reckoned with."""
 
     _shell_class: ClassVar[type[Any]] = Shell
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mauve_rt.trace.pairs import gaps
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.records import IN_VAIN, Kind, ReconfigurationPhase
 from mauve_rt.trace.trace import Message, Trace
 
 _EVENT_TYPE = "mauve_msgs/msg/ReconfigurationEvent"
@@ -48,7 +48,7 @@ class Request:
 
 
 def find_swaps(trace: Trace, component: str) -> list[Swap]:
-    """Parks of a component with their ends; those that lost records cut are none."""
+    """Parks of a component with their ends; those that lost records cut, or that were in vain, are none."""
     rows = trace.of(component)
     kinds, part = rows["kind"], np.cumsum(gaps(rows))
     (marks,) = np.nonzero(np.isin(kinds, (Kind.PARKED, Kind.ARMED)))
@@ -58,6 +58,8 @@ def find_swaps(trace: Trace, component: str) -> list[Swap]:
     found = []
     for parked, armed in pairwise(marks.tolist()):
         if kinds[parked] != Kind.PARKED or kinds[armed] != Kind.ARMED or part[parked] != part[armed]:
+            continue
+        if rows["b"][armed] == IN_VAIN:
             continue
         after = int(np.searchsorted(nexts, armed))
         resumed = int(nexts[after]) if after < len(nexts) else -1

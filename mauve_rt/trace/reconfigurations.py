@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.records import IN_VAIN, Kind, ReconfigurationPhase
 from mauve_rt.trace.trace import Trace
 
 
@@ -47,7 +47,10 @@ class Reconfiguration:
 
 
 def reconfigurations(trace: Trace) -> list[Reconfiguration]:
-    """All reconfigurations in a trace by time. A park that the bag ends in is none (yet)."""
+    """All reconfigurations in a trace by time.
+
+    A park that the bag ends in is none (yet), nor is one that ended without a change as others were missing.
+    """
     found = [one for component in trace.components for one in _of_component(trace, component)]
     return sorted(found, key=lambda one: one.parked_ns)
 
@@ -60,6 +63,7 @@ def _of_component(trace: Trace, component: str) -> list[Reconfiguration]:
         _measure(trace, component, int(parked), int(armed))
         for parked, armed in pairwise(marks)
         if kinds[parked] == Kind.PARKED and kinds[armed] == Kind.ARMED
+        if records["b"][armed] != IN_VAIN
     ]
 
 

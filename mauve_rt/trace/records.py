@@ -35,6 +35,10 @@ class ReconfigurationPhase(IntEnum):
     TAKE = 2
 
 
+IN_VAIN = 2
+"""Value of `b` in records of kind ARMED: instants passed while others were missing; nothing was changed."""
+
+
 RECORD = np.dtype(
     [
         ("sequence", "<u8"),

@@ -116,7 +116,9 @@ class Armed(NamedTuple):
     wait: str
     pending_ns: int
     committed: bool
-    """False: refused by adopt, everything is as before."""
+    """False: refused by adopt, or others were missing; everything is as before."""
+    lost: int = 0
+    """Instants that passed since it was parked: the change's own, not overruns."""
 
 
 class ServiceBegun(NamedTuple):
@@ -183,7 +185,7 @@ _MAKE: dict[int, Callable[[int, str, str, int, int, int], Record]] = {
     Kind.WAIT: lambda t, who, name, a, _b, _c: Waited(t, who, name, a),
     Kind.OVERRUN: Overrun,
     Kind.PARKED: lambda t, who, name, a, _b, _c: Parked(t, who, name, a),
-    Kind.ARMED: lambda t, who, name, a, b, _c: Armed(t, who, name, a, bool(b)),
+    Kind.ARMED: lambda t, who, name, a, b, c: Armed(t, who, name, a, b == 1, c),
     Kind.SERVICE_BEGIN: lambda t, who, name, _a, _b, _c: ServiceBegun(t, who, name),
     Kind.SERVICE_END: lambda t, who, name, _a, _b, _c: ServiceEnded(t, who, name),
     Kind.CONTENDED: lambda t, who, name, a, b, _c: Contended(t, who, name, a, b),

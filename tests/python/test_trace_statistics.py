@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from synthetic_traces import trace_of
 
 from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.records import IN_VAIN, Kind, ReconfigurationPhase
 from mauve_rt.trace.statistics import Distribution, component_statistics, distribution, state_spans
 from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.typed_records import Armed, typed_records
 
 EPOCH_NS, OFFSET_NS, PERIOD_NS = 1_000_000, 300, 10_000
 FIRST_NS = EPOCH_NS + OFFSET_NS
@@ -155,6 +156,22 @@ def test_a_swap_that_misses_nothing(*, committed: bool):
     assert (found.blackout_ns, found.adopt_ns, found.take_ns) == (120, 40, 25)
     assert (found.missed_releases, found.phase_nominal_ns, found.phase_actual_ns) == (0, 0, 17)
     assert found.complete
+
+
+def test_a_park_in_vain_is_no_reconfiguration():
+    source = source_of_one()
+    pending = source.cycle("c", FIRST_NS, states={"sense": 100}, wait_ns=PERIOD_NS)
+    source.add("c", Kind.PARKED, FIRST_NS + 500, name="wait", a=pending)
+    late = pending + 2 * PERIOD_NS
+    source.add("c", Kind.ARMED, late - 900, name="wait", a=late, b=IN_VAIN, c=2)
+    swap(source, late - 500, late - 380, pending_ns=late)
+    source.cycle("c", late, states={"sense": 100}, wait_ns=PERIOD_NS)
+    trace = trace_of(source)
+    (found,) = reconfigurations(trace)
+    assert (found.parked_ns, found.missed_releases) == (late - 500, 0)
+    in_vain, armed = (one for one in typed_records(trace) if isinstance(one, Armed))
+    assert (in_vain.committed, in_vain.lost) == (False, 2)
+    assert (armed.committed, armed.lost) == (True, 0)
 
 
 @given(

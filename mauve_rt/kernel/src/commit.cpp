@@ -203,12 +203,13 @@ void Commit::take_all(const Clock& clock) noexcept {
   time_ns_t began = clock.now_ns();
   for (CommitAction* action : actions_) {
     adopting_.store(action, std::memory_order_release);
+    const time_ns_t declared = action->declared_ns();  // of the new core; after take, that is another
     action->take();
     const time_ns_t now = clock.now_ns();
     action->take_ns = now - began;
     began = now;
     const time_ns_t took = action->adopt_ns + action->take_ns;
-    if (action->declared_ns() == 0 || took <= action->declared_ns()) continue;
+    if (declared == 0 || took <= declared) continue;
     for (Participant& place : participants_) {
       if (place.task == action->task) place.overlong_ns = took;
     }

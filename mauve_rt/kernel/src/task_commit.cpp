@@ -14,6 +14,7 @@ namespace mauve {
 namespace {
 
 constexpr int kTries = 3;
+constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without a change, the others missing
 
 }  // namespace
 
@@ -123,7 +124,7 @@ void Task::go_on_unchanged(Participant& place) noexcept {
   place.lost += lost;
   const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
   trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
-  trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), 0, lost);
+  trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), kInVain, lost);
 }
 
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.

@@ -26,6 +26,13 @@ TransactionCommit::Work::Work(Architecture& architecture, Host* host, const Tran
 
 void TransactionCommit::Work::make(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
+  constexpr std::int64_t kMostMissed = 1'000'000;
+  if (options_.max_missed < 0 || options_.max_missed > kMostMissed) {
+    throw Error(ErrorCode::out_of_range, "so many releases cannot be allowed to be missed",
+                {.element = "max_missed",
+                 .expected = "0 to " + std::to_string(kMostMissed),
+                 .found = std::to_string(options_.max_missed)});
+  }
   transaction_ = std::move(transaction);
   if (const std::uint64_t revision = architecture_.revision();
       options_.expected_revision != 0 && options_.expected_revision != revision) {
