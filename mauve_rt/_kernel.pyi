@@ -387,6 +387,11 @@ class Transaction:
         """As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''."""
     def remove_resource(self, name: str) -> Transaction:
         """Refused while a port is connected to it."""
+    def configure(self, component: str) -> Transaction:
+        """Cleans up and configures anew one that is not running; it is STOPPED then, a fault is forgotten.
+
+        Its hooks run before the commit; where they refuse, it is UNCONFIGURED.
+        """
     def start(self, component: str, clock_ns: int | None = None) -> Transaction: ...
     def stop(self, component: str) -> Transaction: ...
 
@@ -476,6 +481,8 @@ class Architecture:
         """Components, implementations, wiring, properties, states, grids and resources, as of one moment."""
     def revision(self) -> int:
         """Grows with every committed change and every start, stop and fault; never 0."""
+    def threads_left_behind(self) -> int:
+        """Threads of removed components that still execute what they were condemned for."""
     def components(self) -> list[ComponentDescription]: ...
     def take_recent_maxima(self) -> list[RecentMaxima]:
         """Of every component, and counted anew from here on: for one caller only."""

@@ -155,6 +155,8 @@ void bind_architecture(py::module_& module) {
           "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked())
       .def("revision", [](PyArchitecture& self) { return self.architecture.revision(); })
       .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
+      .def("threads_left_behind",
+           [](PyArchitecture& self) { return self.architecture.threads_left_behind(); })
       .def("components", &describe_components)
       .def("take_recent_maxima", &take_all_recent_maxima)
       .def("resources", &describe_resources);

@@ -27,6 +27,8 @@ class SerializedWriteService : public ServiceBase {
   std::string_view representation() const noexcept override { return kSerializedRepresentation; }
   /// Takes a copy; false when there was no room, or more bytes than declared. [rt]
   virtual bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+  /// The same without waiting for a lock. [rt]
+  virtual TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
 };
 
 /// What a resource of serialized messages holds.

@@ -13,7 +13,7 @@ class SerializedReadPort final : public PortBase {
   std::string_view representation() const noexcept override { return kSerializedRepresentation; }
   bool read_serialized(Message& message, DataStatus& status, time_ns_t& time_ns) override {
     if (is_previewed()) return stand_in<SerializedReadPort>().read_serialized(message, status, time_ns);
-    status = service_ != nullptr ? service_->read(message, time_ns, seen_) : DataStatus::none;
+    status = service_ != nullptr && !is_closed() ? service_->read(message, time_ns, seen_) : DataStatus::none;
     if (status == DataStatus::none || message.empty()) message = zero_;
     return true;
   }
@@ -48,11 +48,14 @@ class SerializedWritePort final : public PortBase {
   void write_zero() noexcept override {
     if (service_ != nullptr) service_->write(zero_, stamp_ns());
   }
+  TryWrite try_write_zero() noexcept override {
+    return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
+  }
   bool write_serialized(std::span<const std::byte> message) override {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(message, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
-    if (is_closed() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
     return taken;
   }
 

@@ -62,6 +62,16 @@ class SerializedResource : public Resource {
     written(time_ns);
     return true;
   }
+  TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
+    if (message.size() > options_.max_bytes) return TryWrite::done;
+    {
+      const std::unique_lock lock(mutex_, std::try_to_lock);
+      if (!lock.owns_lock()) return TryWrite::busy;
+      if (!put_in(message, time_ns)) return TryWrite::done;
+    }
+    written(time_ns);
+    return TryWrite::done;
+  }
   Place place() const {
     Place made;
     made.message.reserve(options_.max_bytes);
@@ -85,6 +95,9 @@ class SerializedResource : public Resource {
     explicit Write(SerializedResource& owner) : SerializedWriteService(owner.type()), owner_(owner) {}
     bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
       return owner_.write(message, time_ns);
+    }
+    TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
+      return owner_.try_write(message, time_ns);
     }
 
    private:

@@ -154,6 +154,12 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
           [](Self self, const std::string& component) -> Self {
             return self.add([=](Steps steps, Registry) { steps.stop(component); });
           },
+          py::arg("component"))
+      .def(
+          "configure",
+          [](Self self, const std::string& component) -> Self {
+            return self.add([=](Steps steps, Registry) { steps.configure(component); });
+          },
           py::arg("component"));
 }
 

@@ -34,6 +34,7 @@ StepKind = Literal[
     "remove_resource",
     "start",
     "stop",
+    "configure",
 ]
 STEP_KINDS: tuple[str, ...] = get_args(StepKind)
 _NEED_NAME = ("replace_core", "replace_fsm", "replace_shell", "set_property", "connect", "disconnect")

@@ -193,11 +193,14 @@ class Diagnostics:
         usage = resource.getrusage(resource.RUSAGE_SELF)
         level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
         message = "without real-time rights" if missing else "real-time rights granted"
+        if left_behind := self._runtime.threads_left_behind():
+            level, message = DiagnosticStatus.WARN, f"{left_behind} threads of removed components still execute"
         if error:
             level, message = DiagnosticStatus.ERROR, error
         values = {
             "revision": self._runtime.revision,
             "missing": "; ".join(missing),
+            "threads_left_behind": left_behind,
             "page_faults_major": usage.ru_majflt,
             "page_faults_minor": usage.ru_minflt,
             "allocation_counting": self._allocation_counting,

@@ -198,6 +198,11 @@ class Runtime:
         architecture = self._architecture
         return architecture.components() if architecture is not None else []
 
+    def threads_left_behind(self) -> int:
+        """Threads of removed components that still execute what they were condemned for."""
+        architecture = self._architecture
+        return architecture.threads_left_behind() if architecture is not None else 0
+
     def take_recent_maxima(self) -> list[RecentMaxima]:
         """The largest figures of every component since the last call; none while unconfigured."""
         architecture = self._architecture

@@ -47,7 +47,6 @@ class _Sketch:
 
     model: ComponentModel
     properties: dict[str, PropertyDescription] = field(default_factory=dict)
-    fault: str = ""
     is_new: bool = False
 
 
@@ -123,6 +122,9 @@ class Plan:
             case "stop":
                 self._component(step)
                 transaction.stop(name)
+            case "configure":
+                self._component(step)
+                transaction.configure(name)
             case "connect":
                 self._component(step)
                 resource, service = _service(step)
@@ -139,7 +141,7 @@ class Plan:
         """The component that a step is about.
 
         Raises:
-            RefusalError: UNKNOWN_COMPONENT, NOT_RECONFIGURABLE or FAULTED.
+            RefusalError: UNKNOWN_COMPONENT or NOT_RECONFIGURABLE.
         """
         name = step.target
         sketch = self._sketches.get(name)
@@ -152,11 +154,6 @@ class Plan:
         if not sketch.model.reconfigurable and not sketch.is_new:
             text = f"component '{name}' is protected: it was declared with reconfigurable: false"
             raise RefusalError(Code.NOT_RECONFIGURABLE, text)
-        if sketch.fault and step.kind != "remove_component":
-            remedy = "remove it, or clean up and configure the executor (lifecycle)"
-            raise RefusalError(
-                Code.FAULTED, one_line(f"component '{name}' is faulted ({sketch.fault}); {remedy}")
-            )
         return sketch
 
     def _replace(self, step: Step) -> None:
@@ -236,8 +233,7 @@ class Plan:
 
 
 def _sketch_of(part: ComponentDescription, model: ComponentModel) -> _Sketch:
-    fault = part.fault if part.state == "FAULTED" else ""
-    return _Sketch(model, {item.name: item for item in part.properties}, fault)
+    return _Sketch(model, {item.name: item for item in part.properties})
 
 
 def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -> RefusalError:

@@ -31,6 +31,8 @@ class ListedComponent:
                 return self.connections.get(step.name) == ""
             case "start":
                 return self.state in PRESENT
+            case "configure":
+                return self.state not in {"UNCONFIGURED", "FAULTED"}
             case "stop":
                 return self.state == "STOPPED"
             case _:

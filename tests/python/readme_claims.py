@@ -449,9 +449,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule11Faults.AnExceptionParksItsComponentAndWritesItsOutputs",
         "ros/test_executor_process.py::test_fault_is_told_at_once_and_the_others_run_on",
     ),
-    "caught by a watchdog, which takes its thread's priority away": (
+    "faults its component when it ends": ("Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",),
+    "and while it lasts by a real-time watchdog": (
         "Rule11Faults.AStateOverItsDeclaredTimeIsCaughtByTheWatchdog",
     ),
+    "which sleeps until the next bound can be exceeded": ("Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",),
+    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheCondemnedOneHolds",),
+    "repaired in place by a step `configure` or `replace_core`, then started": (
+        "Rule11Repaired/0.AndStartedInOneTransaction",
+        "Rule11Repaired/0.ByConfiguringItAnew",
+    ),
+    "is removed and added anew, in one transaction": ("Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",),
     "the component's own thread puts that one in": (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
         "Rule11Fallback.StartsInTheInitialStateAtTheNextInstantOfTheGrid",

@@ -392,6 +392,29 @@ def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) 
     assert "weak" not in [part.name for part in runtime.components()]
 
 
+@pytest.mark.parametrize("repair", [Step("configure", "weak"), Step("replace_core", "weak", "executor_tests/Counter")])
+def test_a_faulted_component_is_repaired_in_place(runtime: Runtime, control: Control, repair: Step) -> None:
+    steps = (
+        Step("add_component", "weak", "", COUNTER),
+        Step("connect", "weak", "set", "poison.read"),
+        Step("start", "weak"),
+    )
+    assert _ask(control, *steps).success
+    runtime.deployer.write_resource("poison", POISON)
+    _wait(lambda: _part(runtime, "weak").state == "FAULTED")
+    refused = _ask(control, Step("start", "weak"))
+    assert (refused.code, "replace_core" in refused.message) == (Code.FAULTED, True)
+    runtime.deployer.write_resource("poison", b"\0\1\0\0" + struct.pack("<d", 1.0))
+    outcome = _ask(control, repair)
+    assert outcome.success, outcome.message
+    assert (_part(runtime, "weak").state, _part(runtime, "weak").fault) == ("STOPPED", "")
+    outcome = _ask(control, Step("start", "weak"))
+    assert outcome.success, outcome.message
+    _wait(lambda: _part(runtime, "weak").releases > 0)
+    assert _part(runtime, "weak").state == "RUNNING"
+    assert runtime.threads_left_behind() == 0
+
+
 def test_every_step_names_the_core_that_it_changed(runtime: Runtime, control: Control) -> None:
     outcome = _ask(
         control,

@@ -204,7 +204,7 @@ def test_fault_is_told_at_once_and_the_others_run_on(executor: Any, graph: Any) 
     graph.spin_until(lambda: "component 'counter' is faulted" in executor.output, "the fault on stderr")
     reply = graph.ask(Start, f"{NODE}/start", component="counter")
     assert (reply.success, reply.code) == (False, Code.FAULTED)
-    assert "clean up and configure" in reply.message
+    assert "a step configure, or replace_core" in reply.message
     first = graph.ask(ListComponents, f"{NODE}/list_components").components[1].releases
 
     def told() -> bool:

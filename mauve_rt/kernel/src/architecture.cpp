@@ -2,6 +2,7 @@
 #include "mauve_rt/architecture.hpp"
 
 #include <algorithm>
+#include <deque>
 
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
@@ -15,6 +16,17 @@
 namespace mauve {
 
 namespace {
+
+constexpr time_ns_t kEndTimeout = ms_to_ns(500);
+
+/// Until the process ends, and beyond the end of static objects.
+template <typename Objects>
+void keep_for_ever(Objects objects) {
+  static std::mutex mutex;
+  static auto* const kept = new std::deque<Objects>;
+  const std::lock_guard lock(mutex);
+  kept->push_back(std::move(objects));
+}
 
 template <typename Item>
 std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, const std::string& name) {
@@ -31,9 +43,16 @@ Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
 }
 
 Architecture::~Architecture() {
-  for (const auto& component : components_) {
-    component->task().end_thread(kForever);
-    component->set_architecture(nullptr);
+  if (!end_threads()) {
+    // A thread that does not come back from its state is left behind with all it may use: nothing of that is freed.
+    for (const auto& resource : resources_) resource->set_notifier(nullptr);
+    keep_for_ever(std::move(resources_));
+    keep_for_ever(std::move(leaving_));
+    const auto has_ended = [](const auto& component) { return component->task().has_ended(); };
+    const auto first = std::partition(components_.begin(), components_.end(), has_ended);
+    keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components_.end()));
+    components_.erase(first, components_.end());
+    resources_.clear();
   }
   Configurable::cleanup();
 }
@@ -100,6 +119,18 @@ void Architecture::set_host(Host& host) {
 void Architecture::release_host(const Host& host) noexcept {
   const std::lock_guard lock(host_mutex_);
   if (host_ == &host) host_ = nullptr;
+}
+
+/// False when one still executes a state.
+bool Architecture::end_threads() noexcept {
+  const time_ns_t until = monotonic_now_ns() + kEndTimeout;
+  bool all_ended = true;
+  for (const auto& component : components_) {
+    all_ended &= component->task().end_thread(until);
+    component->set_architecture(nullptr);
+  }
+  for (const Leaving& leaving : leaving_) all_ended &= leaving.component->task().end_thread(until);
+  return all_ended;
 }
 
 PluginRegistry& Architecture::require_registry() const {

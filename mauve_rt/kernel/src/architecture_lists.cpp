@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // How an architecture's lists change while others look at them, and what stays of those removed.
 #include <algorithm>
+#include <iterator>
 
 #include "mauve_rt/architecture.hpp"
 #include "mauve_rt/error.hpp"
@@ -71,19 +72,48 @@ void Architecture::change_lists(const ListChange& change) {
   changes_.bump();
 }
 
-void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed) {
-  leaving_.push_back({.component = std::move(component), .was_listed = was_listed});
+void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
+                                    const std::vector<std::shared_ptr<Resource>>& gone) {
+  Leaving leaving{.component = std::move(component), .was_listed = was_listed, .uses = {}};
+  std::vector<std::shared_ptr<Resource>> all = resources();
+  append(all, gone);
+  for (const auto& resource : all) {
+    if (leaving.component->uses(*resource)) leaving.uses.push_back(resource);
+  }
+  const std::lock_guard lock(list_mutex_);
+  leaving_.push_back(std::move(leaving));
 }
 
 void Architecture::reap() {
-  std::erase_if(leaving_, [this](const Leaving& leaving) {
-    Task& task = leaving.component->task();
-    if (!task.end_thread(monotonic_now_ns())) return false;
+  std::vector<Leaving> ended;
+  {
+    const std::lock_guard lock(list_mutex_);
+    const auto has_ended = [](const Leaving& leaving) {
+      return leaving.component->task().end_thread(monotonic_now_ns());
+    };
+    const auto first = std::stable_partition(leaving_.begin(), leaving_.end(),
+                                             [&](const Leaving& leaving) { return !has_ended(leaving); });
+    ended.assign(std::make_move_iterator(first), std::make_move_iterator(leaving_.end()));
+    leaving_.erase(first, leaving_.end());
+  }
+  for (const Leaving& leaving : ended) {
     for (const auto& port : leaving.component->shell().ports()) port->disconnect();
     leaving.component->cleanup();
-    if (leaving.was_listed) retire_trace(task);
-    return true;
-  });
+    if (leaving.was_listed) retire_trace(leaving.component->task());
+  }
+}
+
+std::size_t Architecture::threads_left_behind() const {
+  const std::lock_guard lock(list_mutex_);
+  return static_cast<std::size_t>(std::count_if(leaving_.begin(), leaving_.end(), [](const Leaving& leaving) {
+    return !leaving.component->task().has_ended();
+  }));
+}
+
+bool Architecture::is_used_by_left_behind(const Resource& resource) const {
+  const std::lock_guard lock(list_mutex_);
+  return std::any_of(leaving_.begin(), leaving_.end(),
+                     [&resource](const Leaving& leaving) { return leaving.component->uses(resource); });
 }
 
 std::vector<std::string> Architecture::trace_components() const {

@@ -357,7 +357,7 @@ void Component::prepare_fallback() {
   if (fallback_core_ == nullptr) return;
   fallback_ =
       std::make_unique<PartsChange>(*this, Parts{.shell = {}, .core = std::move(fallback_core_), .fsm = {}});
-  fallback_->start_afresh();
+  fallback_->be_fallback();
   spare_ = fallback_->core();
   fallback_->prepare();
   task_.set_fallback(fallback_.get());
@@ -391,6 +391,25 @@ void Component::update_listening(const FsmBase& fsm) {
     state->event->set_task(task_);
     state->event->listen();
   }
+}
+
+void Component::stop_listening() noexcept {
+  for (const auto& state : parts_.fsm->states()) {
+    if (state->event != nullptr) state->event->stop_listening();
+  }
+}
+
+bool Component::uses(const Resource& resource) const {
+  const auto& ports = parts_.shell->ports();
+  return std::any_of(ports.begin(), ports.end(), [&resource](const auto& port) {
+    return port->is_connected() && port->service()->resource() == &resource;
+  });
+}
+
+void Component::configure_anew() {
+  require_parked("configure");
+  cleanup();
+  configure();
 }
 
 void Component::check_cleanup() const { require_parked("cleanup"); }

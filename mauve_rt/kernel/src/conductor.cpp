@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Who conducts commits, and the ordinary thread's side of one.
 #include <algorithm>
-#include <csignal>
 #include <mutex>
 #include <stdexcept>
 
@@ -25,26 +24,43 @@ void check_state(const Task& task) {
       task.throw_state_running("the component is STOPPING", 0, "try again when it has stopped");
     case ComponentState::faulted:
       throw Error(ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
-                  {.component = task.name(), .remedy = "clean it up and configure it first"});
+                  {.component = task.name(),
+                   .remedy = task.is_parked() ? Task::kRepairRemedy : Task::kLeftBehindRemedy});
     default:
       return;
   }
 }
 
+/// Keeps condemned threads from coming back while their components are being removed; once they are, for ever.
+class Claims {
+ public:
+  explicit Claims(Commit& commit) noexcept : commit_(commit) {
+    for (Participant& place : commit_.participants()) {
+      place.left_behind = place.afterwards == Afterwards::stop && place.task->claim();
+    }
+  }
+  ~Claims() {
+    for (const Participant& place : commit_.participants()) {
+      if (!place.left_behind) continue;
+      if (commit_.committed()) {
+        place.task->abandon();
+      } else {
+        place.task->give_up_claim();
+      }
+    }
+  }
+  Claims(const Claims&) = delete;
+  Claims& operator=(const Claims&) = delete;
+
+ private:
+  Commit& commit_;
+};
+
 }  // namespace
 
 Conductor::Conductor() {
   ThreadAttributes attributes(kConductorStackBytes, kConductorPriority);
-  sigset_t all_signals;
-  sigset_t callers_signals;
-  sigfillset(&all_signals);
-  pthread_sigmask(SIG_SETMASK, &all_signals, &callers_signals);
-  int result = pthread_create(&thread_, &attributes.value, &Conductor::entry, this);
-  if (result == EPERM) {
-    attributes.set_policy(SCHED_OTHER, 0);
-    result = pthread_create(&thread_, &attributes.value, &Conductor::entry, this);
-  }
-  pthread_sigmask(SIG_SETMASK, &callers_signals, nullptr);
+  const int result = start_thread(thread_, attributes, &Conductor::entry, this);
   if (result != 0) throw Error(ErrorCode::internal, "the system refuses the conductor's thread");
   pthread_setname_np(thread_, "conductor");
 }
@@ -121,7 +137,9 @@ namespace {
   const std::string what =
       call + " of " + whose + "'s new part does not end, on the thread of " + stuck.name();
   for (Participant& place : commit.participants()) {
-    if (place.task == &stuck || (commit.is_taking() && place.in_flight)) place.task->condemn(what);
+    if (place.task == &stuck || (commit.is_taking() && place.in_flight)) {
+      place.task->condemn(what, place.task->clock().now_ns());
+    }
   }
   throw Error(
       ErrorCode::faulted, what,
@@ -212,10 +230,11 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
   locks.reserve(tasks.size());
   for (Task* task : tasks) locks.emplace_back(task->command_mutex());
 
+  const Claims claims(commit);
   std::uint32_t running = 0;
   for (Participant& place : commit.participants()) {
-    if (place.afterwards != Afterwards::stop) check_state(*place.task);
-    place.in_flight = !place.task->is_parked();
+    if (place.afterwards != Afterwards::stop && !place.repairs) check_state(*place.task);
+    place.in_flight = !place.left_behind && !place.task->is_parked();
     if (place.in_flight && !place.task->is_simulated()) ++running;
   }
   commit.expect(running);

@@ -2,6 +2,7 @@
 #include "mauve_rt/deployer.hpp"
 
 #include <algorithm>
+#include <thread>
 
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
@@ -12,7 +13,6 @@ namespace mauve {
 
 namespace {
 
-constexpr time_ns_t kWatchPeriod = ms_to_ns(5);
 constexpr time_ns_t kStopTimeout = ms_to_ns(500);
 constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 
@@ -79,8 +79,6 @@ void Deployer::deploy() {
   start_all(monotonic_now_ns() + deployment_lead_ns(components.size()));
   for (const auto& component : components) component->task().wait_started();
   set_deployed(true);
-  watchdog_stop_.store(0, std::memory_order_relaxed);  // relaxed: the thread is created after
-  watchdog_ = std::thread([this] { watch(); });
 }
 
 void Deployer::create_threads() {
@@ -93,14 +91,16 @@ void Deployer::create_threads() {
     }
   }
   barrier_ = std::make_unique<Barrier>(components.size() + 1);
+  watchdog_ = std::make_shared<Watchdog>();
   try {
     for (const auto& component : components) {
-      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace);
+      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace, watchdog_);
       barrier_->created_one();
     }
   } catch (...) {
     barrier_->stand_in();
     for (const auto& component : components) component->task().end_thread(kForever);
+    watchdog_.reset();
     throw;
   }
   prefault_allocated();
@@ -117,26 +117,18 @@ void Deployer::shutdown() noexcept {
     conductor = std::move(conductor_);
   }
   conductor->withdraw();
-  watchdog_stop_.store(1, std::memory_order_release);
-  futex_wake_all(watchdog_stop_);
-  watchdog_.join();
   stop_all(monotonic_now_ns() + kStopTimeout);
   conductor->withdraw();  // a commit that had found the host open still
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : architecture().components()) component->task().end_thread(until);
+  watchdog_->stop();  // last: stopping is watched too
   architecture().release_host(*this);
   architecture().changes().bump();
 }
 
-void Deployer::watch() noexcept {
-  while (watchdog_stop_.load(std::memory_order_acquire) == 0) {
-    futex_wait_until(watchdog_stop_, 0, monotonic_now_ns() + kWatchPeriod);
-    for (const auto& component : architecture().components())
-      component->task().check_execution(monotonic_now_ns());
-  }
+void Deployer::attach(Task& task) {
+  task.create_thread(nullptr, options_.require_realtime, options_.trace, watchdog_);
 }
-
-void Deployer::attach(Task& task) { task.create_thread(nullptr, options_.require_realtime, options_.trace); }
 
 bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
 

@@ -78,9 +78,13 @@ DraftComponent& Draft::change(const std::string& name) {
   DraftComponent& component = touch(name);
   if (component.is_added) return component;  // whoever adds it decides on all of it
   if (component.component->is_configured()) component.component->check_reconfigurable();
-  if (component.state == ComponentState::faulted) {
-    throw Error(ErrorCode::faulted, "the component is FAULTED: " + component.component->task().fault().what,
-                {.component = name, .remedy = "clean it up and configure it first, or remove it"});
+  const Task& task = component.component->task();
+  if (component.state == ComponentState::faulted && !task.is_parked()) {
+    throw Error(ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
+                {.component = name,
+                 .element = "state " + task.current_state(),
+                 .found = "still executing",
+                 .remedy = Task::kLeftBehindRemedy});
   }
   return component;
 }

@@ -46,6 +46,7 @@ struct DraftComponent {
   int fsm_step{0};
   int core_step{0};
   bool core_unready{false};  // the new core is put in as it is
+  int configure_step{0};  // the last that configures it anew
   int first_step{0};
 
   const std::string& name() const noexcept { return component->name(); }
@@ -56,8 +57,11 @@ struct DraftComponent {
     ReadBy parts = core_step != 0 ? ReadBy::core : ReadBy::none;
     if (fsm_step != 0) parts = parts | ReadBy::fsm;
     if (shell_step != 0) parts = parts | ReadBy::shell | ReadBy::fsm;
+    if (configure_step != 0) parts = parts | ReadBy::core | ReadBy::fsm | ReadBy::shell;
     return parts;
   }
+  /// Whether it was FAULTED, and is STOPPED or RUNNING afterwards.
+  bool is_repaired() const noexcept { return state == ComponentState::faulted && replaced() != ReadBy::none; }
   bool sets_structural() const noexcept {
     return std::any_of(properties.begin(), properties.end(), [this](const auto& set) {
       return component->require_property(set.first).options().structural != ReadBy::none;
@@ -91,7 +95,8 @@ class Draft {
 
   /// Marks it as touched by this step. Throws Error: unknown_component.
   DraftComponent& touch(const std::string& name);
-  /// The same for what `reconfigurable: false` and a fault forbid. Throws Error: not_reconfigurable, faulted besides.
+  /// The same for what `reconfigurable: false` forbids, and a FAULTED thread that still executes.
+  /// Throws Error: not_reconfigurable, faulted besides.
   DraftComponent& change(const std::string& name);
   /// The component that a step has touched, or nullptr.
   DraftComponent* find(const std::string& name) noexcept;
@@ -109,7 +114,7 @@ class Draft {
   void disconnect(DraftComponent& component, const std::string& port);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
 
-  /// Checks what only the whole shows: kept connections of new shells, structural properties, ports that must
+  /// Checks what only the whole shows: faults repaired, kept connections of new shells, structural properties, ports that must
   /// lead somewhere, ports per service. Throws Error with the step.
   void finish() const;
 
@@ -127,6 +132,7 @@ class Draft {
   std::vector<std::string> ports_of(const Resource& resource) const;
   void check_kept_wires(const DraftComponent& component) const;
   static void check_structural(const DraftComponent& component);
+  static void check_repaired(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;
   void check_port_counts() const;
 

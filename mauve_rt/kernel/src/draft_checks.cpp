@@ -16,6 +16,7 @@ void rethrow_as_of(const Error& failure, const std::string& component, int step)
 
 void Draft::finish() const {
   for (const DraftComponent& component : components_) {
+    check_repaired(component);
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
     if (architecture_.is_configured()) check_required_ports(component);
@@ -27,6 +28,13 @@ void Draft::finish() const {
     }
   }
   check_port_counts();
+}
+
+void Draft::check_repaired(const DraftComponent& component) {
+  if (component.first_step == 0 || component.state != ComponentState::faulted || component.is_repaired())
+    return;
+  throw Error(ErrorCode::faulted, "the component is FAULTED: " + component.component->task().fault().what,
+              {.component = component.name(), .remedy = Task::kRepairRemedy, .step = component.first_step});
 }
 
 void Draft::check_kept_wires(const DraftComponent& component) const {

@@ -17,8 +17,11 @@ std::optional<time_ns_t> EventInput::consume() noexcept {
   return time == kNone ? std::nullopt : std::optional(time);
 }
 
-EventInput::~EventInput() {
+EventInput::~EventInput() { stop_listening(); }
+
+void EventInput::stop_listening() noexcept {
   if (resource_ != nullptr) resource_->unlisten(*this);
+  resource_ = nullptr;
 }
 
 void EventInput::listen() {

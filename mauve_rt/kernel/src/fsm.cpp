@@ -203,6 +203,10 @@ bool FsmBase::configure_hook() {
   }
   sporadic_ =
       std::any_of(states_.begin(), states_.end(), [](const auto& state) { return state->event != nullptr; });
+  for (const auto& state : states_) {
+    const time_ns_t bound = state->max_execution_ns;
+    if (bound != 0 && (smallest_bound_ns_ == 0 || bound < smallest_bound_ns_)) smallest_bound_ns_ = bound;
+  }
   const time_ns_t cycles_ns = cycle_gcd_ns(*initial_);  // also refuses loops without a wait
   period_ns_ = sporadic_ ? 0 : std::gcd(cycles_ns, divisor_ns_);
   return true;
@@ -213,7 +217,7 @@ void FsmBase::cleanup_hook() {
   methods_.clear();
   times_ = std::make_shared<StateTimes>();
   initial_ = nullptr;
-  period_ns_ = divisor_ns_ = 0;
+  period_ns_ = divisor_ns_ = smallest_bound_ns_ = 0;
   sporadic_ = false;
 }
 

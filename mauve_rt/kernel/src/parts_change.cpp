@@ -117,7 +117,7 @@ void PartsChange::take() noexcept {
   if (parts_.core != nullptr) {
     if (!afresh_ && !unready_) parts_.core->take(*component_.parts_.core);
     std::swap(parts_.core, component_.parts_.core);
-    component_.task_.set_fallen_back(afresh_);
+    component_.task_.set_fallen_back(is_fallback_);
     component_.core_name_.store(core_name_, std::memory_order_relaxed);
   } else if (parts_.shell != nullptr) {
     component_.parts_.core->bind_shell(*parts_.shell);

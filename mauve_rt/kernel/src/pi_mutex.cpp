@@ -13,7 +13,8 @@ namespace {
 /// What a lock needs of its thread, in static thread-local storage: no call to find it.
 struct ThisThread {
   std::int32_t id{0};  // 0: not asked for yet
-  int held{0};
+  std::atomic<int> held{
+      0};  // relaxed: written by its thread alone; others ask whether it may hold one at all
 };
 __attribute__((tls_model("initial-exec"))) constinit thread_local ThisThread this_thread;
 
@@ -33,7 +34,7 @@ PiMutex::~PiMutex() { pthread_mutex_destroy(&mutex_); }
 inline void PiMutex::note_holder() noexcept {
   if (this_thread.id == 0) this_thread.id = gettid();
   holder_.store(this_thread.id, std::memory_order_relaxed);  // relaxed: a hint for the trace
-  ++this_thread.held;
+  this_thread.held.store(held_by_this_thread() + 1, std::memory_order_relaxed);
 }
 
 void PiMutex::lock() noexcept {
@@ -57,10 +58,12 @@ bool PiMutex::try_lock() noexcept {
 }
 
 void PiMutex::unlock() noexcept {
-  --this_thread.held;
+  this_thread.held.store(held_by_this_thread() - 1, std::memory_order_relaxed);
   pthread_mutex_unlock(&mutex_);
 }
 
-int PiMutex::held_by_this_thread() noexcept { return this_thread.held; }
+int PiMutex::held_by_this_thread() noexcept { return this_thread.held.load(std::memory_order_relaxed); }
+
+const std::atomic<int>& PiMutex::count_of_this_thread() noexcept { return this_thread.held; }
 
 }  // namespace mauve

@@ -81,10 +81,26 @@ PortConnection PortBase::prepare(ServiceBase& service, const std::string& resour
 
 void PortBase::swap(PortConnection& connection) noexcept {
   attach(connection.service);
-  if (connection_.service != nullptr) connection_.service->remove_port();
+  if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
+  is_counted_ = true;
   if (connection.service != nullptr) connection.service->add_port();
   const std::lock_guard lock(shown_mutex_);
   std::swap(connection_, connection);
+}
+
+bool PortBase::make_safe(bool may_wait) noexcept {
+  if (is_safe_ || output().on_stop != OutputPolicy::set_zero) return true;
+  const TryWrite tried = try_write_zero();
+  is_safe_ = tried == TryWrite::done;
+  if (tried != TryWrite::must_wait || !may_wait) return is_safe_;
+  write_zero();
+  return is_safe_ = true;
+}
+
+void PortBase::leave_behind() noexcept {
+  closed_.store(kLeft, std::memory_order_release);
+  if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
+  is_counted_ = false;
 }
 
 void PortBase::connect(ServiceBase& service, const std::string& resource_name) {

@@ -28,6 +28,10 @@ std::size_t ring_capacity(time_ns_t period_ns) {
   return std::max(TraceRing::kDefaultCapacity, static_cast<std::size_t>(std::min(wanted, kMost)));
 }
 
+std::string over_bound(time_ns_t bound_ns) {
+  return "the state ran longer than its declared " + std::to_string(bound_ns / us_to_ns(1)) + " us";
+}
+
 }  // namespace
 
 std::string_view to_string(ComponentState state) noexcept {
@@ -66,6 +70,8 @@ void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time
   if (grid_.period_ns != period_ns)
     grid_.period_ns = period_ns;  // who reports an earlier commit may be reading it
   context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
+  // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
+  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
 }
 
 time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
@@ -75,18 +81,30 @@ time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
 
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
+void Task::swap_fault(FaultNote& note) noexcept {
+  const std::lock_guard lock(fault_mutex_);
+  std::swap(fault_, note);
+}
+
 void Task::clear_fault() noexcept {
-  {
-    const std::lock_guard lock(fault_mutex_);
-    fault_ = {};
-  }
+  FaultNote none;
+  swap_fault(none);
   fallen_back_.store(false, std::memory_order_release);
-  condemned_.store(0, std::memory_order_release);
 }
 
 Fault Task::fault() const {
-  const std::lock_guard lock(fault_mutex_);
-  return fault_;
+  FaultNote note;
+  {
+    const std::lock_guard lock(fault_mutex_);
+    note = fault_;
+  }
+  if (note.when_ns == 0) return {};
+  Fault fault{.what = note.what != nullptr ? *note.what : over_bound(note.bound_ns),
+              .where = TraceNames::word(note.where),
+              .when_ns = note.when_ns};
+  if (outputs_.load(std::memory_order_acquire) != kAllWritten)
+    fault.what += "; an output is not written yet, for its resource is locked";
+  return fault;
 }
 
 std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
@@ -148,10 +166,14 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
   if (!has_thread_) return true;
   control_.fetch_or(kStop | kExit, std::memory_order_acq_rel);
   futex_wake_all(control_);
+  if (is_abandoned()) until_ns = 0;
   while (ended_.load(std::memory_order_acquire) == 0) {
     if (!futex_wait_until(ended_, 0, until_ns) && ended_.load(std::memory_order_acquire) == 0) return false;
   }
+  if (outputs_.load(std::memory_order_acquire) == kWriting) return false;
   pthread_join(thread_, nullptr);
+  if (watchdog_ != nullptr) watchdog_->forget(*this);
+  watchdog_.reset();
   has_thread_.store(false, std::memory_order_release);
   control_.store(0, std::memory_order_relaxed);  // relaxed: no thread is left to race with
   return true;
@@ -183,7 +205,7 @@ void Task::start(std::optional<time_ns_t> clock_ns) {
                   {.component = name_, .remedy = "configure it first"});
     case ComponentState::faulted:
       throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault().what,
-                  {.component = name_, .remedy = "clean it up and configure it, then start it"});
+                  {.component = name_, .remedy = is_parked() ? kRepairRemedy : kLeftBehindRemedy});
     default:
       throw Error(ErrorCode::already_running, "the component is running already",
                   {.component = name_, .expected = "STOPPED", .found = std::string(to_string(state()))});
@@ -259,28 +281,6 @@ void Task::stop(time_ns_t timeout_ns) {
     throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault().what,
                 {.component = name_});
   }
-}
-
-bool Task::check_execution(time_ns_t now_ns) {
-  const time_ns_t began = execution_began_ns_.load(std::memory_order_acquire);
-  if (began == 0 || now_ns - began <= execution_limit_ns_.load(std::memory_order_relaxed)) return false;
-  if (execution_began_ns_.load(std::memory_order_acquire) != began)
-    return false;  // another execution than the limit's
-  std::uint32_t nobody = 0;
-  if (!condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) return false;
-  const time_ns_t limit = execution_limit_ns_.load(std::memory_order_relaxed);
-  {
-    const std::lock_guard lock(fault_mutex_);
-    fault_ = {.what = "the state ran longer than its declared " + std::to_string(limit / 1000) + " us",
-              .where = current_state(),
-              .when_ns = now_ns};
-  }
-  const sched_param ordinary{};
-  pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
-  for (const auto& port : shell_->ports()) port->close();
-  write_outputs(false);
-  publish_state(ComponentState::faulted);
-  return true;
 }
 
 }  // namespace mauve

@@ -85,8 +85,9 @@ void Task::visit(Participant& place) noexcept {
   place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid_.period_ns;
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
+  begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
   const Commit::Answer answer = commit.meet(place);
-  if (answer == Commit::Answer::abandoned) {
+  if (answer == Commit::Answer::abandoned || !end_execution()) {
     is_abandoned_ = true;
     return;
   }
@@ -130,7 +131,8 @@ void Task::go_on_unchanged(Participant& place) noexcept {
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
 time_ns_t Task::restart_instant(const Participant& place) const noexcept {
   if (place.start_clock_ns) return next_instant(place.start_clock_ns);
-  const time_ns_t earliest = event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
+  const time_ns_t earliest =
+      event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
   return grid_.period_ns == 0 ? earliest : grid_.first_not_before(earliest);
 }
 
@@ -179,21 +181,6 @@ void Task::refuse_commit() noexcept {
   if ((control_.load(std::memory_order_seq_cst) & kCommit) == 0) return;
   withdraw_commit();
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-}
-
-/// FAULTED first: whoever waits for the component goes on, whatever becomes of the rest.
-void Task::condemn(const std::string& what) {
-  std::uint32_t nobody = 0;
-  if (!condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) return;
-  {
-    const std::lock_guard lock(fault_mutex_);
-    fault_ = {.what = what, .where = current_state(), .when_ns = clock_->now_ns()};
-  }
-  publish_state(ComponentState::faulted);
-  const sched_param ordinary{};
-  pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
-  for (const auto& port : shell_->ports()) port->close();
-  write_outputs(false);
 }
 
 void Task::leave_behind(std::shared_ptr<void> used) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The state machine of a task. Everything between a start and a park is real-time code.
-#include <pthread.h>
-
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +9,15 @@
 #include "mauve_rt/task.hpp"
 
 namespace mauve {
+
+namespace {
+
+/// An execution that has ended took longer than it declared.
+struct OverBound {
+  time_ns_t bound_ns;
+};
+
+}  // namespace
 
 void Task::resume() noexcept {
   try {
@@ -28,6 +35,8 @@ void Task::resume() noexcept {
     if (now < due_ns()) return;
     release(now);
     run_to_next_wait();
+  } catch (const OverBound& failure) {
+    park_faulted(nullptr, failure.bound_ns);
   } catch (const std::exception& failure) {
     park_faulted(failure.what());
   } catch (...) {
@@ -46,6 +55,7 @@ void Task::take_up_start() noexcept {
   if ((control & kStart) == 0) return;
   control_.fetch_and(~kStart, std::memory_order_acq_rel);
   if (!simulated_) counters_.mark();
+  regain_priority();
   start_machine(start_at_ns_);
 }
 
@@ -99,11 +109,7 @@ const State* Task::execute(const State& state) {
   const time_ns_t began = boundary_ns_;
   present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
   trace_at(began, TraceKind::state_begin, state.trace_id);
-  if (state.max_execution_ns != 0) {
-    execution_limit_ns_.store(state.max_execution_ns,
-                              std::memory_order_relaxed);  // relaxed: began publishes it
-    execution_began_ns_.store(began, std::memory_order_release);
-  }
+  if (state.max_execution_ns != 0) begin_execution(began, state.max_execution_ns);
   const auto& methods = fsm_->methods();
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
   methods[state.action].run(*core_);
@@ -114,16 +120,17 @@ const State* Task::execute(const State& state) {
       break;
     }
   }
-  if (state.max_execution_ns != 0) {
-    execution_began_ns_.store(0, std::memory_order_release);
-    clock_->spend(state.max_execution_ns);
-  }
+  clock_->spend(state.simulated_ns());
   boundary_ns_ = clock_->now_ns();
+  const bool was_condemned = state.max_execution_ns != 0 && !end_execution();
   trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
   state.execution_time->record(boundary_ns_ - began);
   if (PiMutex::held_by_this_thread() > held_before)
     throw std::logic_error("a lock is still held at the end of the state");
-  return condemned_.load(std::memory_order_acquire) == 0 ? next : nullptr;
+  if (was_condemned) return nullptr;
+  if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
+    throw OverBound{state.max_execution_ns};
+  return next;
 }
 
 void Task::enter_wait(const State& state) {
@@ -222,32 +229,14 @@ void Task::park_stopped() noexcept {
   park(ComponentState::stopped);
 }
 
-void Task::park_faulted(const char* what) noexcept {
-  execution_began_ns_.store(0, std::memory_order_release);
-  std::uint32_t nobody = 0;
-  if (condemned_.compare_exchange_strong(nobody, 1, std::memory_order_acq_rel)) {
-    Fault fault{.what = what, .where = current_state(), .when_ns = clock_->now_ns()};
-    const std::lock_guard lock(fault_mutex_);
-    fault_ = std::move(fault);
-  } else {
-    wait_condemned();
-  }
+void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
+  if (!end_execution()) return park_condemned();
+  FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
+                 .bound_ns = bound_ns,
+                 .where = current_.load(std::memory_order_relaxed),
+                 .when_ns = clock_->now_ns()};
+  swap_fault(note);
   end_in_fault();
-}
-
-void Task::park_condemned() noexcept {
-  wait_condemned();
-  end_in_fault();
-}
-
-/// The watchdog was first: it has written, or is writing, the fault and then says FAULTED.
-void Task::wait_condemned() const noexcept {
-  constexpr auto kFaulted = static_cast<std::uint32_t>(ComponentState::faulted);
-  for (;;) {
-    const std::uint32_t state = state_.load(std::memory_order_acquire);
-    if (state == kFaulted) return;
-    futex_wait_until(state_, state, kForever);
-  }
 }
 
 void Task::end_in_fault() noexcept {
@@ -266,11 +255,7 @@ void Task::fall_back(CommitAction& fallback) noexcept {
   fallback.take();
   trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
   for (const auto& port : shell_->ports()) port->reopen();
-  if (has_thread_ && facts_.policy == "SCHED_FIFO") {  // the watchdog may have taken it away
-    const sched_param own{.sched_priority = facts_.priority};
-    pthread_setschedparam(pthread_self(), SCHED_FIFO, &own);
-  }
-  condemned_.store(0, std::memory_order_release);
+  regain_priority();
   start_machine(next_instant(std::nullopt));
 }
 

@@ -9,6 +9,7 @@
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/task.hpp"
+#include "mauve_rt/watchdog.hpp"
 
 #include "prefault.hpp"
 #include "thread_attributes.hpp"
@@ -27,8 +28,11 @@ thread_local const Task* task_simulated_here = nullptr;
 
 }  // namespace
 
-void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace) {
+void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
+                         std::shared_ptr<Watchdog> watchdog) {
+  if (!end_thread(0)) throw_state_running("the component's thread has not ended", 0, kLeftBehindRemedy);
   const std::lock_guard lock(command_mutex_);
+  watchdog_ = std::move(watchdog);
   barrier_ = barrier;
   begin_trace(trace);
   parked_.store(1, std::memory_order_relaxed);  // relaxed: the thread does not exist yet
@@ -66,6 +70,7 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   }
   read_back_thread();
   has_thread_.store(true, std::memory_order_release);
+  if (watchdog_ != nullptr) watchdog_->watch(*this);
   // At deployment nothing runs yet; later, more urgent components may keep it from its processor.
   const time_ns_t until = barrier != nullptr ? kForever : monotonic_now_ns() + kReadyTimeout;
   while (ready_.load(std::memory_order_acquire) == 0) {
@@ -93,6 +98,7 @@ void* Task::thread_entry(void* self) noexcept {
 void Task::thread_main() noexcept {
   pthread_setname_np(pthread_self(), name_.substr(0, 15).c_str());
   task_of_this_thread = this;
+  locks_held_ = &PiMutex::count_of_this_thread();
   TraceRing::set_for_this_thread(ring_.get());
   prctl(PR_SET_TIMERSLACK, 1UL);  // of use where SCHED_FIFO was refused
   counters_.attach();

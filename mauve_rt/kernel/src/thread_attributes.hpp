@@ -2,8 +2,11 @@
 // How the kernel's real-time threads are made.
 #pragma once
 
+#include <alloca.h>
 #include <pthread.h>
 
+#include <cerrno>
+#include <csignal>
 #include <cstddef>
 
 namespace mauve {
@@ -36,5 +39,28 @@ class ThreadAttributes {
 
   pthread_attr_t value;
 };
+
+/// A thread of the kernel's own, all signals blocked; an ordinary one where SCHED_FIFO is refused. As pthread_create.
+inline int start_thread(pthread_t& thread, ThreadAttributes& attributes, void* (*entry)(void*),
+                        void* argument) noexcept {
+  sigset_t all_signals;
+  sigset_t callers_signals;
+  sigfillset(&all_signals);
+  pthread_sigmask(SIG_SETMASK, &all_signals, &callers_signals);  // the new thread inherits it
+  int result = pthread_create(&thread, &attributes.value, entry, argument);
+  if (result == EPERM) {
+    attributes.set_policy(SCHED_OTHER, 0);
+    result = pthread_create(&thread, &attributes.value, entry, argument);
+  }
+  pthread_sigmask(SIG_SETMASK, &callers_signals, nullptr);
+  return result;
+}
+
+/// Touches so much of the calling thread's stack that none of it faults later. [setup]
+[[gnu::noinline]] inline void touch_stack(std::size_t bytes) noexcept {
+  constexpr std::size_t kPage = 4096;
+  auto* pages = static_cast<volatile char*>(alloca(bytes));
+  for (std::size_t offset = 0; offset < bytes; offset += kPage) pages[offset] = 0;
+}
 
 }  // namespace mauve

@@ -180,4 +180,10 @@ Transaction& Transaction::stop(const std::string& component) {
   return add(step(std::move(text), component, [component](Draft& draft) { put_stop(draft, component); }));
 }
 
+Transaction& Transaction::configure(const std::string& component) {
+  std::string text = "configure " + component;
+  return add(
+      step(std::move(text), component, [component](Draft& draft) { put_configure(draft, component); }));
+}
+
 }  // namespace mauve

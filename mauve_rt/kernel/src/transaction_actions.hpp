@@ -82,6 +82,24 @@ class ListenerChange final : public CommitAction, public EventListener {
   std::atomic<bool> live_{false};
 };
 
+/// Forgets a fault: the component is STOPPED then, with new parts or parts configured anew.
+class Repair final : public CommitAction {
+ public:
+  explicit Repair(Component& component) : component_(component), trace_id_(TraceNames::intern("repair")) {}
+  void take() noexcept override {
+    Task& repaired = component_.task();
+    repaired.swap_fault(none_);
+    for (const auto& port : component_.shell().ports()) port->reopen();
+    repaired.set_state(ComponentState::stopped);
+  }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  Component& component_;
+  FaultNote none_;
+  std::uint32_t trace_id_;
+};
+
 /// Takes a component off its resources: its last outputs are written before anybody else gets to write there.
 class Retreat final : public CommitAction {
  public:
@@ -94,7 +112,13 @@ class Retreat final : public CommitAction {
   void set_place(const Participant& place) noexcept { place_ = &place; }
   void take() noexcept override {
     if (place_->in_flight) place_->task->write_outputs(false);
-    for (auto& [port, connection] : ports_) port->swap(connection);
+    for (auto& [port, connection] : ports_) {
+      if (place_->left_behind) {
+        port->leave_behind();  // its thread still uses it
+      } else {
+        port->swap(connection);
+      }
+    }
   }
   time_ns_t budget_ns() const noexcept override {
     return us_to_ns(5) * static_cast<time_ns_t>(ports_.size() + 1);

@@ -80,13 +80,15 @@ void put_start(Draft& draft, const std::string& name, std::optional<time_ns_t> c
     throw Error(ErrorCode::not_configured, "the architecture is not deployed",
                 {.component = name, .remedy = "deploy it: that starts all components"});
   }
-  if (started.state == ComponentState::faulted) {
-    throw Error(ErrorCode::faulted, "the component is FAULTED: " + started.component->task().fault().what,
-                {.component = name, .remedy = "clean it up and configure it, then start it"});
+  const Task& task = started.component->task();
+  if (started.state == ComponentState::faulted && !started.is_repaired()) {
+    throw Error(
+        ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
+        {.component = name, .remedy = task.is_parked() ? Task::kRepairRemedy : Task::kLeftBehindRemedy});
   }
-  if (started.state == ComponentState::unconfigured) {
+  if (started.state == ComponentState::unconfigured && started.configure_step == 0) {
     throw Error(ErrorCode::not_configured, "the component is not configured",
-                {.component = name, .remedy = "configure it first"});
+                {.component = name, .remedy = "configure it in a step before"});
   }
   if (started.runs) {
     throw Error(ErrorCode::already_running, "the component is running already",
@@ -98,6 +100,19 @@ void put_start(Draft& draft, const std::string& name, std::optional<time_ns_t> c
   started.runs = true;
   started.restarts = started.ran;
   started.clock_ns = clock_ns;
+}
+
+void put_configure(Draft& draft, const std::string& name) {
+  DraftComponent& configured = draft.change(name);
+  if (configured.is_added) return;  // it is, as it comes
+  if (configured.ran) {
+    throw Error(ErrorCode::already_running, "the component is running",
+                {.component = name,
+                 .expected = "a parked component",
+                 .found = "RUNNING",
+                 .remedy = "stop it before, or replace its core in flight"});
+  }
+  configured.configure_step = draft.step();
 }
 
 void put_stop(Draft& draft, const std::string& name) {

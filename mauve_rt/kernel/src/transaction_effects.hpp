@@ -17,6 +17,7 @@ void put_component(Draft& draft, const std::string& name, Parts parts, const Com
                    Component::FsmFactory make_fsm, std::unique_ptr<CoreBase> fallback);
 void put_start(Draft& draft, const std::string& name, std::optional<time_ns_t> clock_ns);
 void put_stop(Draft& draft, const std::string& name);
+void put_configure(Draft& draft, const std::string& name);
 /// Makes a registered fsm, as often as asked.
 Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm);
 

@@ -46,7 +46,8 @@ class Preview {
       const auto wire = draft.wires.find(port->name());
       const bool is_wired = wire != draft.wires.end();
       ports_.push_back(port.get());
-      port->preview(is_wired ? port->prepare(*wire->second.service, wire->second.resource) : PortConnection{});
+      port->preview(is_wired ? port->prepare(*wire->second.service, wire->second.resource)
+                             : PortConnection{});
     }
   }
 
@@ -54,6 +55,15 @@ class Preview {
   std::vector<PropertyBase*> properties_;
   std::vector<PortBase*> ports_;
 };
+
+void restore_state(Component& component, ComponentState before, FaultNote& fault) {
+  component.show();  // it was configured with what would have been
+  component.update_listening();
+  if (component.task().state() != ComponentState::stopped) return;  // somebody has started it
+  if (before == ComponentState::unconfigured) return component.cleanup();
+  component.task().swap_fault(fault);
+  component.task().set_state(before);
+}
 
 }  // namespace
 
@@ -82,11 +92,12 @@ void TransactionCommit::Work::prepare() {
 
 void TransactionCommit::Work::prefault_parts() {
   const bool has_new_parts =
-      std::any_of(changes_.begin(), changes_.end(), [](const Change& change) {
-        return change.parts != nullptr && change.draft->component->task().has_thread();
-      }) || std::any_of(prepared_added_.begin(), prepared_added_.end(), [](const DraftComponent* added) {
-        return added->component->task().has_thread();
-      });
+      std::any_of(changes_.begin(), changes_.end(),
+                  [](const Change& change) {
+                    return change.parts != nullptr && change.draft->component->task().has_thread();
+                  }) ||
+      std::any_of(prepared_added_.begin(), prepared_added_.end(),
+                  [](const DraftComponent* added) { return added->component->task().has_thread(); });
   if (has_new_parts) prefault_allocated();
 }
 
@@ -115,7 +126,28 @@ void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
   changes_.push_back({.draft = &removed, .retreat = &retreat});
 }
 
+/// The one thing that is done before the commit: what hooks do cannot be taken back, but the state can.
+void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
+  Component& component = *changed.component;
+  if (!architecture_.is_configured() || options_.dry_run) return;
+  ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
+  component.task().swap_fault(before.fault);
+  Preview preview;
+  preview.begin(component.shell(), changed);
+  component.configure_anew();
+  configured_anew_.push_back(std::move(before));
+  changed.state = ComponentState::stopped;
+}
+
+void TransactionCommit::Work::prepare_repair(const DraftComponent& changed) {
+  if (!changed.is_repaired()) return;
+  repairs_.push_back(std::make_unique<Repair>(*changed.component));
+  repairs_.back()->task = &changed.component->task();
+}
+
 void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
+  if (changed.configure_step != 0) at_step(changed.configure_step, [&] { configure_anew(changed); });
+  prepare_repair(changed);
   changes_.push_back({.draft = &changed});
   Change& change = changes_.back();
   if (changed.has_new_parts()) {
@@ -144,6 +176,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
       if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
     }
   }
+  if (draft.is_repaired()) change.parts->start_afresh();
   Preview preview;
   preview.begin(change.parts->shell(), draft);
   change.parts->prepare();
@@ -168,7 +201,8 @@ void TransactionCommit::Work::prepare_wiring(Change& change) {
 void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
                                                 ServiceBase& service) {
   if (service.resource() == nullptr) return;
-  if (change.parts != nullptr && change.parts->restarts()) return;  // a new fsm has listened there since its prepare()
+  if (change.parts != nullptr && change.parts->restarts())
+    return;  // a new fsm has listened there since its prepare()
   for (const auto& state : change.draft->component->fsm().states()) {
     if (state->event == nullptr || &state->event->port() != &port) continue;
     listener_changes_.push_back(&keep(*change.draft->component,
@@ -186,6 +220,7 @@ void TransactionCommit::Work::prepare_properties(Change& change) {
 /// does not wait) is left to be reaped: what is under way goes on without it.
 void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component, bool was_listed) {
   Task& task = component->task();
+  if (task.is_abandoned()) component->stop_listening();
   const bool ended = host_ != nullptr ? host_->detach(task) : task.end_thread(monotonic_now_ns());
   if (task.is_parked()) {
     for (const auto& port : component->shell().ports()) port->disconnect();
@@ -193,7 +228,7 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
     component->cleanup();
   }
   if (!ended) {
-    architecture_.keep_until_ended(component, was_listed);
+    architecture_.keep_until_ended(component, was_listed, draft_->removed_resources());
   } else if (was_listed) {
     architecture_.retire_trace(task);
   }
@@ -218,6 +253,7 @@ void TransactionCommit::Work::leave_behind() {
 void TransactionCommit::Work::discard() noexcept {
   leave_behind();
   for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
+  for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);
   for (const auto& resource : prepared_resources_) resource->cleanup();
   architecture_.give_back_numbers(numbers_before_);

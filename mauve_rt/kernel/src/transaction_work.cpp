@@ -112,6 +112,7 @@ void TransactionCommit::Work::gather() {
   for (const Change& change : changes_) {
     if (change.parts != nullptr) actions.push_back(change.parts.get());
   }
+  for (const auto& repair : repairs_) actions.push_back(repair.get());
   commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
   commit_->set_max_missed(options_.max_missed);
   auto place = commit_->participants().begin();
@@ -119,6 +120,7 @@ void TransactionCommit::Work::gather() {
     place->task = &change.draft->component->task();
     place->afterwards = afterwards_of(change);
     place->replaces_parts = change.parts != nullptr;
+    place->repairs = change.draft->is_repaired();
     if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
     if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
     if (change.retreat != nullptr) change.retreat->set_place(*place);
@@ -212,12 +214,15 @@ void TransactionCommit::Work::retire() {
   }
   for (const DraftComponent& removed : draft_->removed_components()) {
     try {  // somebody who still held it may have started it again
-      if (!removed.component->task().is_parked()) removed.component->task().stop();
+      const Task& task = removed.component->task();
+      if (!task.is_parked() && !task.is_abandoned()) removed.component->task().stop();
     } catch (const Error&) {  // it faulted, or is in a state: ending its thread is the answer
     }
     let_go(removed.component, true);
   }
-  for (const auto& resource : draft_->removed_resources()) resource->cleanup();
+  for (const auto& resource : draft_->removed_resources()) {
+    if (!architecture_.is_used_by_left_behind(*resource)) resource->cleanup();
+  }
 }
 
 /// Whoever waits for the report keeps nothing that others may take away meanwhile.
@@ -226,6 +231,7 @@ void TransactionCommit::Work::keep_for_report() {
   changes_.clear();
   listener_changes_.clear();
   actions_.clear();
+  repairs_.clear();
   prepared_added_.clear();
   prepared_resources_.clear();
   draft_.reset();

@@ -38,6 +38,8 @@ class TransactionCommit::Work {
   void prepare_change(DraftComponent& changed);
   void prepare_removed(DraftComponent& removed);
   void prepare_parts(Change& change);
+  void configure_anew(DraftComponent& changed);
+  void prepare_repair(const DraftComponent& changed);
   void prepare_wiring(Change& change);
   void prepare_properties(Change& change);
   void prefault_parts();
@@ -79,6 +81,13 @@ class TransactionCommit::Work {
   time_ns_t prepare_ns_{0};
   std::vector<std::shared_ptr<Resource>> prepared_resources_;
   std::vector<DraftComponent*> prepared_added_;
+  struct ConfiguredAnew {
+    Component* component;
+    ComponentState before;
+    FaultNote fault;
+  };
+  std::vector<ConfiguredAnew> configured_anew_;
+  std::vector<std::unique_ptr<Repair>> repairs_;  // taken in last: the new parts are in
   std::vector<Change> changes_;
   std::vector<std::unique_ptr<CommitAction>>
       actions_;                                    // in the order they are taken in; the new parts come after

@@ -51,7 +51,7 @@ struct ListChange {
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
-/// | leaving_                        | who changes it        | same    | change_lock_                   |
+/// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
 /// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
 /// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
@@ -137,6 +137,9 @@ class Architecture final : public Configurable {
   PluginRegistry& require_registry() const;
   PluginRegistry* registry() const noexcept { return registry_; }
 
+  /// Threads of removed components that still execute what they were condemned for. [non-rt]
+  std::size_t threads_left_behind() const;
+
   ChangeSignal& changes() noexcept { return changes_; }
   /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
   std::uint64_t revision() const noexcept {
@@ -186,9 +189,13 @@ class Architecture final : public Configurable {
   void give_back_numbers(std::size_t numbers);
   /// Puts a change of the lists in force, as one for all who look. [non-rt]
   void change_lists(const ListChange& change);
-  /// Keeps a component whose thread has not ended; reap() lets those go that have. [non-rt]
-  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed);
+  /// Keeps a component whose thread has not ended, and all it is connected to (`gone`: of resources that were removed
+  /// with it); reap() lets those go that have. [non-rt]
+  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
+                        const std::vector<std::shared_ptr<Resource>>& gone);
   void reap();
+  /// Whether a thread that was left behind may still use a resource. [non-rt]
+  bool is_used_by_left_behind(const Resource& resource) const;
   /// Keeps what a removed component's ring holds until the next drain. [non-rt]
   void retire_trace(Task& task);
 
@@ -196,6 +203,7 @@ class Architecture final : public Configurable {
   struct Leaving {
     std::shared_ptr<Component> component;
     bool was_listed;
+    std::vector<std::shared_ptr<Resource>> uses;
   };
   struct Final {  // of a removed component
     std::uint64_t written{0};
@@ -205,6 +213,7 @@ class Architecture final : public Configurable {
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
+  bool end_threads() noexcept;
 
   PluginRegistry* registry_;
   ChangeLock change_lock_;

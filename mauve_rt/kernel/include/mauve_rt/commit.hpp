@@ -40,10 +40,10 @@ class CommitAction {
 
 /// What becomes of a component when the change is in.
 enum class Afterwards : std::uint8_t {
-  go_on,    // at its pending instant; a parked one stays parked
+  go_on,  // at its pending instant; a parked one stays parked
   restart,  // in its initial state, at the pending instant if that is on its new grid, else at the grid's next; a
             // parked one starts
-  stop,     // parked, its outputs written
+  stop,  // parked, its outputs written
 };
 
 class Commit;
@@ -76,6 +76,8 @@ struct Participant {
   time_ns_t budget_ns{0};      // what adopt and take of its own core need
   bool replaces_parts{false};  // its outputs are written as the ports' on_commit says
   bool in_flight{false};       // it was running when the commit began
+  bool repairs{false};         // it was FAULTED, and the change mends it
+  bool left_behind{false};     // to be removed, while its thread still executes what it was condemned for
 
   std::atomic<bool> came{false};           // it was at the gate, or would have been but for the budget
   std::atomic<bool> arrived{false};        // it is at the gate
@@ -86,10 +88,10 @@ struct Participant {
   std::int64_t lost{0};      // instants that passed while it waited in vain
   time_ns_t parked_ns{0};
   time_ns_t armed_ns{0};
-  time_ns_t pending_ns{0};  // the instant pending at the park; 0: the component was parked already
-  time_ns_t period_ns{0};   // g before the change
-  Grid grid{};              // after it
-  time_ns_t resumes_ns{0};  // the instant that it goes on at
+  time_ns_t pending_ns{0};     // the instant pending at the park; 0: the component was parked already
+  time_ns_t period_ns{0};      // g before the change
+  Grid grid{};                 // after it
+  time_ns_t resumes_ns{0};     // the instant that it goes on at
   time_ns_t grid_place_ns{0};  // where that belongs within a period (Task::grid_place_ns_)
 
   time_ns_t release_nominal_ns{0};  // of the release that follows

@@ -69,6 +69,8 @@ class PartsChange final : public CommitAction {
   void start_afresh() noexcept { afresh_ = true; }
   /// The new core is put in as it is, neither bound nor configured: Listing 3 of the paper. [setup]
   void leave_unready() noexcept { unready_ = true; }
+  /// And it is the fallback. [setup]
+  void be_fallback() noexcept { afresh_ = is_fallback_ = true; }
 
   /// The core that is not in force now. [setup]
   CoreBase* core() noexcept { return parts_.core.get(); }
@@ -95,6 +97,7 @@ class PartsChange final : public CommitAction {
   std::uint32_t core_name_{0};
   bool afresh_{false};
   bool unready_{false};
+  bool is_fallback_{false};
   bool taken_{false};
   std::uint32_t trace_id_;
   std::string what_{};  // the part being prepared
@@ -253,6 +256,14 @@ class Component final : public Configurable {
 
   /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
   void update_listening() { update_listening(*parts_.fsm); }
+  /// Its event waits hear of nothing any more, for a component that is removed while a state of it hangs. [non-rt]
+  void stop_listening() noexcept;
+  /// Whether one of its ports leads to the resource. [non-rt]
+  bool uses(const Resource& resource) const;
+
+  /// Cleans up and configures anew a parked component, whatever its state; STOPPED then. [non-rt]
+  /// Throws Error: already_running; what configure throws: it is UNCONFIGURED then.
+  void configure_anew();
 
  private:
   friend class PartsChange;

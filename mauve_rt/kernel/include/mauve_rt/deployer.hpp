@@ -5,7 +5,6 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
-#include <thread>
 
 #include "mauve_rt/host.hpp"
 
@@ -43,12 +42,13 @@ class Deployer final : public Host {
   void attach(Task& task) override;
   bool detach(Task& task) noexcept override;
   std::shared_ptr<Conductor> conductor() noexcept override;
+  /// What watches the components' executions while it is deployed; nullptr otherwise. [setup]
+  const Watchdog* watchdog() const noexcept { return watchdog_.get(); }
 
  private:
   class Barrier;
 
   void create_threads();
-  void watch() noexcept;
 
   DeployerOptions options_;
   RealtimeProcess process_;
@@ -56,8 +56,7 @@ class Deployer final : public Host {
   std::mutex conductor_mutex_;
   std::shared_ptr<Conductor> conductor_;
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
-  std::thread watchdog_;
-  std::atomic<std::uint32_t> watchdog_stop_{0};
+  std::shared_ptr<Watchdog> watchdog_;
 };
 
 }  // namespace mauve

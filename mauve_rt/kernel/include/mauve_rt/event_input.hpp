@@ -32,6 +32,8 @@ class EventInput final : public EventListener {
   void set_task(Task& task) noexcept { task_ = &task; }
   /// Listens to the resource that the port is connected to now, and to no other. [non-rt]
   void listen();
+  /// Listens to nothing from now on. [non-rt]
+  void stop_listening() noexcept;
   /// The same for a resource where a stand-in listens so far. [non-rt]
   void listen_for(EventListener& stand_in, Resource& resource) noexcept;
 

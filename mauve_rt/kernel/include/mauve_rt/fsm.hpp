@@ -96,15 +96,21 @@ struct State {
   std::string name;
   std::size_t index{0};  // in the order of declaration
   bool is_wait{false};
-  time_ns_t duration_ns{0};             // of a wait; of an event wait its timeout
-  std::unique_ptr<EventInput> event;    // of an event wait
-  time_ns_t min_interarrival_ns{0};     // of an event wait: the least time from one release to the next
-  std::size_t action{kNone};            // of an execution state
-  time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
-  std::vector<Transition> transitions;  // the first whose guard holds is taken
-  State* next{nullptr};                 // otherwise this one
+  time_ns_t duration_ns{0};              // of a wait; of an event wait its timeout
+  std::unique_ptr<EventInput> event;     // of an event wait
+  time_ns_t min_interarrival_ns{0};      // of an event wait: the least time from one release to the next
+  std::size_t action{kNone};             // of an execution state
+  time_ns_t max_execution_ns{0};         // declared bound of an execution state; 0: none
+  time_ns_t simulated_execution_ns{-1};  // what it takes in virtual time; < 0: as long as its bound allows
+  std::vector<Transition> transitions;   // the first whose guard holds is taken
+  State* next{nullptr};                  // otherwise this one
   std::uint32_t trace_id{0};
   ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
+
+  /// How much of virtual time it takes. [rt]
+  time_ns_t simulated_ns() const noexcept {
+    return simulated_execution_ns < 0 ? max_execution_ns : simulated_execution_ns;
+  }
 };
 
 /// An fsm seen without its types.
@@ -124,6 +130,8 @@ class FsmBase : public Configurable {
   time_ns_t period_ns() const noexcept { return period_ns_; }
   /// Whether it waits for events: phase and missed releases do not apply to it then. Valid once configured. [rt]
   bool is_sporadic() const noexcept { return sporadic_; }
+  /// The smallest max_execution of all states; 0: none declares one. Valid once configured. [rt]
+  time_ns_t smallest_bound_ns() const noexcept { return smallest_bound_ns_; }
 
   void set_implementation(std::string name) { implementation_ = std::move(name); }
   const std::string& implementation() const noexcept { return implementation_; }
@@ -158,6 +166,7 @@ class FsmBase : public Configurable {
   State* initial_{nullptr};
   time_ns_t period_ns_{0};
   bool sporadic_{false};
+  time_ns_t smallest_bound_ns_{0};
   time_ns_t divisor_ns_{0};  // 0: none
   std::string implementation_;
 };

@@ -15,6 +15,8 @@ namespace mauve {
 
 inline constexpr std::uint32_t kDefaultMaxReaders = 14;
 inline constexpr std::uint32_t kMostReaders = 1000;
+/// Readers whose component was removed while a state of it hung keep their place until that ends.
+inline constexpr std::uint32_t kLeftBehind = 2;
 
 /// One value of a trivially copyable type; services `read` (at most max_readers ports, wait-free) and `write`
 /// (one port, or an incoming topic).
@@ -31,7 +33,7 @@ class LatestValue final : public NewestResource {
   explicit LatestValue(std::uint32_t max_readers = kDefaultMaxReaders)
       : NewestResource("latest_value", type_name<T>()),
         max_readers_(checked(max_readers)),
-        register_(max_readers + 2) {
+        register_(max_readers + 2 + kLeftBehind) {
     offer(read);
     offer(write);
   }
@@ -79,6 +81,15 @@ class LatestValue final : public NewestResource {
       owner_.written(time_ns);
       return true;
     }
+    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+      {
+        const std::unique_lock lock(owner_.write_mutex_, std::try_to_lock);
+        if (!lock.owns_lock()) return TryWrite::busy;
+        if (!owner_.register_.write(value, time_ns)) return TryWrite::done;
+      }
+      owner_.written(time_ns);
+      return TryWrite::done;
+    }
 
    private:
     LatestValue& owner_;
@@ -106,7 +117,8 @@ class LatestValue final : public NewestResource {
   }
 
   std::uint32_t max_readers_;
-  LatestRegister<T> register_;  // two readers more: the serialized face, and a port that is previewed
+  LatestRegister<T>
+      register_;  // more readers: the serialized face, a port that is previewed, those left behind
   PiMutex write_mutex_;
   PiMutex serial_mutex_;
 

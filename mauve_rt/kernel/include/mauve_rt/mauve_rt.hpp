@@ -35,3 +35,4 @@
 #include "mauve_rt/trace.hpp"
 #include "mauve_rt/transaction.hpp"
 #include "mauve_rt/transaction_commit.hpp"
+#include "mauve_rt/watchdog.hpp"

@@ -34,6 +34,8 @@ class PiMutex {
   void set_trace_id(std::uint32_t id) noexcept { trace_id_ = id; }
   /// How many PiMutexes the calling thread holds; not 0 at a state boundary is a fault. [rt]
   static int held_by_this_thread() noexcept;
+  /// The same for others to look at, while the calling thread lives. [rt]
+  static const std::atomic<int>& count_of_this_thread() noexcept;
 
  private:
   void lock_contended() noexcept;

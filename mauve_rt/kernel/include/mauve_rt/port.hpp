@@ -95,14 +95,14 @@ class ReadPort final : public PortBase {
     if constexpr (std::is_trivially_copyable_v<T>) {
       if (latest_ != nullptr) return latest_->sample(default_, reader_);
     }
-    if (service_ == nullptr) return {.value = default_};
+    if (service_ == nullptr || is_closed()) return {.value = default_};
     return service_->sample(default_, reader_);
   }
   DataStatus find(T& value, time_ns_t& time_ns) noexcept {
     if constexpr (std::is_trivially_copyable_v<T>) {
       if (latest_ != nullptr) return latest_->read(value, time_ns, reader_);
     }
-    return service_ != nullptr ? service_->read(value, time_ns, reader_) : DataStatus::none;
+    return service_ != nullptr && !is_closed() ? service_->read(value, time_ns, reader_) : DataStatus::none;
   }
 
   ReadService<T>* service_{nullptr};
@@ -130,11 +130,14 @@ class WritePort final : public PortBase {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(value, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
-    if (is_closed() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
     return taken;
   }
   void write_zero() noexcept override {
     if (service_ != nullptr) service_->write(zero_, stamp_ns());
+  }
+  TryWrite try_write_zero() noexcept override {
+    return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
   }
   OutputOptions output() const noexcept override { return output_; }
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }

@@ -48,7 +48,9 @@ struct ConnectedTo {
 /// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
 /// | context_    | [setup]                        | component                 | -                                    |
 /// | optional_   | [setup]                        | any                       | -                                    |
-/// | closed_     | the watchdog                   | component                 | release/acquire: its zeros stay last |
+/// | closed_     | the watchdog; who removes it   | component                 | release/acquire: its zeros stay last |
+/// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
+/// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
 /// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
 /// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
 class PortBase {
@@ -101,10 +103,21 @@ class PortBase {
 
   /// Writes the type's default value; a port that is no write port does nothing. [rt]
   virtual void write_zero() noexcept {}
+  /// The same without waiting for a lock. [rt]
+  virtual TryWrite try_write_zero() noexcept { return TryWrite::done; }
   virtual OutputOptions output() const noexcept { return {OutputPolicy::hold, OutputPolicy::hold}; }
-  /// After this the port swallows writes, until reopened. [rt]
-  void close() noexcept { closed_.store(true, std::memory_order_release); }
-  void reopen() noexcept { closed_.store(false, std::memory_order_release); }
+  /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
+  void close() noexcept { closed_.store(kClosed, std::memory_order_release); }
+  void reopen() noexcept {
+    is_safe_ = false;
+    closed_.store(kOpen, std::memory_order_release);
+  }
+  /// Of a closed port: writes what `on_stop` says, once; waits for a lock only where the service cannot do without, and
+  /// the caller allows it. [rt] Whether it is written.
+  bool make_safe(bool may_wait) noexcept;
+  /// Its component is removed while a state of it still uses the port: gives up its place at the service, and swallows
+  /// writes for good. The connection stays until disconnect(). [rt]
+  void leave_behind() noexcept;
 
   /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
   virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
@@ -136,7 +149,9 @@ class PortBase {
   time_ns_t stamp_ns() const noexcept {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
   }
-  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire); }
+  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire) != kOpen; }
+  /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
+  bool keeps_zero() const noexcept { return closed_.load(std::memory_order_acquire) == kClosed; }
 
  private:
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread
@@ -152,7 +167,10 @@ class PortBase {
   PortConnection connection_;
   const Context* context_{nullptr};
   bool optional_{false};
-  std::atomic<bool> closed_{false};
+  static constexpr std::uint8_t kOpen = 0, kClosed = 1, kLeft = 2;
+  std::atomic<std::uint8_t> closed_{kOpen};
+  bool is_safe_{false};
+  bool is_counted_{true};  // among the ports of its service
   std::unique_ptr<PortBase> stand_in_;
   std::atomic<pthread_t> previewer_{kNobody};
 };

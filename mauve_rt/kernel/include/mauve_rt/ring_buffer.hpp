@@ -86,6 +86,9 @@ class RingBuffer final : public Resource {
    public:
     explicit Write(RingBuffer& owner) : WriteService<T>("write"), owner_(owner) {}
     bool write(const T& value, time_ns_t time_ns) noexcept override { return owner_.push(value, time_ns); }
+    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+      return owner_.try_push(value, time_ns);
+    }
 
    private:
     RingBuffer& owner_;
@@ -109,19 +112,32 @@ class RingBuffer final : public Resource {
   bool push(const T& value, time_ns_t time_ns) noexcept {
     {
       const std::lock_guard lock(mutex_);
-      if (size_ == places_.size()) {
-        ++lost_;
-        if (when_full_ == WhenFull::refuse) return false;
-        first_ = (first_ + 1) % places_.size();
-        --size_;
-      }
-      Place& place = places_[(first_ + size_) % places_.size()];
-      place.value = value;
-      place.time_ns = time_ns;
-      place.sequence = ++sequence_;
-      ++size_;
+      if (!put(value, time_ns)) return false;
     }
     written(time_ns);
+    return true;
+  }
+  TryWrite try_push(const T& value, time_ns_t time_ns) noexcept {
+    {
+      const std::unique_lock lock(mutex_, std::try_to_lock);
+      if (!lock.owns_lock()) return TryWrite::busy;
+      if (!put(value, time_ns)) return TryWrite::done;
+    }
+    written(time_ns);
+    return TryWrite::done;
+  }
+  bool put(const T& value, time_ns_t time_ns) noexcept {
+    if (size_ == places_.size()) {
+      ++lost_;
+      if (when_full_ == WhenFull::refuse) return false;
+      first_ = (first_ + 1) % places_.size();
+      --size_;
+    }
+    Place& place = places_[(first_ + size_) % places_.size()];
+    place.value = value;
+    place.time_ns = time_ns;
+    place.sequence = ++sequence_;
+    ++size_;
     return true;
   }
 

@@ -25,6 +25,13 @@ std::string_view to_string(PortKind kind) noexcept;
 /// newer.
 enum class DataStatus : std::uint8_t { none = 0, old_data = 1, new_data = 2 };
 
+/// What came of a write that waits for no lock.
+enum class TryWrite : std::uint8_t {
+  done,
+  busy,       // somebody holds the lock
+  must_wait,  // the service cannot do without waiting
+};
+
 /// A value with its status and its writer's time.
 template <typename T>
 struct Sample {
@@ -138,6 +145,10 @@ class WriteService : public ServiceBase {
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Takes a copy; false when there was no room. [rt]
   virtual bool write(const T& value, time_ns_t time_ns) noexcept = 0;
+  /// The same without waiting for a lock; for the outputs of a component that hangs. [rt]
+  virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept {
+    return TryWrite::must_wait;
+  }
 };
 
 template <typename Signature>

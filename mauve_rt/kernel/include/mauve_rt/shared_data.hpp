@@ -58,12 +58,19 @@ class SharedData final : public NewestResource {
     bool write(const T& value, time_ns_t time_ns) noexcept override {
       {
         const std::lock_guard lock(owner_.mutex_);
-        owner_.value_ = value;
-        owner_.time_ns_ = time_ns;
-        ++owner_.sequence_;
+        owner_.put(value, time_ns);
       }
       owner_.written(time_ns);
       return true;
+    }
+    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+      {
+        const std::unique_lock lock(owner_.mutex_, std::try_to_lock);
+        if (!lock.owns_lock()) return TryWrite::busy;
+        owner_.put(value, time_ns);
+      }
+      owner_.written(time_ns);
+      return TryWrite::done;
     }
 
    private:
@@ -77,6 +84,12 @@ class SharedData final : public NewestResource {
     seen = reader.seen;
     CdrWriter(message).put(*value);
     return status;
+  }
+
+  void put(const T& value, time_ns_t time_ns) noexcept {
+    value_ = value;
+    time_ns_ = time_ns;
+    ++sequence_;
   }
 
   PiMutex mutex_;

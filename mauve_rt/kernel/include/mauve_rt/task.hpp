@@ -13,11 +13,13 @@
 
 #include "mauve_rt/commit.hpp"
 #include "mauve_rt/context.hpp"
+#include "mauve_rt/execution_word.hpp"
 #include "mauve_rt/fsm.hpp"
 #include "mauve_rt/pi_mutex.hpp"
 #include "mauve_rt/present_state.hpp"
 #include "mauve_rt/statistics.hpp"
 #include "mauve_rt/thread_counters.hpp"
+#include "mauve_rt/watchdog.hpp"
 
 namespace mauve {
 
@@ -63,6 +65,14 @@ struct Fault {
   time_ns_t when_ns{0};
 };
 
+/// A fault as it is kept, so that a watchdog can note one without allocating.
+struct FaultNote {
+  std::shared_ptr<const std::string> what{};  // nullptr: an execution over its bound
+  time_ns_t bound_ns{0};
+  std::uint32_t where{0};  // the state's name in the trace
+  time_ns_t when_ns{0};
+};
+
 /// Shared by all tasks of a deployment: bumped on every change of a component's state.
 /// A component not listed yet has nobody to tell.
 struct ChangeSignal {
@@ -90,12 +100,16 @@ struct ChangeSignal {
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | current_               | machine                               | anyone       | relaxed: a lone fact               |
 /// | present_               | machine                               | anyone       | its own: present_state.hpp         |
-/// | execution_*            | machine                               | watchdog     | release: the limit before began    |
+/// | execution_             | machine, who condemns, who removes    | all of these | its own: execution_word.hpp        |
+/// | wait_bound_ns_         | commanders, machine parked; commits   | watchdog     | relaxed: a hint when to look       |
+/// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
+/// | demoted_               | who condemns, machine                 | machine      | execution_                         |
 /// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
 /// | shell_, fsm_, core_,   | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
 /// | grid_                  |                                       |              |                                    |
-/// | fault_                 | who set condemned_                    | anyone       | under fault_mutex_ (PI)            |
-/// | condemned_             | machine or watchdog, the first wins   | both         | acq_rel: one fault at a time       |
+/// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
+/// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
+/// |                        |                                       | condemns     |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
@@ -126,11 +140,15 @@ class Task {
 
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
-  /// when told so.
-  void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace);
-  /// Tells the thread to end, then joins it; false when it was still in user code at the instant. [non-rt]
+  /// when told so; and Error (timeout) while an earlier thread of the task has not ended.
+  void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
+                     std::shared_ptr<Watchdog> watchdog = {});
+  /// Tells the thread to end, then joins it; false when it was still in user code at the instant. An abandoned one is
+  /// not waited for. [non-rt]
   bool end_thread(time_ns_t until_ns) noexcept;
   bool has_thread() const noexcept { return has_thread_.load(std::memory_order_acquire); }
+  /// Whether its last thread has come to its end. [non-rt]
+  bool has_ended() const noexcept { return !has_thread() || ended_.load(std::memory_order_acquire) != 0; }
 
   /// In place of a thread: every command is taken up at once, on the calling thread. [setup]
   void simulate(const Clock& clock, bool trace);
@@ -174,8 +192,6 @@ class Task {
   bool has_event() const noexcept {
     return !event_settled_ && (control_.load(std::memory_order_acquire) & kEvent) != 0;
   }
-  /// Marks the component FAULTED whose thread is in an adopt or take that does not end, or waits for one. [non-rt]
-  void condemn(const std::string& what);
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
@@ -214,15 +230,51 @@ class Task {
     return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   }
 
-  /// Rule 11's watchdog side: when the state under way is over its declared bound, marks the component
-  /// FAULTED, writes its outputs and takes the thread's priority away. Returns whether it did. [non-rt]
-  bool check_execution(time_ns_t now_ns);
+  // ---- watched executions (rule 11, execution_word.hpp)
+
+  /// What begins now is to last no longer than this. [rt], the machine's thread.
+  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+    execution_.begin(began_ns, limit_ns);
+    if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
+  }
+  /// It has ended; false when it was condemned before: the thread goes to park_condemned() then. [rt], the same.
+  bool end_execution() noexcept { return execution_.end(); }
+  /// Condemns the watched execution under way, whatever its bound - a state that declares one, or what the thread does and
+  /// waits for at a commit's gate: tells FAULTED, takes the thread's priority away, then
+  /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
+  bool condemn(std::string what, time_ns_t now_ns);
+  /// The same where it is over its bound. [rt]
+  bool condemn_if_over(time_ns_t now_ns) noexcept;
+  /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
+  /// thread wakes the watchdog itself. [rt]
+  time_ns_t earliest_excess_ns() const noexcept;
+  /// Outputs that had to be left because of a lock: takes the right to write them; writes those that can be, all of them
+  /// or not. [rt] as far as the resources are. By the watchdog's writer.
+  bool take_outputs_left() noexcept;
+  bool write_outputs_left() noexcept;
+
+  /// A condemned execution's thread is not to come back from now on; false when it has. [rt], who removes the component.
+  bool claim() noexcept { return execution_.claim(); }
+  /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
+  void give_up_claim() noexcept { execution_.give_up_claim(); }
+  void abandon() noexcept;
+  bool is_abandoned() const noexcept { return execution_.is_abandoned(); }
+  /// Whether its thread still executes what it was condemned for. [rt]
+  bool is_left_behind() const noexcept { return execution_.is_condemned(); }
+  /// What a person can do about a component whose thread does not come back. [rt]
+  static constexpr const char* kLeftBehindRemedy =
+      "its thread still executes: remove the component and add it anew, in one transaction";
+  /// What a person can do about a FAULTED component. [rt]
+  static constexpr const char* kRepairRemedy =
+      "repair it first (a step configure, or replace_core), or remove it";
 
   ComponentState state() const noexcept {
     return static_cast<ComponentState>(state_.load(std::memory_order_acquire));
   }
   /// For configure and cleanup of the component. [non-rt]
   void set_state(ComponentState state) noexcept;
+  /// Exchanges what is known of the last fault, for one to be forgotten or remembered. [rt], the machine parked.
+  void swap_fault(FaultNote& note) noexcept;
   /// Forgets a fault, for configure; the machine must be parked. [non-rt]
   void clear_fault() noexcept;
   /// Tells who waits for changes that there was one. [rt]
@@ -288,11 +340,13 @@ class Task {
   void continue_after(Participant& place) noexcept;
   void refuse_commit() noexcept;
   void park_stopped() noexcept;
-  void park_faulted(const char* what) noexcept;
+  void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
   void park_condemned() noexcept;
   void end_in_fault() noexcept;
   void park(ComponentState state) noexcept;
-  void wait_condemned() const noexcept;
+  void carry_out_sentence(FaultNote note) noexcept;
+  void take_back_outputs() noexcept;
+  void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void publish_state(ComponentState state) noexcept;
 
@@ -300,8 +354,8 @@ class Task {
              std::int64_t c = 0) noexcept {
     if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
   }
-  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0,
-                std::int64_t b = 0, std::int64_t c = 0) noexcept {
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
+                std::int64_t c = 0) noexcept {
     if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
   }
   time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
@@ -333,8 +387,11 @@ class Task {
   bool simulated_{false};
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
-  Fault fault_;
+  FaultNote fault_;
   std::vector<std::shared_ptr<void>> left_behind_;
+  std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
+  const std::atomic<int>* locks_held_{nullptr};
+  bool demoted_{false};
 
   alignas(64) std::atomic<std::uint32_t> control_{0};
   std::atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
@@ -343,11 +400,12 @@ class Task {
   std::atomic<std::uint32_t> ended_{0};
   Lent<Participant> place_;
   time_ns_t start_at_ns_{0};
-  std::atomic<std::uint32_t> current_{0};         // the state's name in the trace; 0: none yet
-  std::atomic<time_ns_t> execution_began_ns_{0};  // 0: no execution state with a bound under way
-  std::atomic<time_ns_t> execution_limit_ns_{0};
+  std::atomic<std::uint32_t> current_{0};  // the state's name in the trace; 0: none yet
+  ExecutionWord execution_;
+  std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
+  static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
+  std::atomic<std::uint32_t> outputs_{kAllWritten};
   std::atomic<Participant*> awaiting_release_{nullptr};
-  std::atomic<std::uint32_t> condemned_{0};
   std::atomic<CommitAction*> fallback_{nullptr};
   std::atomic<bool> fallen_back_{false};
   PresentState present_;
@@ -360,11 +418,12 @@ class Task {
   bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
   time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
   int deferrals_{0};            // releases a commit was put off for want of time
-  time_ns_t grid_place_ns_{0};  // where the instant pending belongs: the waits since the initial state, modulo g
-  bool is_cold_{false};         // started, and not woken ahead of its first release yet
-  bool left_gate_{false};       // it came to the gate in this wait, and left for its instant
-  bool is_abandoned_{false};    // what it did or waited for at the gate lasted too long
-  time_ns_t overlong_ns_{0};    // what adopt and take of its core took, when that was more than they declared
+  time_ns_t grid_place_ns_{
+      0};                  // where the instant pending belongs: the waits since the initial state, modulo g
+  bool is_cold_{false};    // started, and not woken ahead of its first release yet
+  bool left_gate_{false};  // it came to the gate in this wait, and left for its instant
+  bool is_abandoned_{false};  // what it did or waited for at the gate lasted too long
+  time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
 };
 
 }  // namespace mauve

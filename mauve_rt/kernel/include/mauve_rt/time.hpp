@@ -23,8 +23,8 @@ class Clock {
   /// Returns true when the instant was reached. Interrupted sleeps (EINTR) are resumed.
   virtual bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
                            std::uint32_t expected) const noexcept = 0;
-  /// An execution state has ended that declares this bound on its time: simulated time passes by it. [rt]
-  virtual void spend(time_ns_t /*declared_ns*/) const noexcept {}
+  /// An execution state has ended that takes so much time where time is simulated: that passes by it. [rt]
+  virtual void spend(time_ns_t /*simulated_ns*/) const noexcept {}
 };
 
 /// CLOCK_MONOTONIC, with absolute futex waits.

@@ -91,6 +91,10 @@ class Transaction {
   /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.
   Transaction& start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
   Transaction& stop(const std::string& component);
+  /// Cleans up and configures anew a component that is not running; it is STOPPED then, a fault is forgotten. Its hooks
+  /// run before the commit, on its present parts, with the properties that the transaction sets. Where another step is
+  /// refused it is in its state of before; where its own hooks refuse, it is UNCONFIGURED.
+  Transaction& configure(const std::string& component);
 
   const std::vector<std::unique_ptr<TransactionStep>>& steps() const noexcept { return steps_; }
 
