@@ -28,18 +28,11 @@ class ReadPort final : public PortBase {
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
-  Sample<T> read() noexcept {
-    if (is_previewed()) [[unlikely]]
-      return stand_in<ReadPort>().read_once();
-    Sample<T> sample = find();
-    status_ = sample.status;
-    reader_.time_ns = sample.time_ns;
-    return sample;
-  }
+  Sample<T> read() noexcept { return is_previewed() ? read_ahead() : read_now(); }
   /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
   DataStatus read(T& value, time_ns_t* time_ns = nullptr) noexcept {
     if (is_previewed()) [[unlikely]]
-      return stand_in<ReadPort>().read_once(value, time_ns);
+      return read_ahead(value, time_ns);
     time_ns_t time = reader_.time_ns;
     status_ = find(value, time);
     reader_.time_ns = time;
@@ -80,16 +73,32 @@ class ReadPort final : public PortBase {
   }
 
  private:
-  /// A stand-in's read keeps nothing of the service: it is one reader more than that may be made for.
-  template <typename... Place>
-  auto read_once(Place&&... place) noexcept {
-    const auto found = read(std::forward<Place>(place)...);
-    if (service_ == nullptr) return found;
+  Sample<T> read_now() noexcept {
+    Sample<T> sample = find();
+    status_ = sample.status;
+    reader_.time_ns = sample.time_ns;
+    return sample;
+  }
+  // Out of line: the reads of a running component are to cost what they cost without previews.
+  [[gnu::noinline, gnu::cold]] Sample<T> read_ahead() noexcept {
+    auto& other = stand_in<ReadPort>();
+    Sample<T> sample = other.read();
+    other.keep_nothing();
+    return sample;
+  }
+  [[gnu::noinline, gnu::cold]] DataStatus read_ahead(T& value, time_ns_t* time_ns) noexcept {
+    auto& other = stand_in<ReadPort>();
+    const DataStatus status = other.read(value, time_ns);
+    other.keep_nothing();
+    return status;
+  }
+  /// Gives back what the service keeps for a reader: a stand-in is one more than it may be made for.
+  void keep_nothing() noexcept {
+    if (service_ == nullptr) return;
     const ReaderState known = reader_;
     service_->let_go(reader_);
     reader_.seen = known.seen;
     reader_.time_ns = known.time_ns;
-    return found;
   }
   Sample<T> find() noexcept {
     if constexpr (std::is_trivially_copyable_v<T>) {
