@@ -164,6 +164,7 @@ class StepReport:
     missed_releases: Final[int]
     phase_nominal_ns: Final[int]
     phase_actual_ns: Final[int]  # NOT_MEASURED until the first release after the commit
+    remark: Final[str]  # why releases were missed; empty when none was
 
 NOT_MEASURED: Final[int]
 

@@ -124,7 +124,8 @@ void bind_reports(py::module_& module) {
       .def_readonly("blackout_ns", &StepReport::blackout_ns)
       .def_readonly("missed_releases", &StepReport::missed_releases)
       .def_readonly("phase_nominal_ns", &StepReport::phase_nominal_ns)
-      .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns);
+      .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns)
+      .def_readonly("remark", &StepReport::remark);
   py::class_<RealtimeStatus>(module, "RealtimeStatus")
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);

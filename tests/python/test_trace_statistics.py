@@ -186,8 +186,30 @@ def test_missed_releases_and_phase_are_counted_on_the_grid(missed: int, late_ns:
     swap(source, FIRST_NS + 500, resumed - 1000, pending_ns=pending)
     source.add("c", Kind.RELEASE, resumed, name="wait", a=resumed + nominal_error_ns, b=resumed + late_ns)
     (found,) = reconfigurations(trace_of(source))
-    assert found.missed_releases == (missed * PERIOD_NS + nominal_error_ns) // PERIOD_NS
+    assert found.missed_releases == max(0, missed + (nominal_error_ns > 0))
     assert (found.phase_nominal_ns, found.phase_actual_ns) == (nominal_error_ns, late_ns)
+
+
+def test_a_release_after_another_wait_than_the_last_of_a_cycle_is_in_phase_at_its_own_place():
+    source = source_of_one()
+    pending = FIRST_NS + PERIOD_NS // 4
+    swap(source, FIRST_NS + 500, FIRST_NS + 620, pending_ns=pending)
+    source.add("c", Kind.RELEASE, pending, name="wait", a=pending, b=pending + 17, c=PERIOD_NS // 4)
+    (found,) = reconfigurations(trace_of(source))
+    assert (found.missed_releases, found.phase_nominal_ns, found.phase_actual_ns) == (0, 0, 17)
+
+
+@pytest.mark.parametrize(("factor", "missed"), [(10, 9), (1, 0)])
+def test_missed_releases_are_those_of_the_grid_before_a_new_fsm(factor: int, missed: int):
+    source = source_of_one()
+    resumed = FIRST_NS + 10 * PERIOD_NS
+    pending = resumed - missed * PERIOD_NS
+    source.add("c", Kind.PARKED, FIRST_NS, name="wait", a=pending)
+    source.add("c", Kind.DEPLOYMENT, FIRST_NS, a=EPOCH_NS, c=factor * PERIOD_NS)
+    source.add("c", Kind.ARMED, FIRST_NS, name="wait", a=resumed, b=1)
+    source.add("c", Kind.RELEASE, resumed, name="wait", a=resumed, b=resumed)
+    (found,) = reconfigurations(trace_of(source))
+    assert found.missed_releases == missed
 
 
 def test_a_swap_without_a_release_after_it_has_no_phase():

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Rule 7: a new fsm starts at the pending instant where that lies on its own grid, else at the first of its grid after
+// it; the report says what that cost.
+#include "simulated.hpp"
+
+namespace mauve::testing {
+namespace {
+
+/// A chain of waits, with an activation before each.
+struct ChainFsm : Fsm<TestShell, TestCore> {
+  explicit ChainFsm(std::vector<time_ns_t> waits) : waits_(std::move(waits)) {}
+
+  void define() override {
+    State* first = nullptr;
+    State* before = nullptr;
+    for (std::size_t i = 0; i < waits_.size(); ++i) {
+      State& run = execution("Run" + std::to_string(i), "act", &TestCore::act);
+      State& pause = wait("Wait" + std::to_string(i), waits_[i]);
+      next(run, pause);
+      if (before != nullptr) next(*before, run);
+      if (first == nullptr) first = &run;
+      before = &pause;
+    }
+    next(*before, *first);
+    set_initial(*first);
+  }
+
+ private:
+  std::vector<time_ns_t> waits_;
+};
+
+/// Once through a wait that no cycle passes, then a loop.
+struct LeadInFsm : Fsm<TestShell, TestCore> {
+  void define() override {
+    State& begin = execution("Begin", "act", &TestCore::act);
+    State& lead = wait("Lead", ms_to_ns(13));
+    State& run = execution("Run", "act", &TestCore::act);
+    State& pause = wait("Pause", ms_to_ns(10));
+    set_initial(begin);
+    next(begin, lead);
+    next(lead, run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+struct EventFsm : Fsm<TestShell, TestCore> {
+  void define() override {
+    State& run = execution("Run", "act", &TestCore::act);
+    State& pause = wait_event("Event", shell().input, s_to_ns(10), us_to_ns(1));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+std::unique_ptr<ChainFsm> chain_ms(const std::vector<std::int64_t>& waits_ms) {
+  std::vector<time_ns_t> waits;
+  for (const std::int64_t wait_ms : waits_ms) waits.push_back(ms_to_ns(wait_ms));
+  return std::make_unique<ChainFsm>(std::move(waits));
+}
+
+class Rule7Restart : public Simulated {
+ protected:
+  void SetUp() override {
+    add("c", 1);
+    deploy();
+  }
+  /// Replaces the fsm at an instant; the next release comes in the same call.
+  StepReport replace(time_ns_t at_ns, std::unique_ptr<FsmBase> fsm) {
+    run_to(at_ns);
+    simulation.drain_trace(architecture);
+    Transaction transaction;
+    transaction.replace_fsm("c", std::move(fsm));
+    auto report = simulation.commit(architecture, std::move(transaction));
+    return report.steps.front();
+  }
+  Component& component() { return architecture.component("c"); }
+  time_ns_t due_ns() { return component().task().due_ns() - simulation.epoch_ns(); }
+};
+
+TEST_F(Rule7Restart, ThePendingInstantIsTakenWhenItIsOnTheNewGrid) {
+  const StepReport equal = replace(us_to_ns(9'990), chain_ms({1}));  // no margin is needed in flight
+  EXPECT_EQ(ms_to_ns(10), due_ns());
+  EXPECT_EQ(0, equal.missed_releases);
+  EXPECT_EQ("", equal.remark);
+  const StepReport longer = replace(us_to_ns(19'500), chain_ms({10}));
+  EXPECT_EQ(ms_to_ns(20), due_ns());
+  EXPECT_EQ(0, longer.missed_releases);
+  const StepReport shorter = replace(us_to_ns(25'000), chain_ms({2}));
+  EXPECT_EQ(ms_to_ns(30), due_ns()) << "not before the instant that was pending";
+  EXPECT_EQ(0, shorter.missed_releases);
+  EXPECT_EQ(0, shorter.phase_nominal_ns);
+}
+
+TEST_F(Rule7Restart, ElseTheFirstOfTheNewGridAndTheReportSaysWhatThatCost) {
+  const StepReport report = replace(us_to_ns(2'500), chain_ms({10}));
+  EXPECT_EQ(ms_to_ns(10), due_ns());
+  EXPECT_EQ(7, report.missed_releases) << "3, 4, 5, 6, 7, 8 and 9 ms";
+  EXPECT_THAT(report.remark, ::testing::HasSubstr("10000 us"));
+  const StepReport between = replace(ms_to_ns(15), chain_ms({7}));
+  EXPECT_EQ(ms_to_ns(21), due_ns());
+  EXPECT_EQ(1, between.missed_releases) << "20 ms";
+  EXPECT_EQ(0, between.phase_nominal_ns);
+}
+
+TEST_F(Rule7Restart, AStartOnAClockOfItsOwnIsAsFromAParkAndNeverCountsBelowZero) {
+  replace(us_to_ns(500), chain_ms({100}));
+  run_to(ms_to_ns(150));
+  Transaction transaction;
+  transaction.stop("c").replace_fsm("c", chain_ms({10}));
+  transaction.start("c", simulation.epoch_ns() + ms_to_ns(3));
+  const auto report = simulation.commit(architecture, std::move(transaction));
+  EXPECT_EQ(ms_to_ns(153), due_ns());
+  EXPECT_EQ(0, report.steps.front().missed_releases) << "153 ms comes before 200 ms, which was pending";
+  EXPECT_EQ(ms_to_ns(3), report.steps.front().phase_nominal_ns);
+}
+
+TEST_F(Rule7Restart, AStopAndAStartInOneTransactionKeepThePendingInstant) {
+  run_to(us_to_ns(4'900));
+  Transaction transaction;
+  transaction.stop("c").start("c");
+  const auto report = simulation.commit(architecture, std::move(transaction));
+  EXPECT_EQ(ms_to_ns(5), due_ns());
+  EXPECT_EQ(0, report.steps.front().missed_releases);
+}
+
+TEST_F(Rule7Restart, WithoutAGridItStartsAtThePendingInstantAndFromAnEventNow) {
+  EXPECT_EQ(0, replace(us_to_ns(2'500), std::make_unique<EventFsm>()).missed_releases);
+  EXPECT_EQ(ms_to_ns(3), due_ns());
+  run_to(us_to_ns(3'500));
+  EXPECT_EQ(ms_to_ns(3) + s_to_ns(10), due_ns()) << "it waits for an event";
+  EXPECT_EQ(0, replace(us_to_ns(4'500), std::make_unique<EventFsm>()).missed_releases);
+  EXPECT_EQ(us_to_ns(4'500), due_ns());
+  run_to(us_to_ns(4'600));
+  EXPECT_EQ(0, replace(us_to_ns(4'700), chain_ms({2})).missed_releases);
+  EXPECT_EQ(ms_to_ns(6), due_ns());
+}
+
+TEST_F(Rule7Restart, ThePhaseIsThatOfTheStateWhateverWaitItLeaves) {
+  replace(us_to_ns(500), chain_ms({4, 6, 5}));
+  for (const time_ns_t at_ms : {16, 20, 26, 31}) {  // pending: after 4 ms, 6 ms, 5 ms, 4 ms
+    run_to(ms_to_ns(at_ms));
+    Transaction transaction;
+    transaction.replace_core("c", std::make_unique<TestCore>());
+    const auto report = simulation.commit(architecture, std::move(transaction));
+    EXPECT_EQ(0, report.steps.front().phase_nominal_ns) << "at " << at_ms << " ms";
+    EXPECT_EQ(0, report.steps.front().missed_releases);
+  }
+  replace(ms_to_ns(31), std::make_unique<LeadInFsm>());
+  EXPECT_EQ(ms_to_ns(40), due_ns());
+  simulation.drain_trace(architecture);
+  run_to(ms_to_ns(80));
+  const auto releases = records_of(simulation.drain_trace(architecture), TraceKind::release);
+  ASSERT_EQ(4U, releases.size());
+  const Grid& grid = component().task().grid();
+  for (const TraceRecord& release : releases) EXPECT_EQ(0, grid.phase_error(release.a - release.c));
+  EXPECT_EQ(0, releases[0].c);
+  EXPECT_EQ(ms_to_ns(3), releases[1].c) << "after 13 ms, on a grid of 10";
+}
+
+using Rule7RestartOnThreads = Deployed;
+
+TEST_F(Rule7RestartOnThreads, NoReleaseIsMissedOnAnEqualGrid) {
+  add("c", 1, {.trace_records = std::size_t{1} << 15U});
+  deploy();
+  for (int change = 0; change < 30; ++change) {
+    deployer.drain_trace();
+    Transaction transaction;
+    transaction.replace_fsm("c", std::make_unique<TestFsm>());
+    const auto report = deployer.commit(std::move(transaction), {.timeouts = {.phase_ns = s_to_ns(10)}});
+    const TraceDrain drain = deployer.drain_trace();
+    const auto parked = records_of(drain, TraceKind::parked);
+    const auto armed = records_of(drain, TraceKind::armed);
+    ASSERT_EQ(1U, armed.size());
+    EXPECT_EQ(0, report.steps.front().phase_nominal_ns);
+    if (armed.back().time_ns > armed.back().a) continue;  // the machine stalled the commit past the instant
+    EXPECT_EQ(parked.back().a, armed.back().a);
+    EXPECT_EQ(0, report.steps.front().missed_releases);
+  }
+}
+
+}  // namespace
+}  // namespace mauve::testing
