@@ -34,6 +34,11 @@ class FreshPages {
   FreshPages(const FreshPages&) = delete;
   FreshPages& operator=(const FreshPages&) = delete;
 
+  /// As if they had never been touched.
+  void give_back() const noexcept {
+    mmap(memory_, count_ * kPage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0);
+    madvise(memory_, count_ * kPage, MADV_NOHUGEPAGE);
+  }
   void touch() const noexcept {
     auto* bytes = static_cast<volatile char*>(memory_);
     for (std::size_t page = 0; page < count_; ++page) bytes[page * kPage] = 1;
@@ -192,7 +197,9 @@ TEST_F(Deployed, PageFaultsOfAComponentAreCounted) {
   Component& component = add("c", 1);
   TestCore& busy = core(component);
   busy.work = [&] {
-    if (busy.runs.load() == 3) pages.touch();
+    if (busy.runs.load() != 3) return;
+    pages.give_back();
+    pages.touch();
   };
   deploy();
   wait_runs(component, 4);
@@ -200,6 +207,90 @@ TEST_F(Deployed, PageFaultsOfAComponentAreCounted) {
   EXPECT_GE(faults, kPages);
   deployer.shutdown();
   EXPECT_GE(component.task().counters().page_faults(), faults) << "the figure outlives the thread";
+}
+
+constexpr std::size_t kLargeBytes = std::size_t{8} << 20U;
+
+/// Allocates much, and leaves it to the component to touch it.
+struct LargeCore : TestCore {
+  std::unique_ptr<char[]> constructed{new char[kLargeBytes]};
+  std::unique_ptr<char[]> configured;
+  std::vector<std::unique_ptr<char[]>> small;  // from the heap or an arena, not from a mapping of their own
+
+  bool configure_hook() override {
+    configured.reset(new char[kLargeBytes]);
+    for (int i = 0; i < 200; ++i) small.emplace_back(new char[2 * kPage]);
+    return true;
+  }
+  void act() override {
+    if (runs.load() == 0) {
+      touch(constructed.get(), kLargeBytes);
+      touch(configured.get(), kLargeBytes);
+      for (const auto& bytes : small) touch(bytes.get(), 2 * kPage);
+    }
+    TestCore::act();
+  }
+
+ private:
+  static void touch(volatile char* bytes, std::size_t count) noexcept {
+    for (std::size_t at = 0; at < count; at += kPage) bytes[at] = 1;
+  }
+};
+
+class Prefaulted : public Deployed {
+ protected:
+  /// Page faults of "c" from here on.
+  std::uint64_t faults() { return architecture.component("c").task().counters().page_faults() - before_; }
+  void begin() { before_ += faults(); }
+  void commit(std::unique_ptr<CoreBase> core) {
+    Transaction transaction;
+    transaction.replace_core("c", std::move(core));
+    deployer.commit(std::move(transaction), {.timeouts = {.commit_ns = s_to_ns(10)}});
+  }
+
+ private:
+  std::uint64_t before_{0};
+};
+
+TEST_F(Prefaulted, WhatANewCoreAllocatedIsInMemory) {
+  if (allocation_counting() == AllocationCounting::none) GTEST_SKIP() << "a sanitizer's allocator";
+  Component& component = add("c", 1);
+  deploy();
+  wait_runs(component, 3);
+  begin();
+  for (int change = 0; change < 4; ++change) {  // what one gives back the next may get
+    commit(std::make_unique<LargeCore>());
+    wait_runs(component, 2);
+    EXPECT_EQ(0U, faults()) << "change " << change;
+  }
+  std::thread([&] {  // with an arena of its own
+    commit(std::make_unique<LargeCore>());
+    wait_runs(component, 2);
+    EXPECT_EQ(0U, faults());
+  }).join();
+}
+
+TEST_F(Prefaulted, WhatTheFirstCoreAllocatedIsInMemory) {
+  if (allocation_counting() == AllocationCounting::none) GTEST_SKIP() << "a sanitizer's allocator";
+  Component& component = architecture.add_component<TestShell, LargeCore, TestFsm>("c");
+  deploy();
+  wait_runs(component, 2);
+  EXPECT_EQ(0U, faults());
+}
+
+TEST_F(Prefaulted, TheWholeDeclaredStackIsInMemory) {
+  if (allocation_counting() == AllocationCounting::none) GTEST_SKIP() << "a sanitizer's stacks";
+  Component& component = add("c", 1, {.stack_bytes = std::size_t{1} << 20U});
+  TestCore& deep = core(component);
+  deep.work = [&deep] {
+    if (deep.runs.load() != 3) return;
+    constexpr std::size_t kDeep = std::size_t{900} * 1024;
+    std::array<volatile char, kDeep> place;
+    for (std::size_t at = 0; at < kDeep; at += kPage) place[kDeep - 1 - at] = 1;
+  };
+  deploy();
+  wait_runs(component, 4);
+  EXPECT_EQ(0U, faults());
 }
 
 TEST(ThreadCounters, CountTheThreadTheyAreAttachedTo) {

@@ -403,6 +403,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
     ),
     "Fig. 3, 5 and 6 drawn from traces": ("system/test_figures.py::test_the_drawings_are_whole",),
+    "its whole declared stack (512 KiB unless told) in memory": ("Prefaulted.TheWholeDeclaredStackIsInMemory",),
+    "What parts have allocated in their constructors and in configure is put into memory before they run": (
+        "Prefaulted.WhatANewCoreAllocatedIsInMemory",
+        "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
+    ),
     "is prepare, commit, retire": (
         "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
         "python/test_python_components.py::test_replaced_cores_are_let_go",
@@ -420,10 +425,23 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: , releases missed",
     ),
     "and nobody else is touched": ("bench: , releases missed by ",),
-    "A new fsm or shell begins in its initial state, at the next instant of its own grid": (
+    "A new fsm or shell begins in its initial state": (
         "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
         "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
     ),
+    "so that it misses no release either": (
+        "Rule7Restart.ThePendingInstantIsTakenWhenItIsOnTheNewGrid",
+        "Rule7RestartOnThreads.NoReleaseIsMissedOnAnEqualGrid",
+    ),
+    "the report says how many releases of the old grid that cost, and why": (
+        "Rule7Restart.ElseTheFirstOfTheNewGridAndTheReportSaysWhatThatCost",
+    ),
+    "New parts are configured with the properties and the wiring that their own transaction makes": (
+        "PreparedFuture.ACoreSeesWhatStepsBeforeAndAfterItMake",
+        "PreparedFuture.AnFsmSeesThemInDefine",
+        "PreparedFuture.AShellSeesItsOwnFuture",
+    ),
+    "what they write meanwhile goes nowhere": ("PreparedFuture.WhatIsWrittenInPreparationGoesNowhere",),
     "The time between the thread's `parked` and `armed` records is the **blackout**": (
         "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
