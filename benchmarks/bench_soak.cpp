@@ -9,6 +9,7 @@
 #include <malloc.h>
 
 #include <fstream>
+#include <limits>
 #include <memory>
 
 #include "support/components.hpp"
@@ -58,11 +59,11 @@ class ReleaseWatch {
     bench::Missed missed;
     for (const Gap& gap : gaps_) {
       // Whose CPU it was does not matter: a stall of any CPU can keep a change and its components waiting.
-      bench::Missed best{.ours = 1};
+      bench::Missed best{.ours = std::numeric_limits<std::int64_t>::max()};
       for (const auto& witness : witnesses) {
         const bench::Missed here =
             bench::count_missed(gap.before_ns, gap.after_ns, gap.period_ns, witness->end());
-        if (best.ours != 0) best = here;
+        if (here.ours < best.ours) best = here;
       }
       missed += best;
     }

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Replacing the core of a running 1 kHz component that works 100 us, beside handing over between two bare
-// threads.
-//   bench_swap [--who component|bare] [--count 100] [--priority 80] [--cpu 0] [--work-us 100] [--seed 1]
-// Prints {"blackout_ns": [...]}; for the component also what its trace tells of releases missed and of its
-// phase.
+// Replacing the core, or the fsm, of a running 1 kHz component that works 100 us, as services and supervisors do it:
+// by Deployer::commit. Beside it: handing over between two bare threads.
+//   bench_swap [--who component|bare] [--part core|fsm] [--busy-cpus 0] [--count 100] [--priority 80] [--cpu 0]
+//              [--work-us 100] [--seed 1]
+// With --busy-cpus an ordinary thread never rests on each of these CPUs.
+// Prints {"blackout_ns": [...]}; for the component also what its reports and its trace tell of releases missed, and of
+// its phase.
 #include <array>
 
 #include "mauve_rt/futex.hpp"
 
+#include "support/busy.hpp"
 #include "support/components.hpp"
 #include "support/options.hpp"
 #include "support/random_pause.hpp"
@@ -21,12 +24,16 @@ constexpr std::int64_t kPeriodUs = 1000;
 
 struct Settings {
   explicit Settings(const bench::Options& options)
-      : count(options.number("count", 100)),
+      : part(options.text("part", "core")),
+        busy_cpus(static_cast<int>(options.number("busy-cpus", 0))),
+        count(options.number("count", 100)),
         priority(options.priority()),
         cpu(options.cpu()),
         work_us(options.number("work-us", 100)),
         seed(options.seed()) {}
 
+  std::string part;
+  int busy_cpus;
   std::int64_t count;
   int priority;
   int cpu;
@@ -34,21 +41,34 @@ struct Settings {
   std::uint64_t seed;
 };
 
+mauve::Transaction replacement(const std::string& part) {
+  mauve::Transaction transaction;
+  if (part == "core")
+    transaction.replace_core("worker", std::make_unique<bench::Worker>());
+  else
+    transaction.replace_fsm("worker", std::make_unique<bench::WorkerFsm>());
+  return transaction;
+}
+
 void measure_component(const Settings& settings) {
   mauve::Architecture architecture;
-  mauve::Component& component =
-      bench::add_worker(architecture, "worker", settings.priority, settings.cpu, kPeriodUs, settings.work_us);
+  bench::add_worker(architecture, "worker", settings.priority, settings.cpu, kPeriodUs, settings.work_us);
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
+  const bench::BusyLoops busy(settings.busy_cpus);
   bench::Witness witness(settings.cpu);
   bench::RandomPause pause(settings.seed, {0, 2 * kPeriodUs});  // on every phase
+  const mauve::TransactionOptions patient{
+      .timeouts = {.commit_ns = mauve::s_to_ns(10), .phase_ns = mauve::s_to_ns(10)}};
   std::vector<std::int64_t> blackouts;
+  std::int64_t reported = 0;
   std::vector<mauve::TraceRecord> releases;
   for (std::int64_t i = 0; i < settings.count; ++i) {
     pause();
-    const mauve::CommitTimeouts patient{.commit_ns = mauve::s_to_ns(10), .phase_ns = mauve::s_to_ns(10)};
-    blackouts.push_back(component.swap_core(std::make_unique<bench::Worker>(), patient).blackout_ns);
+    const mauve::TransactionReport report = deployer.commit(replacement(settings.part), patient);
+    blackouts.push_back(report.blackout_ns);
+    reported += report.steps.front().missed_releases;
     bench::append_records(releases, deployer.drain_trace(), mauve::TraceKind::release);
   }
   deployer.shutdown();
@@ -65,6 +85,7 @@ void measure_component(const Settings& settings) {
       .add("releases", static_cast<std::int64_t>(releases.size()))
       .add("missed", missed.ours)
       .add("missed_in_stalls", missed.machines)
+      .add("reported_missed", reported)
       .add("worst_nominal_phase_ns", worst_phase)
       .print();
 }
@@ -156,6 +177,7 @@ void measure_bare(const Settings& settings) {
   mauve::RealtimeProcess process;
   process.acquire(settings.priority, false);
   Relay relay(settings);
+  const bench::BusyLoops busy(settings.busy_cpus);
   bench::Witness witness(settings.cpu);                         // as beside the component
   bench::RandomPause pause(settings.seed, {0, 2 * kPeriodUs});  // on every phase
   std::vector<std::int64_t> blackouts;

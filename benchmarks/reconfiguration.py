@@ -6,32 +6,60 @@ from typing import Any
 
 import native
 from ratios import percentile
-from rows import Row, compared, exactly_zero, not_available
+from rows import Row, compared, exactly_zero, not_available, pooled
 from settings import Settings
 
 Rounds = list[list[dict[str, Any]]]
 _NS_PER_US = 1000
+_BESIDE_SWAP = "hot-standby handover of two threads"
 
 
 def swap_rows(settings: Settings) -> Iterator[Row]:
-    """Replace the core of a running component, again and again."""
-    rounds = _both("bench_swap", settings, count=settings.swaps, cpu=settings.cpu)
+    """Replace the core, then the fsm, of a running component, again and again, as services do it."""
     what = "replace core of a running 1 kHz component with 100 us of work"
-    beside = "hot-standby handover of two threads"
+    rounds = _both("bench_swap", settings, count=settings.swaps, cpu=settings.cpu)
+    yield from _blackout_rows(what, rounds, p50_ratio=1.5, p99_us=1000)
     components = [component for component, _ in rounds]
-    releases = sum(found["releases"] for found in components)
-    stalled = sum(found["missed_in_stalls"] for found in components)
-    note = f"{settings.rounds * settings.swaps} replacements; {stalled} of {releases} releases were missed "
-    note += "inside stalls of the machine that a witness marked"
-    yield compared(
-        f"{what}, blackout p50", _pairs(rounds, "blackout_ns", 50), unit="us", beside=beside, ratio_limit=1.5
-    )
-    yield compared(
-        f"{what}, blackout p99", _pairs(rounds, "blackout_ns", 99), unit="us", beside=beside, limit=1000
-    )
-    yield exactly_zero(f"{what}, releases missed", [found["missed"] for found in components], note=note)
+    yield _missed(what, components, settings)
     phases = [found["worst_nominal_phase_ns"] for found in components]
     yield exactly_zero(f"{what}, nominal phase error", phases, unit="ns")
+
+    cpus = len(os.sched_getaffinity(0))
+    busy = _both("bench_swap", settings, count=settings.swaps, cpu=settings.cpu, busy_cpus=cpus)
+    yield from _blackout_rows(f"{what}, an ordinary thread busy on each CPU", busy)
+
+    what = "replace fsm of a running 1 kHz component by one on the same grid"
+    place = {"count": settings.swaps, "priority": settings.priority, "cpu": settings.cpu}
+    fsms = [native.run("bench_swap", part="fsm", seed=number, **place) for number in range(settings.rounds)]
+    yield _missed(what, fsms, settings)
+
+
+def _blackout_rows(
+    what: str, rounds: Rounds, *, p50_ratio: float | None = None, p99_us: float | None = None
+) -> Iterator[Row]:
+    for percent, ratio_limit, limit in ((50, p50_ratio, None), (99, None, p99_us)):
+        yield compared(
+            f"{what}, blackout p{percent}",
+            _pairs(rounds, "blackout_ns", percent),
+            unit="us",
+            beside=_BESIDE_SWAP,
+            ratio_limit=ratio_limit,
+            limit=limit,
+        )
+    blackouts, handovers = (
+        [ns / _NS_PER_US for one in rounds for ns in one[side]["blackout_ns"]] for side in (0, 1)
+    )
+    name = f"{what}, blackout p99.9"
+    yield pooled(name, blackouts, 99.9, unit="us", reference=handovers, beside=_BESIDE_SWAP)
+
+
+def _missed(what: str, found: list[dict[str, Any]], settings: Settings) -> Row:
+    releases, stalled, reported = (
+        sum(one[name] for one in found) for name in ("releases", "missed_in_stalls", "reported_missed")
+    )
+    note = f"{settings.rounds * settings.swaps} replacements; {stalled} of {releases} releases were missed "
+    note += f"inside stalls of the machine that a witness marked; the reports told of {reported}"
+    return exactly_zero(f"{what}, releases missed", [one["missed"] for one in found], note=note)
 
 
 def stop_rows(settings: Settings) -> Iterator[Row]:
@@ -68,6 +96,52 @@ def deployment_rows(settings: Settings) -> Iterator[Row]:
         pairs = _pairs(rounds, "spreads_ns", 50)
         beside = "threads with a barrier and a shared epoch"
         yield compared(what, pairs, unit="us", beside=beside, ratio_limit=1.25)
+
+
+def stop_beside_rows(settings: Settings) -> Iterator[Row]:
+    """Stop a component while somebody else's change of it waits, or is prepared."""
+
+    def measure(beside: str) -> native.Measure:
+        return lambda _: native.run(
+            "bench_stop_beside",
+            beside=beside,
+            count=settings.busy_stops,
+            priority=settings.priority,
+            cpu=settings.cpu,
+        )
+
+    whats = {
+        "commit": "a transaction over it waits for a component in a 100 ms state",
+        "preparation": "a new core for it takes 100 ms to prepare",
+    }
+    rounds = native.interleaved(settings.rounds, measure("nothing"), *map(measure, whats))
+    for place, what in enumerate(whats.values(), start=1):
+        for percent, limit in ((50, 2), (99, None)):
+            pairs = [
+                (
+                    percentile(found[place]["durations_ns"], percent),
+                    percentile(found[0]["durations_ns"], percent),
+                )
+                for found in rounds
+            ]
+            yield compared(
+                f"stop of a 1 kHz component while {what}, p{percent}",
+                [(measured / _NS_PER_US, alone_us / _NS_PER_US) for measured, alone_us in pairs],
+                unit="us",
+                beside="the same stop, nothing else going on",
+                ratio_limit=limit,
+            )
+
+
+def prefault_rows(settings: Settings) -> Iterator[Row]:
+    """Replace a core by one that owns memory nobody has touched yet."""
+    found = [
+        native.run("bench_prefault", priority=settings.priority, cpu=settings.cpu)
+        for _ in range(settings.rounds)
+    ]
+    worst = [max(one["faults"]) for one in found]
+    what = "page faults of a component's thread after its core was replaced by one with 8 MiB"
+    yield exactly_zero(what, worst)
 
 
 def restart_rows(settings: Settings) -> Iterator[Row]:

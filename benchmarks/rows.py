@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ratios import Interval, Verdict, median_interval, ratio_interval, verdict
+from ratios import Interval, Verdict, median_interval, percentile, ratio_interval, verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +89,30 @@ def alone(
         verdict=outcome,
         note=note,
         rounds=[(value,) for value in values],
+    )
+
+
+def pooled(
+    what: str,
+    measured: Sequence[float],
+    percent: float,
+    *,
+    unit: str,
+    reference: Sequence[float] = (),
+    beside: str = "",
+) -> Row:
+    """A row about the rare: a percentile over all rounds together, with the maximum in its note."""
+    note = f"maximum {max(measured):.4g} {unit} of {len(measured)}"
+    if reference:
+        note += f", of the reference {max(reference):.4g} {unit} of {len(reference)}"
+    return Row(
+        what=what,
+        unit=unit,
+        measured=percentile(measured, percent),
+        reference=percentile(reference, percent) if reference else None,
+        reference_what=beside,
+        note=note,
+        rounds=[tuple(measured), tuple(reference)],
     )
 
 

@@ -19,16 +19,23 @@ from micro import activation_rows, inversion_rows, latest_value_rows, shared_dat
 from mission import mission_rows
 from native import BenchmarkError
 from reading import reading_rows
-from reconfiguration import deployment_rows, restart_rows, stop_rows, swap_rows
+from reconfiguration import (
+    deployment_rows,
+    prefault_rows,
+    restart_rows,
+    stop_beside_rows,
+    stop_rows,
+    swap_rows,
+)
 from recording import recording_rows
 from recording_killed import kill_rows
 from rows import Row, markdown, not_available
-from scale import scale_rows
+from scale import idle_rows, scale_rows
 from service_calls import service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
 from start import start_rows
 from topics import topic_rows
-from transactions import soak_rows, transaction_rows
+from transactions import refused_rows, soak_rows, transaction_rows
 from wakeup import wakeup_rows
 from wakeup_executor import executor_wakeup_rows
 
@@ -38,14 +45,18 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "deployment": deployment_rows,
     "restart": restart_rows,
     "stop": stop_rows,
+    "stop-beside": stop_beside_rows,
     "swap": swap_rows,
+    "prefault": prefault_rows,
     "transaction": transaction_rows,
+    "refused": refused_rows,
     "shared-data": shared_data_rows,
     "latest-value": latest_value_rows,
     "activation": activation_rows,
     "trace": trace_rows,
     "inversion": inversion_rows,
     "scale": scale_rows,
+    "idle": idle_rows,
     "soak": soak_rows,
     "service": service_rows,
     "service-stop": service_stop_rows,

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import native
-from rows import Row, alone, compared
+from rows import Row, alone, compared, exactly_zero
 from settings import Settings
 
-_COUNTS = (8, 64, 500)
+_COUNTS = (1, 8, 64, 500)
 _KIB = 1024
 _LINEAR = 1.5
 """A component of the most costs at most so many times one of the middle count, or it is not linear."""
@@ -21,13 +21,14 @@ def scale_rows(settings: Settings) -> Iterator[Row]:
     )
     found = {count: [found[place] for found in rounds] for place, count in enumerate(_COUNTS)}
     for count in _COUNTS:
-        lead_ms = max(20, count)
         firsts = sorted(one["first_ns"] / 1e6 for one in found[count])
-        note = f"the last first release came {firsts[len(firsts) // 2]:.0f} ms after the call of deploy(), "
-        note += f"{lead_ms} ms of them the lead that every deployment of {count} gives its threads"
+        note = f"the last first release came {firsts[len(firsts) // 2]:.0f} ms after the call of deploy()"
         what = f"{count} components at 10 Hz"
         starts = [one["start_ns"] / 1e6 for one in found[count]]
         yield alone(f"{what}: time until all threads are ready", starts, unit="ms", note=note)
+        leads = [one["lead_ns"] / 1e6 for one in found[count]]
+        what_lead = f"{what}: from the return of deploy(), all being ready, to the epoch"
+        yield alone(what_lead, leads, unit="ms", limit=20)
         shares = [100 * one["cpu_ns"] / one["ran_ns"] for one in found[count]]
         yield alone(f"{what}: share of one CPU", shares, unit="%")
         reserved = found[count][0]["reserved_bytes"] / count / _KIB
@@ -40,7 +41,7 @@ def scale_rows(settings: Settings) -> Iterator[Row]:
         ("CPU time", "cpu_ns"),
         ("locked memory", "locked_bytes"),
     ):
-        middle, most = _COUNTS[1:]
+        middle, most = _COUNTS[-2:]
         pairs = [
             (big[name] / most, small[name] / middle)
             for big, small in zip(found[most], found[middle], strict=True)
@@ -53,6 +54,14 @@ def scale_rows(settings: Settings) -> Iterator[Row]:
             beside=f"among {middle}",
             ratio_limit=_LINEAR,
         )
+
+
+def idle_rows(settings: Settings) -> Iterator[Row]:
+    """All components wait, and none declares a bound: nothing has to wake up."""
+    found = [native.run("bench_idle", priority=settings.priority) for _ in range(settings.rounds)]
+    rates = [one["wakeups"] / (one["duration_ns"] / 1e9) for one in found]
+    what = "8 components that wait, none with a bound: wake-ups a second of all threads"
+    yield exactly_zero(what, rates)
 
 
 def _measure(count: int, duration_s: float) -> native.Measure:

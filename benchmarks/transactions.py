@@ -6,7 +6,7 @@ from typing import Any
 
 import native
 from ratios import percentile
-from rows import Row, alone, exactly_zero, never_over
+from rows import Row, alone, exactly_zero, never_over, pooled
 from settings import Settings
 
 _KIB = 1024
@@ -30,10 +30,27 @@ def transaction_rows(settings: Settings) -> Iterator[Row]:
     for percent, limit in ((50, None), (99, 200)):
         values = [percentile(found["blackout_ns"], percent) / 1000 for found in rounds]
         yield alone(f"{what}, longest blackout p{percent}", values, unit="us", limit=limit)
+    blackouts = [ns / 1000 for found in rounds for ns in found["blackout_ns"]]
+    yield pooled(f"{what}, longest blackout p99.9", blackouts, 99.9, unit="us")
     for whose in ("untouched", "touched"):
         missed = [found[f"{whose}_missed"] for found in rounds]
         note = _stalls(rounds, whose)
         yield exactly_zero(f"{what}, releases missed by {whose} components", missed, note=note)
+
+
+def refused_rows(settings: Settings) -> Iterator[Row]:
+    """Ask for what cannot be made in time."""
+    found = [
+        native.run("bench_refused", priority=settings.priority, cpu=settings.cpu)
+        for _ in range(settings.rounds)
+    ]
+    refused, releases, stalled = (
+        sum(one[name] for one in found) for name in ("refused", "releases", "missed_in_stalls")
+    )
+    note = f"{refused} were refused after 60 ms; {stalled} of {releases} releases were missed inside stalls "
+    note += "of the machine that a witness marked"
+    what = "transactions over a 1 kHz component and one in a 150 ms state: releases that the 1 kHz one missed"
+    yield exactly_zero(what, [one["missed"] for one in found], note=note)
 
 
 def soak_rows(settings: Settings) -> Iterator[Row]:

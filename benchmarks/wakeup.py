@@ -7,7 +7,7 @@ import cyclictest
 import native
 import stress
 from ratios import percentile
-from rows import Row, compared, not_available
+from rows import Row, compared, not_available, pooled
 from settings import Settings
 
 _NS_PER_US = 1000
@@ -34,6 +34,10 @@ def percentile_rows(
         beside = "bare clock_nanosleep loop"
         pairs = _pairs(rounds, percent, 1)
         yield compared(f"{what}, p{percent}", pairs, unit="us", beside=beside, ratio_limit=limit, note=note)
+    component, bare = ([ns / _NS_PER_US for one in rounds for ns in one[side]] for side in (0, 1))
+    yield pooled(
+        f"{what}, p99.9", component, 99.9, unit="us", reference=bare, beside="bare clock_nanosleep loop"
+    )
     for percent, _ in _LIMITS:
         row = f"{what}, p{percent}, against cyclictest"
         if no_cyclictest:

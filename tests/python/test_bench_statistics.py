@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # at the end: it
 import machine
 import native
 from ratios import Interval, median_interval, percentile, ratio_interval, verdict
-from rows import alone, compared, exactly_zero, markdown, never_over, not_available
+from rows import alone, compared, exactly_zero, markdown, never_over, not_available, pooled
 from topics import Window, latencies_ns, lost_on_the_way, lost_percent, process_cpu_ns
 
 
@@ -104,6 +104,13 @@ def test_a_row_beside_nothing_is_judged_by_its_interval():
     assert alone("a", [250.0] * 9, unit="ns", limit=300).verdict == "undecided"
     row = alone("a", [350.0] * 10, unit="ns")
     assert (row.verdict, row.measured, row.reference, row.ratio) == ("reported", 350.0, None, None)
+
+
+def test_what_is_rare_is_looked_for_in_all_rounds_together():
+    row = pooled("a", range(1, 101), 99, unit="us", reference=range(201, 301), beside="bare")
+    assert (row.measured, row.reference, row.verdict) == (99, 299, "reported")
+    assert row.note == "maximum 100 us of 100, of the reference 300 us of 100"
+    assert pooled("a", [3.0, 1.0], 99.9, unit="us").reference is None
 
 
 def test_a_row_for_machines_has_the_numbers_and_every_round():
