@@ -1,186 +1,302 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Rule 10: random transactions against a model of what they should have made of the architecture.
-#include <random>
+// Rule 10: random transactions against a model of what they should have made of the architecture, of its outputs and of
+// the releases of every component, on threads and in virtual time.
+// MAUVE_RANDOM_SEED and MAUVE_RANDOM_TRANSACTIONS ask for other runs, or longer ones.
+#include <cstdlib>
+#include <string_view>
 
-#include "transaction_fixtures.hpp"
+#include "random_model.hpp"
 
 namespace mauve::testing {
 namespace {
 
-/// What the test expects of one component.
-struct Expected {
-  std::string core{"t/Core"};
-  std::string fsm{"t/Fsm"};
-  std::string shell{"t/Shell"};
-  bool running{false};
-  double gain{1.0};
-  std::string input;  // the resource it reads
-  bool operator==(const Expected&) const = default;
-};
-struct Model {
-  std::map<std::string, Expected> components;
-  std::set<std::string> resources;
-  bool operator==(const Model&) const = default;
+std::uint64_t asked(const char* variable, std::uint64_t otherwise) {
+  const char* text = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): nobody sets any
+  return text == nullptr ? otherwise : std::stoull(text);
+}
+
+/// Hosts, as far as they differ for these tests.
+class OnThreads {
+ public:
+  static constexpr bool kExact = false;
+  static constexpr std::uint64_t kTransactions = 1500;
+
+  explicit OnThreads(Architecture& architecture) : deployer(architecture) {}
+  void deploy() {
+    deployer.deploy();
+    pass(deployer.epoch_ns() + ms_to_ns(5) - monotonic_now_ns());
+  }
+  TransactionReport commit(Transaction transaction, TransactionOptions options) {
+    options.timeouts.commit_ns = s_to_ns(10);
+    return deployer.commit(std::move(transaction), options);
+  }
+  static void pass(time_ns_t duration_ns) {
+    std::this_thread::sleep_for(std::chrono::nanoseconds(duration_ns));
+  }
+  TraceDrain drain_trace() { return deployer.drain_trace(); }
+  time_ns_t epoch_ns() const { return deployer.epoch_ns(); }
+  template <typename Condition>
+  void await(Condition condition, const char* what) {
+    wait_until(condition, what);
+  }
+  void shutdown() { deployer.shutdown(); }
+
+  AwayFromComponents away;
+  Deployer deployer;
 };
 
-class Rule10Random : public Transacted {
+class InVirtualTime {
+ public:
+  static constexpr bool kExact = true;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  static constexpr std::uint64_t kTransactions = 2'000;
+#else
+  static constexpr std::uint64_t kTransactions = 20'000;
+#endif
+
+  explicit InVirtualTime(Architecture& under_test) : architecture(under_test) {}
+  void deploy() {
+    simulation.add(architecture);
+    simulation.deploy();
+    simulation.run_until(simulation.epoch_ns());
+  }
+  TransactionReport commit(Transaction transaction, const TransactionOptions& options) {
+    return simulation.commit(architecture, std::move(transaction), options);
+  }
+  void pass(time_ns_t duration_ns) { simulation.run_until(simulation.now_ns() + duration_ns); }
+  TraceDrain drain_trace() { return simulation.drain_trace(architecture); }
+  time_ns_t epoch_ns() const { return simulation.epoch_ns(); }
+  template <typename Condition>
+  void await(Condition condition, const char* what) {
+    for (int i = 0; i < 1000 && !condition(); ++i) pass(ms_to_ns(1));
+    ASSERT_TRUE(condition()) << what;
+  }
+  void shutdown() { simulation.shutdown(); }
+
+  Architecture& architecture;
+  Simulation simulation;
+};
+
+/// An architecture of random parts, and a neighbour that nothing is ever done to.
+template <typename HostType>
+class Rule10Random : public ::testing::Test {
  protected:
-  using Random = std::mt19937;
+  Rule10Random() {
+    register_random_parts(registry);
+    for (int i = 0; i < 4; ++i) add("c" + std::to_string(i), 2);
+    model.components["c0"].fallback = "r/Other";
+    architecture.component("c0").set_fallback(registry.make_core("r/Other"));
+    for (const char* name : {"r0", "r1"}) {
+      architecture.add_resource<SharedData<Number>>(name);
+      model.resources.insert(name);
+    }
+    for (int i = 0; i < kRandomComponents; ++i) {
+      const std::string name = "c" + std::to_string(i);
+      for (const std::string output : kOutputs) {
+        outputs[output + "_" + name] = &architecture.add_resource<SharedData<Number>>(output + "_" + name);
+        if (model.components.contains(name)) architecture.connect(name, output, output + "_" + name, "write");
+      }
+    }
+    architecture.add_component<TestShell, TestCore, TestFsm>(
+        "neighbour", {.priority = 60, .cpus = {kComponentsCpu}, .trace_records = kRecords});
+    architecture.configure();
+  }
+  ~Rule10Random() override {
+    host.shutdown();
+    run_on_where_sanitized();
+  }
 
-  int below(int bound) { return std::uniform_int_distribution<int>(0, bound - 1)(random); }
-  std::string any_component() { return "c" + std::to_string(below(6)); }
-  std::string any_resource() { return "r" + std::to_string(below(4)); }
+  void add(const std::string& name, std::int64_t period_ms) {
+    Component& component = architecture.add_component(name, "r/Shell", "r/Core", "r/Fsm",
+                                                      {.cpus = {kComponentsCpu}, .trace_records = kRecords});
+    component.allow({"r/Other", "r/Refusing", "r/Throwing", "r/Unready"}, true);
+    component.set_property("period_ms", period_ms);
+    model.components[name] = {.running = true, .period_ms = period_ms};
+  }
 
-  /// Enters a random step; whether the model says that it is valid, and if so what it makes of the model.
-  bool enter(Transaction& transaction, Model& model) {
-    const std::string name = any_component();
-    const std::string resource = any_resource();
-    const auto found = model.components.find(name);
-    const bool known = found != model.components.end();
-    switch (below(11)) {
-      case 0: {
-        const std::string core = below(8) == 0 ? "t/Refusing" : below(2) == 0 ? "t/Core" : "t/Counting";
-        transaction.replace_core(name, core);
-        if (known) found->second.core = core;
-        return known;
+  void deploy() {
+    host.deploy();
+    for (const auto& component : architecture.components()) {
+      const std::string& name = component->name();
+      follow(name);
+      const bool random = model.components.contains(name);
+      rhythms.at(name).expect_start(random ? model.components.at(name).plan() : Plan{{ms_to_ns(1)}}, false);
+    }
+  }
+  void follow(const std::string& name) {
+    rhythms.erase(name);
+    rhythms.emplace(
+        name, Rhythm(name, architecture.component(name).task().number(), host.epoch_ns(), HostType::kExact));
+  }
+
+  void look() {
+    const TraceDrain drain = host.drain_trace();
+    std::map<std::uint16_t, Rhythm*> by_number;
+    for (auto& [name, rhythm] : rhythms) by_number[rhythm.number()] = &rhythm;
+    for (const TraceRecord& record : drain.records) {
+      const auto found = by_number.find(record.component);
+      if (found != by_number.end()) found->second->take(record);
+    }
+    for (const auto& [number, rhythm] : by_number)
+      EXPECT_EQ(0U, drain.dropped[number]) << "the trace has a gap: drain it more often";
+  }
+
+  /// What a transaction that was made has to have done to the releases.
+  void expect_starts(const RandomDraft& draft) {
+    for (const auto& [name, touch] : draft.touched) {
+      if (touch.removed) rhythms.erase(name);
+      const auto after = draft.after.components.find(name);
+      if (after == draft.after.components.end()) continue;
+      if (touch.added) follow(name);
+      if (!after->second.running) continue;
+      const bool ran = !touch.added && model.components.at(name).running;
+      const bool stopped = touch.stopped || !ran;
+      if (stopped || touch.fsm || touch.shell) rhythms.at(name).expect_start(after->second.plan(), !stopped);
+    }
+  }
+
+  void mark_outputs() {
+    ++mark;
+    for (const auto& [name, data] : outputs) data->write.write({mark}, 0);
+  }
+  /// Written by the kernel for what was stopped, or replaced, and for nobody else; nothing by a change not made.
+  void expect_outputs(const RandomDraft& draft, bool made) {
+    for (const auto& [name, data] : outputs) {
+      const std::string output = name.substr(0, name.find('_'));
+      const std::string component = name.substr(name.find('_') + 1);
+      const auto touch = draft.touched.find(component);
+      const auto before = model.components.find(component);
+      bool zeroed = false;
+      if (made && touch != draft.touched.end() && before != model.components.end() &&
+          before->second.running) {
+        const Touch& what = touch->second;
+        const bool ends = what.removed || what.stopped;
+        if (ends && (what.replaced() || what.started || what.added))
+          continue;  // no rule says what comes of both
+        zeroed = output == "output" ? ends : output == "cleared" ? what.replaced() : false;
       }
-      case 1: {
-        const std::string fsm = below(2) == 0 ? "t/Fsm" : "t/Syncopated";
-        transaction.replace_fsm(name, fsm);
-        if (known) found->second.fsm = fsm;
-        return known;
-      }
-      case 2: {
-        const std::string shell = below(2) == 0 ? "t/Shell" : "t/WideShell";
-        transaction.replace_shell(name, shell);
-        if (known) found->second.shell = shell;
-        return known;
-      }
-      case 3: {
-        const double gain = below(12);  // 11 is out of range
-        transaction.set_property(name, "gain", gain);
-        if (known) found->second.gain = gain;
-        return known && gain <= 10.0;
-      }
-      case 4: {
-        transaction.connect(name, "input", resource, "read");
-        if (!known || !found->second.input.empty() || !model.resources.contains(resource)) return false;
-        found->second.input = resource;
-        return true;
-      }
-      case 5: {
-        transaction.disconnect(name, "input");
-        if (!known || found->second.input.empty()) return false;
-        found->second.input.clear();
-        return true;
-      }
-      case 6: {
-        transaction.add_component(name, parts(2));
-        return model.components.emplace(name, Expected{}).second;
-      }
-      case 7: {
-        transaction.remove_component(name);
-        return model.components.erase(name) == 1;
-      }
-      case 8: {
-        const bool add = below(2) == 0;
-        if (add) {
-          transaction.add_resource(resource, "shared_data", kNumberType);
-          return model.resources.insert(resource).second;
-        }
-        transaction.remove_resource(resource);
-        for (const auto& [each, expected] : model.components) {
-          if (expected.input == resource) return false;
-        }
-        return model.resources.erase(resource) == 1;
-      }
-      case 9: {
-        transaction.start(name);
-        if (!known || found->second.running) return false;
-        return found->second.running = true;
-      }
-      default: {
-        transaction.stop(name);
-        if (!known || !found->second.running) return false;
-        found->second.running = false;
-        return true;
-      }
+      Number value;
+      time_ns_t time_ns = 0;
+      ReaderState reader;
+      data->read.read(value, time_ns, reader);
+      EXPECT_EQ(zeroed ? 0.0 : mark, value.value) << name;
     }
   }
 
   Model found() const {
-    Model model;
+    Model seen;
     const ArchitectureDescription description = architecture.describe();
     for (const ComponentFacts& each : description.components) {
-      if (each.name == "untouched") continue;
-      model.components[each.name] = {.core = each.parts.core,
-                                     .fsm = each.parts.fsm,
-                                     .shell = each.parts.shell,
-                                     .running = each.state == ComponentState::running,
-                                     .gain = std::get<double>(property(each.name, "gain")),
-                                     .input = wire(each.name, "input")};
-      std::string& input = model.components[each.name].input;
-      input = input.substr(0, input.find('.'));
+      if (each.name == "neighbour") continue;
+      Expected& facts = seen.components[each.name];
+      facts = {.core = each.parts.core,
+               .fsm = each.parts.fsm,
+               .shell = each.parts.shell,
+               .fallback = each.fallback,
+               .running = each.state == ComponentState::running};
+      for (const ShownProperty& property : each.parts.properties) {
+        if (property.name == "gain") facts.gain = std::get<double>(property.value);
+        if (property.name == "period_ms") facts.period_ms = std::get<std::int64_t>(property.value);
+      }
+      for (const ShownPort& port : each.parts.ports) {
+        if (port.name == "input") facts.input = port.resource;
+        const bool is_output = std::ranges::find(kOutputs, port.name, [](const char* text) {
+                                 return std::string(text);
+                               }) != kOutputs.end();
+        if (is_output) {
+          EXPECT_EQ(port.name + "_" + each.name, port.resource);
+        }
+      }
     }
-    for (const ResourceFacts& each : description.resources) model.resources.insert(each.name);
-    return model;
+    for (const ResourceFacts& each : description.resources) {
+      if (!outputs.contains(each.name)) seen.resources.insert(each.name);
+    }
+    return seen;
+  }
+  void expect_model() const {
+    const Model seen = found();
+    EXPECT_THAT(seen.components, ::testing::ContainerEq(model.components));
+    EXPECT_EQ(model.resources, seen.resources);
   }
 
-  /// Whether a core in the new model refuses: the kernel asks each new core, whatever it is called.
-  static bool refuses(const Model& model) {
-    for (const auto& [name, expected] : model.components) {
-      if (expected.core == "t/Refusing") return true;
+  /// Makes the next change up and carries it out; whether it came into force.
+  bool carry_out() {
+    RandomDraft draft = random.draft(model, architecture.revision());
+    SCOPED_TRACE(draft.text + (draft.valid ? "\n  (valid)" : "\n  (to be refused)"));
+    look();
+    mark_outputs();
+    bool made = false;
+    try {
+      draft.options.timeouts.phase_ns = 0;
+      const TransactionReport report = host.commit(std::move(draft.transaction), draft.options);
+      EXPECT_TRUE(draft.valid) << "it should have been refused";
+      for (const StepReport& step : report.steps) EXPECT_GE(step.missed_releases, 0) << step.step;
+      made = !draft.options.dry_run;
+    } catch (const Error& error) {
+      EXPECT_FALSE(draft.valid) << error.what();
+      EXPECT_TRUE(error.detail().step != 0 || error.code() == ErrorCode::wrong_revision) << error.what();
     }
-    return false;
+    expect_outputs(draft, made);
+    if (made) {
+      expect_starts(draft);
+      model = std::move(draft.after);
+    }
+    look();
+    expect_model();
+    return made;
   }
 
-  Random random{20260};  // NOLINT: the same every time
+  /// In virtual time no release that is due is still to come.
+  void expect_nobody_behind(time_ns_t now_ns) const {
+    for (const auto& [name, rhythm] : rhythms) {
+      if (rhythm.due_ns() != 0) {
+        EXPECT_GT(rhythm.due_ns(), now_ns) << name << " was not released";
+      }
+    }
+  }
+
+  static constexpr std::size_t kRecords = std::size_t{1} << 15U;
+
+  const std::uint64_t seed = asked("MAUVE_RANDOM_SEED", 20260);
+  RandomModel random{seed};
+  Model model;
+  PluginRegistry registry;
+  Architecture architecture{&registry};
+  HostType host{architecture};
+  std::map<std::string, SharedData<Number>*> outputs;
+  std::map<std::string, Rhythm> rhythms;
+  double mark{0.0};
 };
 
-TEST_F(Rule10Random, TransactionsDoWhatTheModelSaysOrNothing) {
-  constexpr int kTransactions = 1500;
-  Model model;
-  for (const char* name : {"c0", "c1", "c2", "c3"}) {
-    add(name);
-    model.components[name].running = true;
+using Hosts = ::testing::Types<OnThreads, InVirtualTime>;
+struct HostNames {
+  template <typename HostType>
+  static std::string GetName(int) {  // NOLINT(readability-identifier-naming): as GoogleTest calls it
+    return HostType::kExact ? "VirtualTime" : "Threads";
   }
-  for (const char* name : {"r0", "r1"}) {
-    architecture.add_resource<SharedData<Number>>(name);
-    model.resources.insert(name);
+};
+TYPED_TEST_SUITE(Rule10Random, Hosts, HostNames);
+
+TYPED_TEST(Rule10Random, TransactionsDoWhatTheModelSaysOrNothing) {
+  const std::uint64_t transactions = asked("MAUVE_RANDOM_TRANSACTIONS", TypeParam::kTransactions);
+  this->deploy();
+  std::uint64_t made = 0;
+  for (std::uint64_t i = 0; i < transactions && !this->HasFailure(); ++i) {
+    SCOPED_TRACE("seed " + std::to_string(this->seed) + ", transaction " + std::to_string(i));
+    this->host.pass(us_to_ns(this->random.below(TypeParam::kExact ? 9'000 : 2'000)));
+    if (this->carry_out()) ++made;
+    if constexpr (TypeParam::kExact) this->expect_nobody_behind(this->host.simulation.now_ns());
   }
-  add("untouched", 1, {.priority = 60});
-  deploy();
-  wait_until([&] { return runs("untouched") > 0; }, "the deployment");
-  ReleaseWitness witness(architecture.component("untouched").task(), ms_to_ns(1));
-  int made = 0;
-  for (int i = 0; i < kTransactions; ++i) {
-    Transaction transaction;
-    Model next = model;
-    bool valid = true;
-    std::string text;
-    for (int steps = 1 + below(3); steps > 0; --steps) {
-      valid = enter(transaction, next) && valid;
-      text += "\n" + transaction.steps().back()->text();
-    }
-    try {
-      commit(transaction, {.timeouts = {.phase_ns = 0}, .dry_run = false});
-      ASSERT_TRUE(valid && !refuses(next)) << "transaction " << i << " should have failed:" << text;
-      model = next;
-      ++made;
-    } catch (const Error& error) {
-      ASSERT_TRUE(!valid || refuses(next)) << "transaction " << i << ": " << error.what() << text;
-      ASSERT_NE(0, error.detail().step) << error.what();
-    }
-    ASSERT_TRUE(model == found()) << "transaction " << i << text << "\n" << described();
-    witness.look(deployer.drain_trace());
+  EXPECT_GT(made, transactions / 10);
+  EXPECT_LT(made, transactions);
+  // Who has a fallback still falls back, on that one.
+  for (const auto& [name, expected] : this->model.components) {
+    if (!expected.running || expected.fallback.empty() || this->HasFailure()) continue;
+    Component& component = this->architecture.component(name);
+    component.template core_as<TestCore>().condition = true;
+    this->host.await([&] { return component.task().has_fallen_back(); }, "the fallback");
+    EXPECT_EQ(expected.fallback, component.core_implementation());
   }
-  EXPECT_GT(made, kTransactions / 10);
-  EXPECT_LT(made, kTransactions);
-  for (const auto& [name, expected] : model.components) {
-    if (expected.running) expect_running(name);
-  }
-  witness.look(deployer.drain_trace());
-  EXPECT_EQ(architecture.trace_components().size(), deployer.drain_trace().written.size());
 }
 
 }  // namespace
