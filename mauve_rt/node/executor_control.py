@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Protocol
 
@@ -34,6 +34,7 @@ from mauve_rt.node.request_limits import RequestLimits
 
 DEFAULT_TIMEOUT_S = 1.0
 _STOP_SLICE_NS = 100_000_000
+_CALLED_OFF = ("wrong_revision", "not_configured", "timeout")
 
 
 class Outside(Protocol):
@@ -126,8 +127,11 @@ class Control:
                 self._under_way[identity] = request
         outcome: Outcome | None = None
         try:
-            with nullcontext() if request.is_direct else self._changing:
+            if request.is_direct:
                 outcome = self._outcome(request)
+            else:
+                with self._changing, self._runtime.changing(str(request)):
+                    outcome = self._outcome(request)
             return outcome
         finally:
             with self._answered:
@@ -201,6 +205,8 @@ class Control:
                 max_missed=request.max_missed,
             )
         except MauveError as error:
+            if error_code(error) in _CALLED_OFF:
+                check_time(request, self._runtime)  # whether it was by a deactivation
             if error_code(error) == "wrong_revision":  # of what changed meanwhile, in our own count
                 self._runtime.observe()
                 check_revision(request, self._runtime)

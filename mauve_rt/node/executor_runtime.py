@@ -2,7 +2,7 @@
 
 import threading
 import uuid
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,18 +21,17 @@ from mauve_rt.errors import MauveError
 from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
 from mauve_rt.model.schema import ComponentModel, DiagnosticsModel
 
+_MOMENT_S = 0.3
 
-class StillRunningError(MauveError):
-    """A component that should be parked still executes a state."""
 
-    def __init__(self, components: Sequence[ComponentDescription]) -> None:
-        words = ", ".join(
-            f"component '{part.name}' still executes state {part.current_state}" for part in components
-        )
-        super().__init__(f"{words}; wait for its end, or end the process")
+class StillBusyError(MauveError):
+    """A component that should be parked still executes a state, or a change is still being prepared."""
+
+    def __init__(self, what: str, *, component: str = "", element: str = "") -> None:
+        super().__init__(f"{what}; wait for its end, or end the process")
         self.code = "timeout"
-        self.component = components[0].name
-        self.element, self.expected, self.found, self.remedy = components[0].current_state, "", "", ""
+        self.component, self.element = component, element
+        self.expected, self.found, self.remedy = "", "", ""
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,7 @@ class Runtime:
     | ------------- | ------------------------------------------ | --------------- |
     | `_revision` ...  | observe(): any thread                      | `_lock`         |
     | `_declared`   | configure(), and who is in loading()       | exchanged whole |
+    | `_changing`, `_unchanging` | who is in changing(): one at a time | itself    |
     | `registry`, `index` | configure(), and who is in loading() | `_loading`; exchanged whole |
     | the others    | configure() ... cleanup(): one at a time   |                 |
     """
@@ -75,6 +75,9 @@ class Runtime:
         self.index = PluginIndex()
         self.instance_id = str(uuid.uuid4())
         self.active = False
+        self._changing = ""  # the change that is being prepared or made, in words
+        self._unchanging = threading.Event()
+        self._unchanging.set()
         self._require_realtime = require_realtime
         self._trace = trace
         self._declared: Mapping[str, _Declared] = {}
@@ -130,14 +133,19 @@ class Runtime:
         return Deployer(architecture, require_realtime=require_realtime, trace=self._trace)
 
     def activate(self) -> None:
-        """Deploy: every component starts on the grid."""
+        """Deploy: every component starts on the grid.
+
+        Raises:
+            MauveError: a change of before is still being prepared, or the host's reason.
+        """
+        self.require_unchanging()
         if not self.host.is_deployed():  # with others of the same simulation
             self.host.deploy()
         self.active = True
         self.observe()
 
     def deactivate(self) -> None:
-        """Write safe outputs, park the components, join their threads."""
+        """Write safe outputs, park the components, join their threads; a change under way is called off."""
         self.active = False
         self.host.shutdown()
         self.observe()
@@ -146,7 +154,8 @@ class Runtime:
         """Release the architecture; configure() builds it anew, from the file as it is then.
 
         Raises:
-            MauveError: a component's state still executes, so that nothing it uses may be taken away.
+            MauveError: a component's state still executes, or a change is still being prepared, so that
+                nothing they use may be taken away.
         """
         self.require_parked()
         self._model = None
@@ -159,10 +168,31 @@ class Runtime:
         """Whether cleanup() may be called.
 
         Raises:
-            MauveError: a component's state still executes.
+            MauveError: a component's state still executes, or a change is still being prepared.
         """
         if busy := self.busy():
-            raise StillRunningError(busy)
+            words = (f"component '{part.name}' still executes state {part.current_state}" for part in busy)
+            raise StillBusyError(", ".join(words), component=busy[0].name, element=busy[0].current_state)
+        self.require_unchanging()
+
+    @contextmanager
+    def changing(self, change: str) -> Iterator[None]:
+        """Around a change, which may take long to prepare."""
+        self._changing = change
+        self._unchanging.clear()
+        try:
+            yield
+        finally:
+            self._unchanging.set()
+
+    def require_unchanging(self) -> None:
+        """Whether no change is under way, or only for a moment more.
+
+        Raises:
+            MauveError: one is still being prepared.
+        """
+        if not self._unchanging.wait(_MOMENT_S):
+            raise StillBusyError(f"a change is still being prepared: {self._changing}")
 
     def busy(self) -> list[ComponentDescription]:
         """After deactivate(): the components whose present state has not come to its end yet."""
