@@ -33,7 +33,6 @@ from mauve_rt.node.executor_steps import Bound, Plan
 from mauve_rt.node.request_limits import RequestLimits
 
 DEFAULT_TIMEOUT_S = 1.0
-_STOP_SLICE_NS = 100_000_000
 _CALLED_OFF = ("wrong_revision", "not_configured", "timeout")
 
 
@@ -249,25 +248,12 @@ class Control:
     def _start_or_stop(self, step: Step, request: Request) -> Outcome:
         """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
         if step.kind == "stop":
-            self._stop(step.target, _timeout_ns(request))
+            self._runtime.host.stop(step.target, _timeout_ns(request))
             message = f"component '{step.target}' is stopped"
         else:
             self._runtime.host.start(step.target, request.clock_ns or None)
             message = f"component '{step.target}' is started"
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
-
-    def _stop(self, component: str, timeout_ns: int) -> None:
-        """Stop in short waits, between which the kernel is free for others, for the end of all above all."""
-        deadline_ns = monotonic_ns() + timeout_ns
-        while True:
-            left_ns = deadline_ns - monotonic_ns()
-            try:
-                self._runtime.host.stop(component, max(0, min(left_ns, _STOP_SLICE_NS)))
-            except MauveError as error:
-                if error_code(error) == "timeout" and left_ns > _STOP_SLICE_NS and self._runtime.active:
-                    continue  # a stop that timed out stays pending
-                raise
-            return
 
 
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:
