@@ -32,6 +32,39 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "rosbags from which timing is proved": (
         "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
+    "A change has no component held past its next release": (
+        "ros/test_stop_wins.py::test_releases_are_missed_only_by_who_may",
+    ),
+    "where each may miss some for it, `--max-missed 2` says how many": (
+        "ros/test_stop_wins.py::test_releases_are_missed_only_by_who_may",
+        "python/test_cli.py::test_a_steps_file_may_allow_releases_to_be_missed",
+    ),
+    "Whoever missed one is named in the outcome": (
+        "python/test_executor_control.py::test_releases_that_were_missed_are_in_the_message",
+    ),
+    "A stop waits for nobody": (
+        "ros/test_executor_beside.py::test_a_stop_by_reconfigure_waits_for_no_preparation",
+        "ros/test_executor_beside.py::test_a_stop_waits_for_no_stop_of_another_component",
+    ),
+    "a change under way that the component takes part in is called off": (
+        "ros/test_stop_wins.py::test_a_stop_calls_off_a_commit_that_waits_for_another_component",
+        "ros/test_executor_beside.py::test_a_stop_of_its_own_component_calls_the_change_off",
+    ),
+    "any other goes on beside it": (
+        "ros/test_executor_beside.py::test_stop_start_and_list_wait_for_no_preparation",
+    ),
+    "Deactivation and the end of the process call all off, and who asked is told so": (
+        "ros/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
+        "ros/test_stop_wins.py::test_the_end_waits_for_no_change",
+    ),
+    "one that finds another under way for 10 s is refused": (
+        "ros/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
+    ),
+    "a faulted component gets a new core": (
+        "ros/test_faulted_component.py::test_by_a_new_core_and_a_start",
+        "ros/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
+        "ros/test_faulted_component.py::test_by_the_command_line",
+    ),
     # ---- two commands
     "nothing comes by pip": ("python/test_package_xml.py::test_the_door_opens_with_rosdep_and_apt_alone",),
     "the Python packages of Ubuntu 24.04 do as they are": (

@@ -1,6 +1,7 @@
 """A stop, a deactivation and the end of the process wait for nobody's preparation, adoption or commit."""
 
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -31,10 +32,10 @@ TRANSITIONS = {
 class Stage:
     """An executor whose counter takes misbehaving cores."""
 
-    def __init__(self, graph: Any, folder: Path, executor: Any) -> None:
+    def __init__(self, graph: Any, folder: Path, executor: Any, *, counts: int = 3) -> None:
         self.graph, self.folder, self.executor = graph, folder, executor
         self.counts = graph.hear(Float64, "/robot_1/count")
-        graph.spin_until(lambda: len(self.counts) > 2, "counts")
+        graph.spin_until(lambda: len(self.counts) >= counts, "counts")
 
     def begin(self, core: str) -> Preparation:
         return Preparation(self.graph, self.folder, core)
@@ -119,6 +120,40 @@ def test_a_stop_calls_off_a_commit_that_waits_for_another_component(stage: Stage
         True,
     )
     voice.publish(Float64(data=1.0))
+
+
+@pytest.mark.parametrize("max_missed", [0, 100_000])
+def test_releases_are_missed_only_by_who_may(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any, tmp_path: Path, max_missed: int
+) -> None:
+    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
+    text = text.replace("core: executor_tests/Counter,", "core: executor_tests/Held,", 1)
+    architecture.write_text(text, encoding="utf-8")
+    stage = Stage(graph, tmp_path, start_executor("-p", f"architecture:={architecture}"), counts=1)
+    events = graph.hear_events(NODE)
+    steps = [
+        ReconfigurationStep(kind="set_property", target="counter", name="step", value="2.0"),
+        ReconfigurationStep(kind="replace_core", target="sleepy", name="executor_tests/Backwards"),
+    ]
+    fields = {"steps": steps, "commit_timeout_s": 0.5 if max_missed == 0 else 10.0, "max_missed": max_missed}
+    change = graph.ask_later(Reconfigure, f"{NODE}/reconfigure", **fields)
+    if max_missed == 0:  # as long as the counter executes they never meet, and sleepy goes on
+        first = stage.part("sleepy").releases
+        graph.spin_until(change.done, "the refusal")
+        assert change.result().code == Code.TIMEOUT
+        graph.spin_until(lambda: stage.part("sleepy").releases > first, "releases")
+        return
+    graph.spin_until(lambda: stage.part("sleepy").state == ComponentInfo.HELD, "sleepy in the commit")
+    held = stage.part("sleepy")
+    time.sleep(0.2)  # ten of its periods
+    assert (stage.part("sleepy").state, stage.part("sleepy").releases) == (ComponentInfo.HELD, held.releases)
+    graph.voice(Float64, "/robot_1/set").publish(Float64(data=1.0))
+    graph.spin_until(change.done, "the change")
+    assert change.result().success, change.result().message
+    graph.spin_until(lambda: bool(events), "its event")
+    missed = events[0].report[1].missed_releases
+    assert missed >= 10
+    assert f"component 'sleepy' missed {missed} releases" in events[0].message
 
 
 def test_a_part_may_ask_its_own_executor_while_it_is_configured(stage: Stage) -> None:
