@@ -231,6 +231,24 @@ TEST_P(Rule10Missed, AllowedReleasesAreSkippedAndReportedAndAreNoOverrun) {
   EXPECT_EQ(report.steps[0].missed_releases, armed[0].c) << "the trace tells them from lost ones";
 }
 
+TEST_P(Rule10Missed, NeitherDoesANewFsmBeginWithAnOverrun) {
+  Component& c = add("c", 200, {.overrun = GetParam()});
+  deploy();
+  wait_runs(c, 1);
+  auto fresh = std::make_unique<ToldCore>();
+  fresh->adopting = pause_ms(600);
+  ToldCore& told = *fresh;
+  Transaction change = replace("c", std::move(fresh));
+  change.replace_fsm("c", std::make_unique<TestFsm>());
+  TransactionOptions options = kPatient;
+  options.timeouts.phase_ns = s_to_ns(50);
+  const TransactionReport report = deployer.commit(std::move(change), options);
+  EXPECT_GE(report.steps[0].missed_releases, 2);
+  wait_until([&] { return told.runs > 1 || c.task().state() == ComponentState::faulted; }, "two runs");
+  EXPECT_EQ(ComponentState::running, c.task().state()) << c.task().fault().what;
+  EXPECT_EQ(0U, c.task().statistics().overruns);
+}
+
 TEST_F(Rule10Gate, AStopCallsACommitOffAndWaitsForNobody) {
   deploy_two();
   keep_slow_busy();
@@ -501,7 +519,7 @@ class Rule7Outputs : public ::testing::TestWithParam<bool> {
     architecture.connect("c", "zeroed", "z", "write");
     architecture.configure();
     if (GetParam()) {
-      simulation.add(architecture);
+      host = &simulation.add(architecture);
       simulation.deploy();
       simulation.run_until(simulation.epoch_ns() + ms_to_ns(10));
     } else {
@@ -509,13 +527,7 @@ class Rule7Outputs : public ::testing::TestWithParam<bool> {
       wait_until([&] { return output() == 42.0; }, "the output");
     }
   }
-  void commit(Transaction change) {
-    if (GetParam()) {
-      simulation.commit(architecture, std::move(change));
-    } else {
-      deployer.commit(std::move(change));
-    }
-  }
+  void commit(Transaction change) { host->commit(std::move(change)); }
   double output() {
     Number value;
     time_ns_t written_ns = 0;
@@ -529,6 +541,7 @@ class Rule7Outputs : public ::testing::TestWithParam<bool> {
   SharedData<Number>& z{architecture.add_resource<SharedData<Number>>("z")};
   Simulation simulation;
   Deployer deployer{architecture};
+  Host* host{&deployer};
 };
 
 INSTANTIATE_TEST_SUITE_P(Hosts, Rule7Outputs, ::testing::Bool(), [](const auto& info) {

@@ -156,11 +156,11 @@ void Task::continue_after(Participant& place) noexcept {
     }
   }
   place.armed_ns = boundary_ns_ = clock_->now_ns();
-  const bool keeps_instant = !committed || place.afterwards == Afterwards::go_on;
-  const std::int64_t lost = keeps_instant ? skip_lost(place, place.armed_ns) : 0;
+  const bool ends = committed && place.afterwards == Afterwards::stop;
+  const std::int64_t lost = ends ? 0 : skip_lost(place, place.armed_ns);
   place.resumes_ns = due_ns();
   trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
-  if (committed && place.afterwards == Afterwards::stop) park_stopped();
+  if (ends) park_stopped();
 }
 
 void Task::hold_parked(Participant& place) const noexcept {
