@@ -194,7 +194,10 @@ class Diagnostics:
         level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
         message = "without real-time rights" if missing else "real-time rights granted"
         if left_behind := self._runtime.threads_left_behind():
-            level, message = DiagnosticStatus.WARN, f"{left_behind} threads of removed components still execute"
+            level, message = (
+                DiagnosticStatus.WARN,
+                f"{left_behind} threads of removed components still execute",
+            )
         if error:
             level, message = DiagnosticStatus.ERROR, error
         values = {

@@ -116,15 +116,10 @@ class Plan:
                 self.removed.add(name)
                 self.taken.pop(name, None)
                 self.added.pop(name, None)
-            case "start":
+            case "start" | "stop" | "configure":
                 self._component(step)
-                transaction.start(name)
-            case "stop":
-                self._component(step)
-                transaction.stop(name)
-            case "configure":
-                self._component(step)
-                transaction.configure(name)
+                ask = {"stop": transaction.stop, "configure": transaction.configure}
+                ask.get(step.kind, transaction.start)(name)
             case "connect":
                 self._component(step)
                 resource, service = _service(step)

@@ -29,12 +29,9 @@ class ListedComponent:
                 return _same(self.connections.get(step.name, ""), step.value)
             case "disconnect":
                 return self.connections.get(step.name) == ""
-            case "start":
-                return self.state in PRESENT
-            case "configure":
-                return self.state not in {"UNCONFIGURED", "FAULTED"}
-            case "stop":
-                return self.state == "STOPPED"
+            case "start" | "stop" | "configure":
+                states = {"start": PRESENT, "stop": ("STOPPED",), "configure": ("STOPPED", *PRESENT)}
+                return self.state in states[step.kind]
             case _:
                 parts = {"replace_core": self.core, "replace_fsm": self.fsm, "replace_shell": self.shell}
                 return parts.get(step.kind) == step.name

@@ -27,9 +27,6 @@ struct ThreadsHost {
     deployer = std::make_unique<Deployer>(architecture);
     deployer->deploy();
   }
-  void commit(Architecture& /*architecture*/, Transaction transaction) {
-    deployer->commit(std::move(transaction), {.timeouts = {.phase_ns = 0}});
-  }
   void pass() { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
   std::unique_ptr<Deployer> deployer;
 };
@@ -38,9 +35,6 @@ struct VirtualHost {
     architecture.configure();
     simulation.add(architecture);
     simulation.deploy();
-  }
-  void commit(Architecture& architecture, Transaction transaction) {
-    simulation.commit(architecture, std::move(transaction));
   }
   void pass() { simulation.run_until(simulation.now_ns() + ms_to_ns(1)); }
   Simulation simulation;
@@ -73,7 +67,9 @@ class Rule11Repaired : public ::testing::Test {
     EXPECT_EQ(ComponentState::running, component->task().state());
     EXPECT_EQ("", component->task().fault().what);
   }
-  void commit(Transaction transaction) { host.commit(architecture, std::move(transaction)); }
+  void commit(Transaction transaction) {
+    architecture.commit(std::move(transaction), {.timeouts = {.phase_ns = 0}});
+  }
 
   Architecture architecture;
   Host host;

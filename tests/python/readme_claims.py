@@ -504,13 +504,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "and while it lasts by a real-time watchdog": (
         "Rule11Faults.AStateOverItsDeclaredTimeIsCaughtByTheWatchdog",
     ),
-    "which sleeps until the next bound can be exceeded": ("Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",),
+    "which sleeps until the next bound can be exceeded": (
+        "Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",
+    ),
     "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheCondemnedOneHolds",),
     "repaired in place by a step `configure` or `replace_core`, then started": (
         "Rule11Repaired/0.AndStartedInOneTransaction",
         "Rule11Repaired/0.ByConfiguringItAnew",
     ),
-    "is removed and added anew, in one transaction": ("Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",),
+    "is removed and added anew, in one transaction": (
+        "Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",
+    ),
     "the component's own thread puts that one in": (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
         "Rule11Fallback.StartsInTheInitialStateAtTheNextInstantOfTheGrid",

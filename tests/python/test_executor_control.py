@@ -392,7 +392,9 @@ def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) 
     assert "weak" not in [part.name for part in runtime.components()]
 
 
-@pytest.mark.parametrize("repair", [Step("configure", "weak"), Step("replace_core", "weak", "executor_tests/Counter")])
+@pytest.mark.parametrize(
+    "repair", [Step("configure", "weak"), Step("replace_core", "weak", "executor_tests/Counter")]
+)
 def test_a_faulted_component_is_repaired_in_place(runtime: Runtime, control: Control, repair: Step) -> None:
     steps = (
         Step("add_component", "weak", "", COUNTER),

@@ -37,6 +37,7 @@ void Task::carry_out_sentence(FaultNote note) noexcept {
   note.where = current_.load(std::memory_order_relaxed);
   swap_fault(note);
   publish_state(ComponentState::faulted);
+  withdraw_commit();  // it cannot come to the gate any more
   if (has_thread_.load(std::memory_order_acquire)) {
     const sched_param ordinary{};
     pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);

@@ -33,6 +33,7 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   if (!end_thread(0)) throw_state_running("the component's thread has not ended", 0, kLeftBehindRemedy);
   const std::lock_guard lock(command_mutex_);
   watchdog_ = std::move(watchdog);
+  demoted_ = false;
   barrier_ = barrier;
   begin_trace(trace);
   parked_.store(1, std::memory_order_relaxed);  // relaxed: the thread does not exist yet
