@@ -115,7 +115,7 @@ class RandomModel {
 
   RandomDraft draft(const Model& now, std::uint64_t revision) {
     RandomDraft made{.after = now};
-    for (int steps = 1 + below(4); steps > 0; --steps) {
+    for (int steps = 1 + below(3); steps > 0; --steps) {
       const std::size_t first = made.transaction.steps().size();
       made.valid = enter(made) && made.valid;
       for (std::size_t i = first; i < made.transaction.steps().size(); ++i)
@@ -135,7 +135,7 @@ class RandomModel {
     ComponentParts parts{.shell = "r/Shell", .core = "r/Core", .fsm = "r/Fsm"};
     parts.settings.cpus = {kComponentsCpu};
     parts.properties["period_ms"] = std::int64_t{2};
-    parts.alternatives = {"r/Other"};
+    parts.alternatives = {"r/Other", "r/Refusing", "r/Throwing", "r/Unready"};
     return parts;
   }
 
