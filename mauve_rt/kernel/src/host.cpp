@@ -16,7 +16,10 @@ constexpr time_ns_t kInOrder = ms_to_ns(50);
 }  // namespace
 
 void Host::require_deployable() const {
-  if (is_deployed()) throw Error(ErrorCode::already_running, "the architecture is deployed already");
+  if (is_deployed()) {
+    throw Error(ErrorCode::already_running, "the architecture is deployed already",
+                {.remedy = "shut it down first, to deploy it anew"});
+  }
   if (architecture_.is_configured()) return;
   throw Error(ErrorCode::not_configured, "the architecture is not configured",
               {.remedy = "call configure() first"});

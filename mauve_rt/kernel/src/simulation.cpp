@@ -166,7 +166,7 @@ SimulatedHost::SimulatedHost(Simulation& simulation, Architecture& architecture)
 SimulatedHost::~SimulatedHost() { shutdown(); }
 
 void SimulatedHost::join() {
-  const std::lock_guard change(architecture().change_lock());
+  const auto change = architecture().change_lock().join();
   require_deployable();
   const std::size_t stack_bytes = own_stack_bytes();
   for (const auto& component : architecture().components()) {
@@ -182,6 +182,7 @@ void SimulatedHost::join() {
 }
 
 void SimulatedHost::deploy() {
+  const std::lock_guard change(architecture().change_lock());
   if (architecture().host() != this) join();  // it was shut down
   require_deployable();
   if (simulation_.epoch_ns_ == 0) return simulation_.deploy();
@@ -189,7 +190,7 @@ void SimulatedHost::deploy() {
 }
 
 void SimulatedHost::begin(time_ns_t epoch_ns) {
-  const std::lock_guard change(architecture().change_lock());
+  const auto change = architecture().change_lock().join();
   for (const auto& component : architecture().components()) attach(component->task());
   start_all(epoch_ns);
   set_deployed(true);
