@@ -21,7 +21,7 @@ Commit::Commit(std::size_t participants, std::vector<CommitAction*> actions)
 }
 
 Commit::~Commit() {
-  if (!committed_ || is_abandoned()) return;
+  if (!committed()) return;
   for (Participant& place : participants_) {
     if (place.in_flight && place.afterwards != Afterwards::stop) place.task->forget_release(place);
   }

@@ -153,7 +153,7 @@ class Commit {
   void set_max_missed(std::int64_t releases) noexcept { max_missed_ = releases; }
 
   /// Whether it was made; else nothing was changed. [non-rt], after it ended.
-  bool committed() const noexcept { return committed_; }
+  bool committed() const noexcept { return !is_abandoned() && committed_; }
   /// What adopt threw, if it did. [non-rt], after it ended.
   const std::exception_ptr& refusal() const noexcept { return refusal_; }
   /// The action whose adopt refused, or nullptr. [non-rt], after it ended.
