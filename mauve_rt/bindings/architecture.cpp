@@ -137,16 +137,15 @@ void bind_architecture(py::module_& module) {
           py::arg("resource"), Unlocked())
       .def(
           "subscribe",
-          [](PyArchitecture& self, const std::string& resource) {
-            self.architecture.subscribe(resource);
-          },
+          [](PyArchitecture& self, const std::string& resource) { self.architecture.subscribe(resource); },
           py::arg("resource"), Unlocked())
       .def(
           "configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
       .def(
           "cleanup",
           [](PyArchitecture& self) {
-            const auto change = self.architecture.change_lock().join();  // first: a hook may ask for a description
+            const auto change =
+                self.architecture.change_lock().join();  // first: a hook may ask for a description
             const std::lock_guard lock(self.describing);
             self.architecture.cleanup();
           },

@@ -93,8 +93,8 @@ std::shared_ptr<Resource> Draft::find_resource(const std::string& name) const {
   if (const auto added = resources_by_name_.find(name); added != resources_by_name_.end())
     return added->second->resource;
   auto present = architecture_.find_resource(name);
-  const bool is_removed = std::find(removed_resources_.begin(), removed_resources_.end(), present) !=
-                          removed_resources_.end();
+  const bool is_removed =
+      std::find(removed_resources_.begin(), removed_resources_.end(), present) != removed_resources_.end();
   return is_removed ? nullptr : present;
 }
 

@@ -46,7 +46,7 @@ struct DraftComponent {
   int fsm_step{0};
   int core_step{0};
   bool core_unready{false};  // the new core is put in as it is
-  int configure_step{0};  // the last that configures it anew
+  int configure_step{0};     // the last that configures it anew
   int first_step{0};
 
   const std::string& name() const noexcept { return component->name(); }
