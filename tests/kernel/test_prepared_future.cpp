@@ -110,21 +110,16 @@ class OnThreads {
 
 class InVirtualTime {
  public:
-  explicit InVirtualTime(Architecture& architecture) : architecture_(architecture) {
-    simulation_.add(architecture);
-    simulation_.deploy();
-  }
-  TransactionReport commit(Transaction transaction) {
-    return simulation_.commit(architecture_, std::move(transaction));
-  }
+  explicit InVirtualTime(Architecture& architecture) : host_(simulation_.add(architecture)) { host_.deploy(); }
+  TransactionReport commit(Transaction transaction) { return host_.commit(std::move(transaction)); }
   void run_on(FutureCore& core, int runs) {
     while (core.runs.load() < runs) simulation_.run_until(simulation_.now_ns() + ms_to_ns(1));
   }
   static constexpr bool kPreparesBeside = false;
 
  private:
-  Architecture& architecture_;
   Simulation simulation_;
+  SimulatedHost& host_;
 };
 
 template <typename Host>

@@ -69,10 +69,10 @@ class Rule7Restart : public Simulated {
   /// Replaces the fsm at an instant; the next release comes in the same call.
   StepReport replace(time_ns_t at_ns, std::unique_ptr<FsmBase> fsm) {
     run_to(at_ns);
-    simulation.drain_trace(architecture);
+    host().drain_trace();
     Transaction transaction;
     transaction.replace_fsm("c", std::move(fsm));
-    auto report = simulation.commit(architecture, std::move(transaction));
+    auto report = host().commit(std::move(transaction));
     return report.steps.front();
   }
   Component& component() { return architecture.component("c"); }
@@ -110,7 +110,7 @@ TEST_F(Rule7Restart, AStartOnAClockOfItsOwnIsAsFromAParkAndNeverCountsBelowZero)
   Transaction transaction;
   transaction.stop("c").replace_fsm("c", chain_ms({10}));
   transaction.start("c", simulation.epoch_ns() + ms_to_ns(3));
-  const auto report = simulation.commit(architecture, std::move(transaction));
+  const auto report = host().commit(std::move(transaction));
   EXPECT_EQ(ms_to_ns(153), due_ns());
   EXPECT_EQ(0, report.steps.front().missed_releases) << "153 ms comes before 200 ms, which was pending";
   EXPECT_EQ(ms_to_ns(3), report.steps.front().phase_nominal_ns);
@@ -120,7 +120,7 @@ TEST_F(Rule7Restart, AStopAndAStartInOneTransactionKeepThePendingInstant) {
   run_to(us_to_ns(4'900));
   Transaction transaction;
   transaction.stop("c").start("c");
-  const auto report = simulation.commit(architecture, std::move(transaction));
+  const auto report = host().commit(std::move(transaction));
   EXPECT_EQ(ms_to_ns(5), due_ns());
   EXPECT_EQ(0, report.steps.front().missed_releases);
 }
@@ -143,15 +143,15 @@ TEST_F(Rule7Restart, ThePhaseIsThatOfTheStateWhateverWaitItLeaves) {
     run_to(ms_to_ns(at_ms));
     Transaction transaction;
     transaction.replace_core("c", std::make_unique<TestCore>());
-    const auto report = simulation.commit(architecture, std::move(transaction));
+    const auto report = host().commit(std::move(transaction));
     EXPECT_EQ(0, report.steps.front().phase_nominal_ns) << "at " << at_ms << " ms";
     EXPECT_EQ(0, report.steps.front().missed_releases);
   }
   replace(ms_to_ns(31), std::make_unique<LeadInFsm>());
   EXPECT_EQ(ms_to_ns(40), due_ns());
-  simulation.drain_trace(architecture);
+  host().drain_trace();
   run_to(ms_to_ns(80));
-  const auto releases = records_of(simulation.drain_trace(architecture), TraceKind::release);
+  const auto releases = records_of(host().drain_trace(), TraceKind::release);
   ASSERT_EQ(4U, releases.size());
   const Grid& grid = component().task().grid();
   for (const TraceRecord& release : releases) EXPECT_EQ(0, grid.phase_error(release.a - release.c));

@@ -243,8 +243,8 @@ std::int64_t missed_releases(const Participant& place, time_ns_t release_ns) noe
 std::string why_missed(const Participant& place) {
   const auto in_us = [](time_ns_t duration_ns) { return std::to_string(duration_ns / us_to_ns(1)) + " us"; };
   if (place.start_clock_ns) return "it starts on the clock that was asked for";
-  if (place.afterwards != Afterwards::restart || place.resumes_ns == place.pending_ns)
-    return "it was held past its pending instant";
+  const bool was_to_go_on = place.grid.first_not_before(place.pending_ns) == place.pending_ns;
+  if (place.afterwards != Afterwards::restart || was_to_go_on) return "it was held past its pending instant";
   return "the pending instant, of a period of " + in_us(place.period_ns) +
          ", is none of the new one's: it starts at the first of " + in_us(place.grid.period_ns) + " after it";
 }
