@@ -116,7 +116,7 @@ def _spin(node: Any, stop: threading.Event) -> int:
     from mauve_rt.node.executor_services import is_change  # noqa: PLC0415
     from mauve_rt.node.service_thread import OtherGroupsExecutor, ServiceThreads  # noqa: PLC0415
 
-    requests = ServiceThreads(node, node.control_group, node.watch, is_change=is_change)
+    requests = ServiceThreads(node, node.control_group, node.watch, is_change=is_change, sign=node.sign)
     requests.start()
     executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
     executor.add_node(node)

@@ -114,6 +114,11 @@ class ExecutorNode(LifecycleNode):
         guarded = self.watch.guarded(f"receiving from {topic}", callback)
         return super().create_subscription(msg_type, topic, guarded, *more, **options)
 
+    def sign(self, response: Any) -> None:
+        """Put into a reply who replies, and at which revision, where it has words for that."""
+        if hasattr(response, "instance_id"):
+            response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+
     # ---- transitions
     #
     # What a user can correct (a bad file, rights that are missing) is a FAILURE: everything is as before, and

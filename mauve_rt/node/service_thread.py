@@ -47,17 +47,20 @@ class ServiceThreads:
         watch: Watch,
         *,
         is_change: Callable[[Any], bool],
+        sign: Callable[[Any], None],
         patience_s: float = PATIENCE_S,
     ) -> None:
         """Of the services that the group has now; no executor may serve it (`OtherGroupsExecutor`).
 
-        `is_change(request)` says which requests wait for each other.
+        `is_change(request)` says which requests wait for each other; `sign(response)` puts into a refusal who
+        refuses.
         """
         self._node = node
         self._watch = watch
         self._services = [service for service in node.services if service.callback_group is group]
         self._wakeup = node.create_guard_condition(lambda: None, callback_group=group)
         self._is_change = is_change
+        self._sign = sign
         self._patience_s = patience_s
         self._ending = threading.Event()
         self._baton = threading.Lock()
@@ -90,7 +93,7 @@ class ServiceThreads:
         with self._mutex:
             left = [*self._calls]
         for call in left:
-            call.refuse(Code.NOT_ACTIVE, message)
+            call.refuse(Code.NOT_ACTIVE, message, self._sign)
 
     def _start_thread(self) -> None:
         name = f"requests {len(self._threads) + 1}"
@@ -181,7 +184,7 @@ class ServiceThreads:
             left_s = self._queue[0].since_s + self._patience_s - now_s if self._queue else -1.0
         for call in overdue:
             text = f"another change has been under way for more than {self._patience_s:g} s"
-            call.refuse(Code.TIMEOUT, f"{text}; ask again when it is done (~/events)")
+            call.refuse(Code.TIMEOUT, f"{text}; ask again when it is done (~/events)", self._sign)
             self._node.get_logger().warning(f"a request was refused: {text}")
         return math.ceil(left_s * 1e9) if left_s >= 0 else _FOREVER_NS
 
@@ -203,9 +206,11 @@ class _Call:
         response = self._service.srv_type.Response()
         self._send(self._service.callback(self._request, response))
 
-    def refuse(self, code: Code, message: str) -> None:
+    def refuse(self, code: Code, message: str, sign: Callable[[Any], None]) -> None:
         """Answer it in its handler's place."""
-        self._send(refusing(self._request, self._service.srv_type.Response(), code, message))
+        response = refusing(self._request, self._service.srv_type.Response(), code, message)
+        sign(response)
+        self._send(response)
 
     def _send(self, response: Any) -> None:
         with self._lock:

@@ -95,6 +95,7 @@ def test_the_end_waits_for_no_change(stage: Stage, how: str, core: str) -> None:
     stage.graph.spin_until(change.reply.done, "the answer to who waits for the change")
     reply = change.reply.result()
     assert (reply.success, reply.code in (Code.NOT_ACTIVE, Code.WRONG_REVISION)) == (False, True), reply
+    assert (bool(reply.instance_id), reply.revision > 0) == (True, True)
 
 
 def test_a_stop_calls_off_a_commit_that_waits_for_another_component(stage: Stage) -> None:
