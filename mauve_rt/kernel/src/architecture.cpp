@@ -240,6 +240,10 @@ bool Architecture::next_published(std::string& resource, std::vector<std::byte>&
   return false;
 }
 
+void Architecture::require_ready_cores() const {
+  for (const auto& component : components()) component->require_ready_core();
+}
+
 bool Architecture::configure_hook() {
   try {
     for (const auto& resource : resources_) resource->configure();

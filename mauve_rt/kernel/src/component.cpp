@@ -110,6 +110,23 @@ void Component::set_settings(const TaskSettings& settings) {
     throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
                 {.component = name_, .expected = "period_ns >= 0, max_backlog >= 1, stack_bytes >= 65536"});
   }
+  if (settings.offset_ns < 0 || settings.offset_ns > kLongest) {
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "offset_ns",
+                 .expected = "0 to " + std::to_string(kLongest),
+                 .found = std::to_string(settings.offset_ns),
+                 .remedy = "give the time from the epoch to the first instant"});
+  }
+  for (const int cpu : settings.cpus) {
+    if (cpu >= 0 && cpu < CPU_SETSIZE) continue;
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "cpus",
+                 .expected = "0 to " + std::to_string(CPU_SETSIZE - 1),
+                 .found = std::to_string(cpu),
+                 .remedy = "name CPUs of this machine, or none to allow every one"});
+  }
   if (settings.hung_after_ns < 0) {
     throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
                 {.component = name_,
@@ -191,6 +208,7 @@ void Component::require_parked(const std::string& what) const {
 void Component::cleanup_core() {
   const auto change = join_change();
   require_parked("cleanup_core");
+  binding_ = {};
   parts_.core->cleanup();
 }
 
@@ -212,16 +230,28 @@ void Component::bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& 
         {.component = name_, .element = core.description(), .expected = "a core for " + shell.description()});
   }
   core.set_context(&task_.context());
-  binding = require_binding(core, fsm);
+  CoreBinding bound = require_binding(core, fsm);
   core.configure();
+  binding = std::move(bound);
 }
 
 CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const {
   CoreBinding binding = fsm.bind_core(core);
+  binding.core = &core;
   if (binding.is_bound()) return binding;
   throw Error(
       ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
       {.component = name_, .element = core.description(), .expected = "a core for " + fsm.description()});
+}
+
+void Component::require_ready_core() const {
+  if (!is_configured() || binding_.is_ready()) return;
+  throw Error(ErrorCode::not_configured, "the core is not configured",
+              {.component = name_,
+               .element = parts_.core->description(),
+               .expected = "a core that configure_core() has bound and configured",
+               .found = "one that it has not",
+               .remedy = "call configure_core() first"});
 }
 
 StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts,
@@ -255,13 +285,13 @@ StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
   report.component = place.task->name();
   report.blackout_ns = place.armed_ns - place.parked_ns;
-  if (place.pending_ns == 0 || place.afterwards == Afterwards::stop) return report;
-  const bool released = place.task->wait_release(place, monotonic_now_ns() + phase_timeout_ns);
+  if (!place.is_followed_by_release()) return report;
+  const bool released = place.task->wait_release(place, later_by(monotonic_now_ns(), phase_timeout_ns));
   const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;
   report.phase_nominal_ns = place.grid.phase_error(nominal_ns - place.grid_place_ns);
   if (released)
     report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
-  report.missed_releases = place.lost + missed_releases(place, nominal_ns);
+  report.missed_releases = place.lost + missed_releases(place, nominal_ns - place.shift_ns);
   if (report.missed_releases != 0) report.remark = why_missed(place);
   return report;
 }
@@ -286,7 +316,7 @@ time_ns_t Component::settled_period_ns(const FsmBase& fsm) const {
                  .found = std::to_string(declared),
                  .remedy = "declare a divisor, or change the waits"});
   }
-  if (declared == 0 && found < kShortestUndeclaredPeriod) {
+  if (declared == 0 && found != 0 && found < kShortestUndeclaredPeriod) {
     throw Error(ErrorCode::bad_period, "the fsm's cycles have a very short common period",
                 {.component = name_,
                  .element = "period",
@@ -425,6 +455,7 @@ void Component::cleanup_hook() {
     fallback_.reset();
     fallback_core_->cleanup();
   }
+  binding_ = {};
   parts_.core->cleanup();
   parts_.fsm->cleanup();
   parts_.shell->cleanup();

@@ -111,7 +111,7 @@ void Conductor::withdraw() noexcept {
 
 void conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
   constexpr time_ns_t kLook = ms_to_ns(20);  // only while an adopt or take lasts
-  const time_ns_t until = monotonic_now_ns() + timeout_ns;
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   for (Participant* place : commit.in_order()) {
     if (place->in_flight) place->task->post(*place);
   }

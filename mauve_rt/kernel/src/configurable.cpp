@@ -15,8 +15,8 @@ void Configurable::configure() {
     }
   } catch (const Error&) {
     throw;
-  } catch (const std::exception& failure) {
-    throw Error(ErrorCode::configure_failed, failure.what(), {.element = description()});
+  } catch (...) {
+    throw Error(ErrorCode::configure_failed, caught_text(), {.element = description()});
   }
   configured_ = true;
 }

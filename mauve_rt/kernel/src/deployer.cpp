@@ -74,10 +74,11 @@ void Deployer::deploy() {
     architecture().release_host(*this);
     throw;
   }
-  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it.
-  const auto components = architecture().components();
-  start_all(monotonic_now_ns() + deployment_lead_ns(components.size()));
-  for (const auto& component : components) component->task().wait_started();
+  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it. Each finds its start
+  // waiting when the barrier opens, which one wake-up does for all: none runs while the others' are being posted.
+  start_all(monotonic_now_ns() + kDeploymentLead);
+  barrier_->arrive();
+  for (const auto& component : architecture().components()) component->task().wait_started();
   set_deployed(true);
 }
 
@@ -104,7 +105,6 @@ void Deployer::create_threads() {
     throw;
   }
   prefault_allocated();
-  barrier_->arrive();
 }
 
 void Deployer::shutdown() noexcept {

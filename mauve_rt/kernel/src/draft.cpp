@@ -108,6 +108,7 @@ Resource& Draft::resource(const std::string& name) {
 }
 
 DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
+  check_name("component", name);
   if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
     throw_taken("component", name);
   DraftComponent added;
@@ -136,6 +137,7 @@ void Draft::remove_component(const std::string& name) {
 }
 
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
+  check_name("resource", name);
   if (find_resource(name) != nullptr) throw_taken("resource", name);
   resource->set_name(name);
   architecture_.prepare_outward(*resource, topic);
@@ -210,6 +212,19 @@ void Draft::set_property(DraftComponent& component, const std::string& name, con
                                           DraftProperty{.value = property.checked(value), .step = step_});
   } catch (const Error& failure) {
     rethrow_as_of(failure, component.name(), step_);
+  }
+}
+
+void Draft::resynchronise() {
+  if (!deployed_) {
+    throw Error(ErrorCode::not_configured, "the architecture is not deployed",
+                {.remedy = "deploy it: that gives all components one epoch"});
+  }
+  resynchronise_step_ = step_;
+  for (const auto& component : architecture_.components()) {
+    const ComponentState state = component->task().state();
+    const bool can_take_part = state != ComponentState::faulted && state != ComponentState::unconfigured;
+    if (can_take_part && !is_removed(component->name())) touch(component->name());
   }
 }
 

@@ -114,6 +114,11 @@ class Draft {
   void disconnect(DraftComponent& component, const std::string& port);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
 
+  /// Touches all that can take a new epoch. Throws Error: not_configured when nothing is deployed.
+  void resynchronise();
+  /// The step that did; 0: none.
+  int resynchronise_step() const noexcept { return resynchronise_step_; }
+
   /// Checks what only the whole shows: faults repaired, kept connections of new shells, structural properties, ports that must
   /// lead somewhere, ports per service. Throws Error with the step.
   void finish() const;
@@ -133,12 +138,14 @@ class Draft {
   void check_kept_wires(const DraftComponent& component) const;
   static void check_structural(const DraftComponent& component);
   static void check_repaired(const DraftComponent& component);
+  static void check_core(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;
   void check_port_counts() const;
 
   Architecture& architecture_;
   bool deployed_;
   int step_{0};
+  int resynchronise_step_{0};
   std::list<DraftComponent> components_;
   std::map<std::string, DraftComponent*> by_name_;  // of components_
   std::list<DraftComponent> removed_components_;    // those that were there before

@@ -26,6 +26,7 @@ void Draft::finish() const {
                    .remedy = "configure it first, or replace it by a replace_core step",
                    .step = component.core_step});
     }
+    if (component.runs && !component.ran) check_core(component);
   }
   check_port_counts();
 }
@@ -65,6 +66,16 @@ void Draft::check_structural(const DraftComponent& component) {
     } catch (const Error& failure) {
       rethrow_as_of(failure, component.name(), property.step);
     }
+  }
+}
+
+/// A core that is put in is configured by then.
+void Draft::check_core(const DraftComponent& component) {
+  if (component.is_added || component.core_step != 0) return;
+  try {
+    component.component->require_ready_core();
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), component.first_step);
   }
 }
 

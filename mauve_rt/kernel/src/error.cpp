@@ -99,4 +99,14 @@ std::string_view to_string(ErrorCode code) noexcept {
 Error::Error(ErrorCode code, const std::string& what, ErrorDetail detail)
     : std::runtime_error(one_line(what, detail)), code_(code), statement_(what), detail_(std::move(detail)) {}
 
+std::string caught_text() {
+  try {
+    throw;
+  } catch (const std::exception& failure) {
+    return failure.what();
+  } catch (...) {
+    return "an exception that is no std::exception";
+  }
+}
+
 }  // namespace mauve

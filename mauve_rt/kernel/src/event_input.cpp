@@ -9,7 +9,7 @@ void EventInput::on_event(time_ns_t time_ns) noexcept {
   time_ns_t none = kNone;
   // acq_rel: the first event's time stays until it is consumed
   time_.compare_exchange_strong(none, time_ns, std::memory_order_acq_rel);
-  task_->signal_event();
+  task_.load(std::memory_order_relaxed)->signal_event();
 }
 
 std::optional<time_ns_t> EventInput::consume() noexcept {

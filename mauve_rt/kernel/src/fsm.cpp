@@ -7,14 +7,21 @@
 
 #include "mauve_rt/error.hpp"
 
+#include "names.hpp"
+
 namespace mauve {
 
 namespace {
 
 constexpr const char* kDeclareRemedy = "declare it in define()";
 
+bool is_endless(const State& state) noexcept {
+  return state.is_wait && state.event == nullptr && state.duration_ns == kForever;
+}
+
 std::vector<const State*> successors(const State& state) {
   std::vector<const State*> all;
+  if (is_endless(state)) return all;  // nothing comes after it
   all.reserve(state.transitions.size() + 1);
   for (const Transition& transition : state.transitions) all.push_back(transition.to);
   all.push_back(state.next);
@@ -59,13 +66,18 @@ class CycleLengths {
       for (const State* next : successors(*state)) {
         const Node& to = nodes_.at(next);
         if (to.component != node.component) continue;
-        gcd = std::gcd(gcd, node.potential_ns + state->duration_ns - to.potential_ns);
+        gcd = std::gcd(gcd, node.potential_ns + length_of(*state) - to.potential_ns);
       }
     }
     return gcd;
   }
 
  private:
+  /// An event wait has none that a period could be made of.
+  static time_ns_t length_of(const State& state) noexcept {
+    return state.event != nullptr ? 0 : state.duration_ns;
+  }
+
   struct Node {
     time_ns_t potential_ns;
     int index;
@@ -80,7 +92,7 @@ class CycleLengths {
     for (const State* next : successors(state)) {
       const auto known = nodes_.find(next);
       if (known == nodes_.end()) {
-        visit(*next, potential_ns + state.duration_ns);
+        visit(*next, potential_ns + length_of(state));
         nodes_[&state].low = std::min(nodes_[&state].low, nodes_[next].low);
       } else if (known->second.component < 0) {
         nodes_[&state].low = std::min(nodes_[&state].low, known->second.index);
@@ -99,6 +111,23 @@ class CycleLengths {
   std::vector<const State*> stack_;
 };
 
+/// All waits together bound the length of every path, so that sums of them do not overflow.
+void check_lengths(const std::vector<const State*>& reachable) {
+  time_ns_t all = 0;
+  const State* longest = nullptr;
+  for (const State* state : reachable) {
+    if (!state->is_wait || state->duration_ns == kForever) continue;
+    all = later_by(all, state->duration_ns);
+    if (longest == nullptr || longest->duration_ns < state->duration_ns) longest = state;
+  }
+  if (all <= kLongest) return;
+  throw Error(ErrorCode::bad_fsm, "the waits are too long",
+              {.element = "state " + longest->name,
+               .expected = "at most " + std::to_string(kLongest) + " ns, all waits together",
+               .found = std::to_string(longest->duration_ns) + " ns in this one",
+               .remedy = "wait for kForever where only a stop is to end the wait"});
+}
+
 }  // namespace
 
 time_ns_t cycle_gcd_ns(const State& initial) {
@@ -112,10 +141,12 @@ time_ns_t cycle_gcd_ns(const State& initial) {
   for (const State* state : reachable) {
     if (!state->is_wait && !loops.visited(*state)) loops.search(*state);
   }
+  check_lengths(reachable);
   return CycleLengths().gcd_from(initial);
 }
 
 State& FsmBase::add_state(std::string name) {
+  check_name("state", name);
   for (const auto& state : states_) {
     if (state->name == name) {
       throw Error(ErrorCode::duplicate_name, "the state is declared twice", {.element = "state " + name});
@@ -195,7 +226,14 @@ bool FsmBase::configure_hook() {
                 {.element = description(), .expected = "set_initial(state)", .remedy = kDeclareRemedy});
   }
   for (const auto& state : states_) {
-    if (state->next == nullptr) {
+    if (is_endless(*state) && !state->transitions.empty()) {
+      throw Error(ErrorCode::bad_fsm, "a guard would never be asked",
+                  {.element = "state " + state->name,
+                   .expected = "no transition from a wait that only a stop ends",
+                   .found = "a transition to " + state->transitions.front().to->name,
+                   .remedy = "give the wait a length, or leave the transition out"});
+    }
+    if (state->next == nullptr && !is_endless(*state)) {
       throw Error(
           ErrorCode::bad_fsm, "the state leads nowhere when no guard holds",
           {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});

@@ -20,7 +20,7 @@ void Host::require_deployable() const {
     throw Error(ErrorCode::already_running, "the architecture is deployed already",
                 {.remedy = "shut it down first, to deploy it anew"});
   }
-  if (architecture_.is_configured()) return;
+  if (architecture_.is_configured()) return architecture_.require_ready_cores();
   throw Error(ErrorCode::not_configured, "the architecture is not configured",
               {.remedy = "call configure() first"});
 }

@@ -7,6 +7,10 @@
 
 namespace mauve {
 
+/// What components, resources, ports, properties and states may be called, in files and in code alike: letters, digits and
+/// single underscores, a letter first, at most 100 characters. [non-rt] Throws Error (invalid_argument) naming `what`.
+void check_name(const std::string& what, const std::string& name);
+
 /// The names of items, of what they point to, or that they are: what an error message offers instead. [non-rt]
 template <typename Items>
 std::vector<std::string> names_of(const Items& items) {

@@ -66,9 +66,10 @@ void PartsChange::prepare() {
   if (unready_) return;
   try {
     prepare_parts();
-  } catch (const std::exception& failure) {
+  } catch (...) {
+    const std::string failure = caught_text();
     retire();
-    throw Error(ErrorCode::prepare_failed, failure.what(),
+    throw Error(ErrorCode::prepare_failed, failure,
                 {.component = component_.name(), .element = what_, .remedy = "the old parts go on"});
   }
 }

@@ -31,6 +31,23 @@ void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry
   throw Error(ErrorCode::duplicate_name, "the plug-in is registered twice", {.element = shown});
 }
 
+/// Makes a part by what its package registered, whatever that throws.
+template <typename Make>
+auto made(const std::string& what, Make&& make) -> decltype(make()) {
+  const auto failed = [&what](const std::string& reason) {
+    return Error(ErrorCode::plugin, "the plug-in cannot be made: " + reason,
+                 {.element = what, .remedy = "mend its constructor, or what it needs"});
+  };
+  try {
+    if (auto part = make()) return part;
+  } catch (const Error&) {
+    throw;
+  } catch (...) {
+    throw failed(caught_text());
+  }
+  throw failed("its factory made nothing");
+}
+
 EventMessage event_message(const std::string& type) {
   for (const EventMessage said : {EventMessage::empty, EventMessage::truth, EventMessage::count}) {
     if (type == type_of(said)) return said;
@@ -62,7 +79,14 @@ void PluginRegistry::load_library(const std::string& path) {
     throw Error(ErrorCode::plugin, "the library registers no plug-ins",
                 {.element = path, .expected = "a MAUVE_PLUGINS(registry) function", .found = "none"});
   }
-  register_plugins(*this);
+  try {
+    register_plugins(*this);
+  } catch (const Error&) {
+    throw;
+  } catch (...) {
+    throw Error(ErrorCode::plugin, "the library cannot register its plug-ins: " + caught_text(),
+                {.element = path});
+  }
   libraries_.insert(path);
 }
 
@@ -83,17 +107,17 @@ void PluginRegistry::add_resource(const std::string& kind, const std::string& ty
 }
 
 std::unique_ptr<Shell> PluginRegistry::make_shell(const std::string& name) const {
-  auto shell = require_entry(shells_, name, ErrorCode::unknown_shell, "shell").make();
+  auto shell = made("shell " + name, require_entry(shells_, name, ErrorCode::unknown_shell, "shell").make);
   shell->set_implementation(name);
   return shell;
 }
 std::unique_ptr<CoreBase> PluginRegistry::make_core(const std::string& name) const {
-  auto core = require_entry(cores_, name, ErrorCode::unknown_core, "core").make();
+  auto core = made("core " + name, require_entry(cores_, name, ErrorCode::unknown_core, "core").make);
   core->set_implementation(name);
   return core;
 }
 std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const {
-  auto fsm = require_entry(fsms_, name, ErrorCode::unknown_fsm, "fsm").make();
+  auto fsm = made("fsm " + name, require_entry(fsms_, name, ErrorCode::unknown_fsm, "fsm").make);
   fsm->set_implementation(name);
   return fsm;
 }
@@ -101,7 +125,7 @@ std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,
                                                         const ResourceParameters& parameters) const {
   if (const auto found = resources_.find({kind, type}); found != resources_.end())
-    return found->second(parameters);
+    return made(kind + " " + type, [&] { return found->second(parameters); });
   if (kind == "event") return std::make_unique<EventCounter>(event_message(type));
   if (kind == "latest_value" && resources_.contains({"shared_data", type})) {
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",

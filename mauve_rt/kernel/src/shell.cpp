@@ -3,6 +3,8 @@
 
 #include "mauve_rt/error.hpp"
 
+#include "names.hpp"
+
 namespace mauve {
 
 namespace {
@@ -42,6 +44,7 @@ std::size_t stack_bytes_for(const LargestMessage& largest) noexcept {
 }
 
 void Shell::check_new(const std::string& name) const {
+  check_name("port or property", name);
   if (find_port(name) != nullptr || find_property(name) != nullptr) {
     throw Error(ErrorCode::duplicate_name, "the shell declares the name twice",
                 {.element = name, .remedy = "give ports and properties names of their own"});

@@ -72,9 +72,8 @@ SimulatedHost& Simulation::add(Architecture& architecture) {
 
 void Simulation::deploy() {
   if (epoch_ns_ != 0) throw Error(ErrorCode::already_running, "the simulation is deployed already");
-  std::size_t components = 0;
-  for (const Processor* processor : processors_) components += processor->architecture->components().size();
-  epoch_ns_ = now_ns_ + deployment_lead_ns(components);
+  for (const Processor* processor : processors_) processor->architecture->require_ready_cores();
+  epoch_ns_ = now_ns_ + kDeploymentLead;
   for (const auto& host : hosts_) {
     if (std::find(processors_.begin(), processors_.end(), &host->processor_) != processors_.end())
       host->begin(epoch_ns_);
@@ -99,24 +98,9 @@ void Simulation::every(time_ns_t first_ns, time_ns_t period_ns, Callback callbac
 }
 
 Simulation::Next Simulation::next_of(Processor& processor) {
-  const std::uint64_t revision = processor.architecture->revision();
-  if (processor.seen_lists != revision) {
-    processor.components = processor.architecture->components();
-    processor.seen_lists = revision;
-  }
-  const time_ns_t now = processor.clock.now_ns();
-  Next next;
-  const auto rank = [](time_ns_t begin, const Task& task) {
-    return std::pair(begin, -task.settings().priority);
-  };
-  for (const auto& component : processor.components) {
-    Task& task = component->task();
-    if (task.due_ns() == kForever) continue;
-    const time_ns_t begin = std::max(task.due_ns(), now);
-    if (next.task == nullptr || rank(begin, task) < rank(next.begin_ns, *next.task))
-      next = {begin, &processor, &task};
-  }
-  return next;
+  Task* const task = processor.clock.next();
+  if (task == nullptr) return {};
+  return {std::max(task->due_ns(), processor.clock.now_ns()), &processor, task};
 }
 
 void Simulation::run_until(time_ns_t instant_ns) {
@@ -177,7 +161,6 @@ void SimulatedHost::join() {
   }
   architecture().set_host(*this);
   processor_.clock.advance_to(simulation_.now_ns_);
-  processor_.seen_lists = 0;
   simulation_.processors_.push_back(&processor_);
 }
 
@@ -186,7 +169,7 @@ void SimulatedHost::deploy() {
   if (architecture().host() != this) join();  // it was shut down
   require_deployable();
   if (simulation_.epoch_ns_ == 0) return simulation_.deploy();
-  begin(simulation_.now_ns_ + deployment_lead_ns(architecture().components().size()));
+  begin(simulation_.now_ns_ + kDeploymentLead);
 }
 
 void SimulatedHost::begin(time_ns_t epoch_ns) {
@@ -204,13 +187,11 @@ void SimulatedHost::shutdown() noexcept {
   set_deployed(false);
   stop_all(0);
   for (const auto& component : architecture().components()) component->task().end_simulation();
-  processor_.components.clear();
   architecture().release_host(*this);
 }
 
 const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
-  static const RealtimeStatus none{.granted = false,
-                                   .missing = {"simulated time: nothing ran in real time"}};
+  static const RealtimeStatus none{.granted = false, .missing = {"simulated time: nothing ran in real time"}};
   return none;
 }
 

@@ -67,16 +67,16 @@ void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time
   shell_ = &shell;
   fsm_ = &fsm;
   core_ = core;
-  if (grid_.period_ns != period_ns)
-    grid_.period_ns = period_ns;  // who reports an earlier commit may be reading it
+  period_ns_.store(period_ns, std::memory_order_relaxed);
   context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
   // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
   wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
 }
 
 time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
-  grid_ = {.reference_ns = epoch_ns + settings_.offset_ns, .period_ns = grid_.period_ns};
-  return grid_.reference_ns;
+  const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
+  reference_ns_.store(first_ns, std::memory_order_relaxed);
+  return first_ns;
 }
 
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
@@ -143,7 +143,7 @@ void Task::begin_trace(bool trace) {
     ring_.reset();
   } else if (ring_ == nullptr) {
     const std::size_t wanted = settings_.trace_records;
-    ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid_.period_ns));
+    ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid().period_ns));
   }
   if (ring_ != nullptr) ring_->set_clock(simulated_ ? clock_ : nullptr);
 }
@@ -156,6 +156,7 @@ void Task::simulate(const Clock& clock, bool trace) {
 
 void Task::end_simulation() noexcept {
   if (!simulated_) return;
+  clock_->leave(*this);
   simulated_ = false;
   clock_ = &MonotonicClock::instance();
   if (ring_ != nullptr) ring_->set_clock(nullptr);
@@ -186,6 +187,7 @@ void Task::start_at(time_ns_t instant_ns) {
 
 void Task::post_start(time_ns_t instant_ns) noexcept {
   start_at_ns_ = instant_ns;
+  started_.store(0, std::memory_order_relaxed);  // relaxed: kStart publishes it
   {
     const std::lock_guard lock(order_mutex_);
     // A stop bit that came too late for the last run must not end this one: store, not or.
@@ -196,7 +198,14 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
 }
 
 void Task::start(std::optional<time_ns_t> clock_ns) {
+  if (is_called_from_own_state()) require_startable();  // refused without the lock, as in stop()
   const std::lock_guard lock(command_mutex_);
+  require_startable();
+  post_start(next_instant(clock_ns));
+  wait_started();
+}
+
+void Task::require_startable() const {
   switch (state()) {
     case ComponentState::stopped:
       break;
@@ -210,23 +219,30 @@ void Task::start(std::optional<time_ns_t> clock_ns) {
       throw Error(ErrorCode::already_running, "the component is running already",
                   {.component = name_, .expected = "STOPPED", .found = std::string(to_string(state()))});
   }
+  if (!core_->is_ready()) {
+    throw Error(ErrorCode::not_configured, "the core is not configured",
+                {.component = name_,
+                 .element = core_->core != nullptr ? core_->core->description() : "core",
+                 .expected = "a core that configure_core() has bound and configured",
+                 .remedy = "call configure_core() first"});
+  }
   if (!has_thread_ && !simulated_) {
     throw Error(ErrorCode::not_configured, "the component has no thread",
                 {.component = name_, .remedy = "deploy the architecture first"});
   }
-  post_start(next_instant(clock_ns));
-  wait_started();
 }
 
 time_ns_t Task::next_instant(std::optional<time_ns_t> reference_ns) const noexcept {
-  const Grid grid{.reference_ns = reference_ns.value_or(grid_.reference_ns), .period_ns = grid_.period_ns};
-  return grid.first_not_before(clock_->now_ns() + kStartMargin + 1);
+  const Grid own = grid();
+  const Grid wanted{.reference_ns = reference_ns.value_or(own.reference_ns), .period_ns = own.period_ns};
+  const time_ns_t earliest = clock_->now_ns() + kStartMargin + 1;
+  return wanted.first_not_before(std::max(earliest, wanted.reference_ns));
 }
 
 void Task::wait_started() noexcept {
-  // The thread itself says RUNNING; until then another command would find STOPPED.
-  constexpr auto kStopped = static_cast<std::uint32_t>(ComponentState::stopped);
-  while (state_.load(std::memory_order_acquire) == kStopped) futex_wait_until(state_, kStopped, kForever);
+  // The thread itself says RUNNING; until then another command would find STOPPED. By a word of its own: a stop may
+  // have come since, and the state be STOPPED again.
+  while (started_.load(std::memory_order_acquire) == 0) futex_wait_until(started_, 0, kForever);
 }
 
 void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
@@ -259,10 +275,16 @@ void Task::order_stop() {
   control_.fetch_or(kStop, std::memory_order_seq_cst);  // seq_cst: before the look for a commit
 }
 
+bool Task::is_called_from_own_state() const noexcept {
+  return of_this_thread() == this || (simulated_ && in_resume_);
+}
+
 void Task::stop(time_ns_t timeout_ns) {
-  const time_ns_t until = monotonic_now_ns() + timeout_ns;
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   order_stop();
   changes_.bump();
+  if (is_called_from_own_state())
+    return;  // it takes effect when the state ends, for which nobody can wait here
   withdraw_commit();
   if (simulated_) resume();
   futex_wake_all(control_);

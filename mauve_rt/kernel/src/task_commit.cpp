@@ -41,7 +41,7 @@ time_ns_t Task::leaves_gate_at(const Participant& place) const noexcept {
   if (due == kForever) return kForever;
   const Commit& commit = *place.commit;
   const time_ns_t needed = deferrals_ < kTries ? commit.budget_ns() : commit.declared_ns();
-  return due + commit.may_miss(place) * grid_.period_ns - needed;
+  return due + commit.may_miss(place) * grid().period_ns - needed;
 }
 
 bool Task::may_commit_now() noexcept {
@@ -82,7 +82,7 @@ void Task::visit(Participant& place) noexcept {
   place.parked_ns = clock_->now_ns();
   place.pending_ns = due;
   place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
-  place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid_.period_ns;
+  place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid().period_ns;
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
   begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
@@ -109,7 +109,7 @@ void Task::visit(Participant& place) noexcept {
 /// Instants that passed at the gate, or in adopt and take, are skipped whatever the overrun policy; returns how many.
 /// One that it was not to miss, and that has passed by less than a period, is released late as after any wait.
 std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
-  const time_ns_t period = grid_.period_ns;
+  const time_ns_t period = grid().period_ns;
   const time_ns_t late = now_ns - clock_ns();
   if (!event_settled_ || period == 0 || late <= 0 || place.parked_ns > clock_ns()) return 0;
   if (late < period && place.holds_until_ns == place.pending_ns) return 0;
@@ -133,7 +133,7 @@ time_ns_t Task::restart_instant(const Participant& place) const noexcept {
   if (place.start_clock_ns) return next_instant(place.start_clock_ns);
   const time_ns_t earliest =
       event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
-  return grid_.period_ns == 0 ? earliest : grid_.first_not_before(earliest);
+  return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
 }
 
 void Task::continue_after(Participant& place) noexcept {
@@ -146,9 +146,13 @@ void Task::continue_after(Participant& place) noexcept {
     if (commit.committed()) trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
   }
   const bool committed = commit.committed();
+  if (committed && place.epoch_ns != nullptr) {
+    place.shift_ns = resynchronise(*place.epoch_ns);
+    if (place.afterwards == Afterwards::go_on) trace_deployment();
+  }
   if (committed && place.afterwards != Afterwards::stop) {
     if (place.afterwards == Afterwards::restart) start_machine(restart_instant(place));
-    place.grid = grid_;
+    place.grid = grid();
     place.grid_place_ns = grid_place_ns_;
     if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
       earlier->released.store(Participant::kSuperseded, std::memory_order_release);
@@ -171,10 +175,26 @@ void Task::hold_parked(Participant& place) const noexcept {
 void Task::finish_parked(Participant& place, bool committed) noexcept {
   if (place.in_flight) {
     continue_after(place);
-  } else if (committed && place.afterwards == Afterwards::restart) {
+    return clock_->due_changed(*this);
+  }
+  if (committed && place.epoch_ns != nullptr) join(*place.epoch_ns);
+  if (committed && place.afterwards == Afterwards::restart) {
     post_start(next_instant(place.start_clock_ns));
     wait_started();
   }
+}
+
+/// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
+/// instants come closer together. Returns by how much: less than a period.
+time_ns_t Task::resynchronise(time_ns_t epoch_ns) noexcept {
+  join(epoch_ns);
+  const Grid now = grid();
+  if (now.period_ns == 0 || clock_ns() == kForever) return 0;
+  const time_ns_t initial_ns =
+      clock_ns() - grid_place_ns_;  // the initial state is entered there, or whole periods off
+  const time_ns_t shift = now.first_not_before(initial_ns) - initial_ns;
+  set_clock_ns(clock_ns() + shift);
+  return shift;
 }
 
 void Task::refuse_commit() noexcept {

@@ -20,33 +20,45 @@ struct OverBound {
 }  // namespace
 
 void Task::resume() noexcept {
+  if (in_resume_) return;  // in virtual time a state may stop its own component, or raise an event for it
+  in_resume_ = true;
+  const auto held_before = PiMutex::held_by_this_thread();
+  PiMutex::was_misused_by_this_thread();  // what others did on a simulation's thread is not this component's
   try {
-    if (waiting_ == nullptr) return take_up_start();
-    const std::uint32_t control = control_.load(std::memory_order_acquire);
-    if ((control & kStop) != 0) return park_stopped();
-    if ((control & kCommit) != 0 && may_commit_now()) {
-      come_to_commit();
-      if (std::exchange(is_abandoned_, false)) return park_condemned();
-      if (waiting_ == nullptr) return;
-      tell_wait();
-    }
-    if (!event_settled_ && (control & kEvent) != 0) settle_event();
-    const time_ns_t now = clock_->now_ns();
-    if (now < due_ns()) return;
-    release(now);
-    run_to_next_wait();
+    step();
   } catch (const OverBound& failure) {
     park_faulted(nullptr, failure.bound_ns);
   } catch (const std::exception& failure) {
+    PiMutex::let_go_of_all_but(held_before);
     park_faulted(failure.what());
   } catch (...) {
+    PiMutex::let_go_of_all_but(held_before);
     park_faulted("an exception that is no std::exception");
   }
+  in_resume_ = false;
+  if (simulated_) clock_->due_changed(*this);
+}
+
+void Task::step() {
+  if (waiting_ == nullptr) return take_up_start();
+  const std::uint32_t control = control_.load(std::memory_order_acquire);
+  if ((control & kStop) != 0) return park_stopped();
+  if ((control & kCommit) != 0 && may_commit_now()) {
+    come_to_commit();
+    if (std::exchange(is_abandoned_, false)) return park_condemned();
+    if (waiting_ == nullptr) return;
+    tell_wait();
+  }
+  if (!event_settled_ && (control & kEvent) != 0) settle_event();
+  const time_ns_t now = clock_->now_ns();
+  if (now < due_ns()) return;
+  release(now);
+  run_to_next_wait();
 }
 
 time_ns_t Task::due_ns() const noexcept {
   if (waiting_ == nullptr) return kForever;
-  return event_settled_ ? clock_ns() : wait_from_ns_ + waiting_->duration_ns;
+  return event_settled_ ? clock_ns() : later_by(wait_from_ns_, waiting_->duration_ns);
 }
 
 void Task::take_up_start() noexcept {
@@ -57,6 +69,8 @@ void Task::take_up_start() noexcept {
   if (!simulated_) counters_.mark();
   regain_priority();
   start_machine(start_at_ns_);
+  started_.store(1, std::memory_order_release);
+  futex_wake_all(started_);
 }
 
 void Task::start_machine(time_ns_t instant_ns) noexcept {
@@ -69,9 +83,13 @@ void Task::start_machine(time_ns_t instant_ns) noexcept {
   tell_wait();
   parked_.store(0, std::memory_order_release);
   publish_state(ComponentState::running);
-  trace(TraceKind::deployment, 0, grid_.reference_ns - settings_.offset_ns, settings_.offset_ns,
-        grid_.period_ns);
+  trace_deployment();
   trace(TraceKind::start, 0, instant_ns);
+}
+
+void Task::trace_deployment() noexcept {
+  const Grid now = grid();
+  trace(TraceKind::deployment, 0, now.reference_ns - settings_.offset_ns, settings_.offset_ns, now.period_ns);
 }
 
 void Task::release(time_ns_t actual_ns) noexcept {
@@ -94,7 +112,7 @@ void Task::release(time_ns_t actual_ns) noexcept {
 
 void Task::run_to_next_wait() {
   const State* const initial = &fsm_->initial();
-  const State* state = next_;
+  const State* state = next_ != nullptr ? next_ : leave_wait();
   for (;;) {
     if ((control_.load(std::memory_order_acquire) & kStop) != 0) return park_stopped();
     if (state == initial) context_.instant_ns.store(clock_ns(), std::memory_order_relaxed);
@@ -113,32 +131,54 @@ const State* Task::execute(const State& state) {
   const auto& methods = fsm_->methods();
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
   methods[state.action].run(*core_);
-  const State* next = state.next;
-  for (const Transition& transition : state.transitions) {
-    if (methods[transition.guard].test(*core_)) {
-      next = transition.to;
-      break;
-    }
-  }
+  const State* next = successor(state);
   clock_->spend(state.simulated_ns());
   boundary_ns_ = clock_->now_ns();
   const bool was_condemned = state.max_execution_ns != 0 && !end_execution();
   trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
   state.execution_time->record(boundary_ns_ - began);
-  if (PiMutex::held_by_this_thread() > held_before)
-    throw std::logic_error("a lock is still held at the end of the state");
+  check_locks(held_before);
   if (was_condemned) return nullptr;
   if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
     throw OverBound{state.max_execution_ns};
   return next;
 }
 
+/// Where the state leads: where its first transition does whose guard holds.
+const State* Task::successor(const State& state) const {
+  const auto& methods = fsm_->methods();
+  for (const Transition& transition : state.transitions) {
+    if (methods[transition.guard].test(*core_)) return transition.to;
+  }
+  return state.next;
+}
+
+/// The wait is over: now its guards are asked.
+const State* Task::leave_wait() {
+  if (waiting_->transitions.empty()) return waiting_->next;
+  present_.tell({.since_ns = boundary_ns_, .name = waiting_->trace_id});
+  const auto held_before = PiMutex::held_by_this_thread();
+  const State* next = successor(*waiting_);
+  check_locks(held_before);
+  boundary_ns_ = clock_->now_ns();
+  return next;
+}
+
+/// A component that waits holds no lock, and none was taken twice on the way. Lets go of the lock first: others may wait.
+void Task::check_locks(int held_before) {
+  if (PiMutex::was_misused_by_this_thread())
+    throw std::logic_error("a lock was taken twice by its holder, or let go by who did not hold it");
+  if (PiMutex::held_by_this_thread() <= held_before) return;
+  PiMutex::let_go_of_all_but(held_before);
+  throw std::logic_error("a lock is still held at the end of the state");
+}
+
 void Task::enter_wait(const State& state) {
   waiting_ = &state;
-  next_ = state.next;
+  next_ = nullptr;
   if (state.event == nullptr) {
-    set_clock_ns(clock_ns() + state.duration_ns);
-    if (const time_ns_t period = grid_.period_ns; period != 0) {
+    set_clock_ns(later_by(clock_ns(), state.duration_ns));
+    if (const time_ns_t period = grid().period_ns; period != 0) {
       grid_place_ns_ += state.duration_ns % period;
       if (grid_place_ns_ >= period) grid_place_ns_ -= period;
     }
@@ -176,7 +216,9 @@ void Task::settle_event() noexcept {
 void Task::signal_event() noexcept {
   const std::uint32_t before = control_.fetch_or(kEvent, std::memory_order_acq_rel);
   if (simulated_) {
-    if (waiting_ != nullptr && !event_settled_) settle_event();
+    if (waiting_ == nullptr || event_settled_) return;
+    settle_event();
+    clock_->due_changed(*this);
   } else if ((before & kEvent) == 0) {
     futex_wake_all(control_);
     if (place_.is_lent()) place_.use([](Participant& place) { place.commit->poke(); });
@@ -203,7 +245,7 @@ void Task::signal_awaited() noexcept {
 
 void Task::handle_overrun(const State& state, time_ns_t now_ns) {
   const time_ns_t missed = clock_ns();
-  const time_ns_t period = grid_.period_ns;
+  const time_ns_t period = grid().period_ns;
   statistics_.overruns.fetch_add(1, std::memory_order_relaxed);
   std::int64_t skipped = 0;
   if (settings_.overrun == OverrunPolicy::skip) {

@@ -15,10 +15,10 @@ time_ns_t read_clock(clockid_t clock) noexcept {
   return s_to_ns(now.tv_sec) + now.tv_nsec;
 }
 
-/// k * period at or below the distance, for negative distances too.
-time_ns_t floor_to_period(time_ns_t distance, time_ns_t period) noexcept {
-  const time_ns_t remainder = distance % period;
-  return distance - (remainder < 0 ? remainder + period : remainder);
+/// The way from one instant to the next that is whole periods away from another: 0 to period - 1, whatever the instants.
+time_ns_t to_grid(time_ns_t from, time_ns_t reference, time_ns_t period) noexcept {
+  const time_ns_t way = reference % period - from % period;  // within 2 periods
+  return (way % period + period) % period;
 }
 
 }  // namespace
@@ -44,13 +44,12 @@ const MonotonicClock& MonotonicClock::instance() noexcept {
 
 time_ns_t Grid::first_not_before(time_ns_t earliest_ns) const noexcept {
   if (period_ns <= 0) return earliest_ns > reference_ns ? earliest_ns : reference_ns;
-  return reference_ns + floor_to_period(earliest_ns - reference_ns + period_ns - 1, period_ns);
+  return later_by(earliest_ns, to_grid(earliest_ns, reference_ns, period_ns));
 }
 
 time_ns_t Grid::phase_error(time_ns_t instant_ns) const noexcept {
   if (period_ns <= 0) return 0;
-  const time_ns_t distance = instant_ns - reference_ns;
-  const time_ns_t after = distance - floor_to_period(distance, period_ns);
+  const time_ns_t after = to_grid(reference_ns, instant_ns, period_ns);
   return after > period_ns / 2 ? after - period_ns : after;
 }
 

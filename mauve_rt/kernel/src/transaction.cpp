@@ -186,4 +186,8 @@ Transaction& Transaction::configure(const std::string& component) {
       step(std::move(text), component, [component](Draft& draft) { put_configure(draft, component); }));
 }
 
+Transaction& Transaction::resynchronise() {
+  return add(step("resynchronise", {}, [](Draft& draft) { draft.resynchronise(); }));
+}
+
 }  // namespace mauve

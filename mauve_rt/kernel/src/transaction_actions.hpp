@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "mauve_rt/component.hpp"
+#include "mauve_rt/architecture.hpp"
 
 namespace mauve {
 
@@ -37,6 +37,24 @@ class StateGuard final : public CommitAction {
   };
   std::vector<Found> found_;
   const Task* changed_{nullptr};
+};
+
+/// Gives the architecture a new epoch; the participants take it as they go on.
+class NewEpoch final : public CommitAction {
+ public:
+  NewEpoch(Architecture& architecture, const Clock& clock) : architecture_(architecture), clock_(clock) {}
+  void take() noexcept override {
+    epoch_ns_ = clock_.now_ns() + kDeploymentLead;
+    architecture_.set_deployment_epoch(epoch_ns_);
+  }
+  time_ns_t budget_ns() const noexcept override { return us_to_ns(1); }
+  /// Where participants find it, once it was taken.
+  const time_ns_t& epoch_ns() const noexcept { return epoch_ns_; }
+
+ private:
+  Architecture& architecture_;
+  const Clock& clock_;
+  time_ns_t epoch_ns_{0};
 };
 
 /// Exchanges a port's connection for one made ready.

@@ -76,6 +76,7 @@ Action& TransactionCommit::Work::keep(const Component& component, std::unique_pt
 }
 
 void TransactionCommit::Work::prepare() {
+  if (draft_->resynchronise_step() != 0) prepare_epoch();
   for (DraftResource& resource : draft_->resources())
     at_step(resource.added_step, [&] { prepare_resource(resource); });
   for (DraftComponent& component : draft_->removed_components())
@@ -118,7 +119,13 @@ void TransactionCommit::Work::prepare_added(DraftComponent& added) {
   Task& task = component.task();
   task.join(architecture_.deployment_epoch_ns());
   host_->attach(task);
-  if (added.runs) changes_.push_back({.draft = &added});
+  if (added.runs || new_epoch_ != nullptr) changes_.push_back({.draft = &added});
+}
+
+void TransactionCommit::Work::prepare_epoch() {
+  auto epoch = std::make_unique<NewEpoch>(architecture_, host_->clock());
+  new_epoch_ = epoch.get();
+  actions_.push_back(std::move(epoch));
 }
 
 void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {

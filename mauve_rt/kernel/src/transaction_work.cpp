@@ -56,6 +56,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
     discard();
     throw;
   }
+  tell_epoch();
   publish();
   settle_with_host();
   retire();
@@ -122,6 +123,7 @@ void TransactionCommit::Work::gather() {
     place->replaces_parts = change.parts != nullptr;
     place->repairs = change.draft->is_repaired();
     if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
+    if (new_epoch_ != nullptr) place->epoch_ns = &new_epoch_->epoch_ns();
     if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
     if (change.retreat != nullptr) change.retreat->set_place(*place);
     guard_.expect(*place, change.draft->state);
@@ -143,8 +145,8 @@ void TransactionCommit::Work::carry_out_commit() {
     const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->off() == Commit::Off::not_yet;
     if (!is_adopts_own) rethrow_at(step_of(failure.detail().component), failure);
     throw_refused(failure.what());
-  } catch (const std::exception& failure) {
-    throw_refused(failure.what());
+  } catch (...) {
+    throw_refused(caught_text());
   }
   throw_refused("it refused the old core's state");
 }
@@ -170,6 +172,15 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
                  .step_name = text_of(step)});
   }
   throw Error(ErrorCode::adopt_refused, what);
+}
+
+/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again.
+void TransactionCommit::Work::tell_epoch() {
+  if (new_epoch_ == nullptr) return;
+  if (!committed_) new_epoch_->take();  // there was nobody to commit with
+  for (const auto& component : architecture_.components()) {
+    if (!places_.contains(component->name())) component->task().join(new_epoch_->epoch_ns());
+  }
 }
 
 void TransactionCommit::Work::publish() {
@@ -239,7 +250,7 @@ void TransactionCommit::Work::keep_for_report() {
 
 TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   // In virtual time the releases that follow come only when this call has returned.
-  const time_ns_t until = monotonic_now_ns() + (is_simulated_ ? 0 : phase_timeout_ns);
+  const time_ns_t until = later_by(monotonic_now_ns(), is_simulated_ ? 0 : phase_timeout_ns);
   std::map<std::string, StepReport> measured;
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
@@ -251,6 +262,15 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
   }
+  const auto resynchronised = std::find_if(
+      reports_.begin(), reports_.end(), [](const StepReport& step) { return step.step == "resynchronise"; });
+  if (committed_ && resynchronised != reports_.end()) {  // a line each, after those of the steps
+    for (const auto& component : touched_) {
+      StepReport& line = report.steps.emplace_back();
+      line.step = resynchronised->step;
+      line.component = component->name();
+    }
+  }
   for (StepReport& step : report.steps) {
     if (is_simulated_) step.prepare_ns = 0;
     const auto found = measured.find(step.component);
@@ -260,6 +280,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     step.phase_nominal_ns = found->second.phase_nominal_ns;
     step.phase_actual_ns = found->second.phase_actual_ns;
     step.remark = found->second.remark;
+    step.shift_ns = places_.at(step.component)->shift_ns;
     report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
   }
   return report;

@@ -33,6 +33,7 @@ class TransactionCommit::Work {
   void draft_steps();
   // prepare
   void prepare();
+  void prepare_epoch();
   void prepare_resource(DraftResource& added);
   void prepare_added(DraftComponent& added);
   void prepare_change(DraftComponent& changed);
@@ -53,6 +54,7 @@ class TransactionCommit::Work {
   void publish();
   void settle_with_host();
   void retire();
+  void tell_epoch();
   void keep_for_report();
   static void renew_fallback(Change& change);
   void leave_behind();
@@ -93,6 +95,7 @@ class TransactionCommit::Work {
       actions_;                                    // in the order they are taken in; the new parts come after
   std::vector<ListenerChange*> listener_changes_;  // among the actions
   StateGuard guard_;
+  NewEpoch* new_epoch_{nullptr};                     // among the actions, when the transaction resynchronises
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component
@@ -107,8 +110,8 @@ void TransactionCommit::Work::at_step(int step, Part&& part) {
     part();
   } catch (const Error& failure) {
     rethrow_at(step, failure);
-  } catch (const std::exception& failure) {
-    rethrow_at(step, Error(ErrorCode::prepare_failed, failure.what()));
+  } catch (...) {
+    rethrow_at(step, Error(ErrorCode::prepare_failed, caught_text()));
   }
   reports_[static_cast<std::size_t>(step - 1)].prepare_ns += monotonic_now_ns() - began;
 }

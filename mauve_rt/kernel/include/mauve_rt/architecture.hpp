@@ -31,10 +31,8 @@ struct TraceDrain {
   time_ns_t realtime_ns{0};
 };
 
-/// From a deployment to its epoch, so that every thread is ready by then (rule 5). [rt]
-constexpr time_ns_t deployment_lead_ns(std::size_t components) noexcept {
-  return std::max(ms_to_ns(20), ms_to_ns(1) * static_cast<time_ns_t>(components));
-}
+/// From the instant that all threads are ready at to the epoch, however many they are (rule 5).
+inline constexpr time_ns_t kDeploymentLead = ms_to_ns(20);
 
 /// What a transaction puts on and takes off an architecture's lists, and whose looks it changed.
 struct ListChange {
@@ -124,6 +122,8 @@ class Architecture final : public Configurable {
   /// The same; nullptr when there is none. [non-rt]
   std::shared_ptr<Component> find_component(const std::string& name) const;
   std::shared_ptr<Resource> find_resource(const std::string& name) const;
+  /// Throws Error (not_configured) when a component could not start for want of a configured core. [non-rt]
+  void require_ready_cores() const;
   /// All there are now, in the order of declaration. [non-rt]
   std::vector<std::shared_ptr<Component>> components() const;
   std::vector<std::shared_ptr<Resource>> resources() const;
@@ -149,7 +149,7 @@ class Architecture final : public Configurable {
   time_ns_t deployment_epoch_ns() const noexcept {
     return deployment_epoch_ns_.load(std::memory_order_relaxed);
   }
-  /// By who deploys: now + deployment_lead_ns(). [non-rt]
+  /// By who deploys, and by a commit that resynchronises: now + kDeploymentLead. [rt]
   void set_deployment_epoch(time_ns_t epoch_ns) noexcept {
     deployment_epoch_ns_.store(epoch_ns, std::memory_order_relaxed);
   }

@@ -60,8 +60,9 @@ class Commit;
 /// | holds_until_ns    |                                                 |                      |                          |
 /// | overlong_ns       | who makes the change                            | component's thread   | the gate                 |
 /// | period            | requester, before it is posted                  | requester            | its own                  |
-/// | armed, lost, grid | the component's thread, before it lets go       | requester, after it  | the task's place         |
-/// | resumes, ..place  |                                                 |                      |                          |
+/// | armed, lost, grid,| the component's thread, before it lets go       | requester, after it  | the task's place         |
+/// | resumes, ..place, |                                                 |                      |                          |
+/// | shift             |                                                 |                      |                          |
 /// | release_*         | the component's thread, before released         | requester, after it  | through released         |
 /// | released (futex)  | the component's thread                          | requester            | release/acquire          |
 struct Participant {
@@ -72,12 +73,13 @@ struct Participant {
   Commit* commit{nullptr};
   Afterwards afterwards{Afterwards::go_on};
   std::optional<time_ns_t>
-      start_clock_ns{};        // of a restart: the grid's reference, when it is not the deployment's
-  time_ns_t budget_ns{0};      // what adopt and take of its own core need
-  bool replaces_parts{false};  // its outputs are written as the ports' on_commit says
-  bool in_flight{false};       // it was running when the commit began
-  bool repairs{false};         // it was FAULTED, and the change mends it
-  bool left_behind{false};     // to be removed, while its thread still executes what it was condemned for
+      start_clock_ns{};                // of a restart: the grid's reference, when it is not the deployment's
+  time_ns_t budget_ns{0};              // what adopt and take of its own core need
+  bool replaces_parts{false};          // its outputs are written as the ports' on_commit says
+  bool in_flight{false};               // it was running when the commit began
+  bool repairs{false};                 // it was FAULTED, and the change mends it
+  const time_ns_t* epoch_ns{nullptr};  // the new one, once the change is made; nullptr: the epoch stays
+  bool left_behind{false};  // to be removed, while its thread still executes what it was condemned for
 
   std::atomic<bool> came{false};           // it was at the gate, or would have been but for the budget
   std::atomic<bool> arrived{false};        // it is at the gate
@@ -94,14 +96,20 @@ struct Participant {
   time_ns_t resumes_ns{0};     // the instant that it goes on at
   time_ns_t grid_place_ns{0};  // where that belongs within a period (Task::grid_place_ns_)
 
+  time_ns_t shift_ns{0};  // by which a new epoch makes its instants later
+
   time_ns_t release_nominal_ns{0};  // of the release that follows
   time_ns_t release_actual_ns{0};
   std::atomic<std::uint32_t> released{0};
 
-  /// After the commit was made: whether a release is to follow, and has not come. [non-rt]
+  /// After the commit was made: whether a release follows; none does in a wait that only a stop ends. [non-rt]
+  bool is_followed_by_release() const noexcept {
+    if (afterwards == Afterwards::go_on && pending_ns == kForever) return false;
+    return pending_ns != 0 && afterwards != Afterwards::stop;
+  }
+  /// The same, when it has not come yet. [non-rt]
   bool awaits_release() const noexcept {
-    return in_flight && pending_ns != 0 && afterwards != Afterwards::stop &&
-           released.load(std::memory_order_acquire) == 0;
+    return in_flight && is_followed_by_release() && released.load(std::memory_order_acquire) == 0;
   }
 };
 

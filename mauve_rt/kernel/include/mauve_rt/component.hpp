@@ -28,7 +28,8 @@ struct StepReport {
   std::int64_t missed_releases{0};
   time_ns_t phase_nominal_ns{0};
   time_ns_t phase_actual_ns{kNotMeasured};
-  std::string remark{};  // why releases were missed; empty when none was
+  std::string remark{};   // why releases were missed; empty when none was
+  time_ns_t shift_ns{0};  // by which a new epoch made its instants later
 };
 
 struct CommitTimeouts {
@@ -242,6 +243,8 @@ class Component final : public Configurable {
   }
   void replace_core(std::unique_ptr<CoreBase> core);
   void configure_core();
+  /// Throws Error (not_configured) when it could not start for want of a core that is bound and configured. [non-rt]
+  void require_ready_core() const;
 
   /// Replaces the core in flight: prepare, commit inside a wait, retire the old one. [non-rt]
   /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted, not_configured,

@@ -80,6 +80,9 @@ class Error : public std::runtime_error {
   ErrorDetail detail_;
 };
 
+/// What the exception being handled says, whatever was thrown. [non-rt], in a handler
+std::string caught_text();
+
 /// "a, b, c" of any range of strings; "none" when empty. [non-rt]
 template <typename Range>
 std::string join(const Range& words) {

@@ -17,7 +17,7 @@ class Task;
 /// | member    | written by                        | read by | order                                          |
 /// | --------- | --------------------------------- | ------- | ---------------------------------------------- |
 /// | time_     | writers, if empty; task empties   | task    | acq_rel: what was written before is visible    |
-/// | task_     | [setup], before it listens        | writers | listening publishes it                         |
+/// | task_     | ordinary threads, the same again  | writers | relaxed: listening publishes it first          |
 /// | resource_ | ordinary threads, one at a time   | -       | -                                              |
 class EventInput final : public EventListener {
  public:
@@ -29,7 +29,8 @@ class EventInput final : public EventListener {
   std::optional<time_ns_t> consume() noexcept;
 
   const PortBase& port() const noexcept { return *port_; }
-  void set_task(Task& task) noexcept { task_ = &task; }
+  /// The task that it wakes; before it listens, and no other later. [non-rt]
+  void set_task(Task& task) noexcept { task_.store(&task, std::memory_order_relaxed); }
   /// Listens to the resource that the port is connected to now, and to no other. [non-rt]
   void listen();
   /// Listens to nothing from now on. [non-rt]
@@ -41,7 +42,7 @@ class EventInput final : public EventListener {
   static constexpr time_ns_t kNone = INT64_MIN;
 
   PortBase* port_;
-  Task* task_{nullptr};
+  std::atomic<Task*> task_{nullptr};
   Resource* resource_{nullptr};
   std::atomic<time_ns_t> time_{kNone};
 };

@@ -21,9 +21,12 @@ struct CoreBinding {
   void* object{nullptr};          // of the fsm's core type, when it is a C++ core
   DynamicCore* dynamic{nullptr};  // otherwise
   std::vector<int> method_slots;  // of dynamic, by method number
+  const CoreBase* core{nullptr};  // the same, given by the component
 
   /// Whether the fsm can run the core. [rt]
   bool is_bound() const noexcept { return object != nullptr || dynamic != nullptr; }
+  /// Whether the core is configured too: a component may start with it. [non-rt]
+  bool is_ready() const noexcept { return is_bound() && core != nullptr && core->is_configured(); }
 };
 
 /// A method of the core, by name and by pointer, whichever the core at hand needs.
@@ -96,13 +99,13 @@ struct State {
   std::string name;
   std::size_t index{0};  // in the order of declaration
   bool is_wait{false};
-  time_ns_t duration_ns{0};              // of a wait; of an event wait its timeout
+  time_ns_t duration_ns{0};              // of a wait; of an event wait its timeout; kForever: it has none
   std::unique_ptr<EventInput> event;     // of an event wait
   time_ns_t min_interarrival_ns{0};      // of an event wait: the least time from one release to the next
   std::size_t action{kNone};             // of an execution state
   time_ns_t max_execution_ns{0};         // declared bound of an execution state; 0: none
   time_ns_t simulated_execution_ns{-1};  // what it takes in virtual time; < 0: as long as its bound allows
-  std::vector<Transition> transitions;   // the first whose guard holds is taken
+  std::vector<Transition> transitions;   // the first whose guard holds is taken; of a wait, when it has ended
   State* next{nullptr};                  // otherwise this one
   std::uint32_t trace_id{0};
   ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
@@ -141,9 +144,12 @@ class FsmBase : public Configurable {
   /// Declare states and transitions here; shell properties are set by then. [setup]
   virtual void define() = 0;
 
+  /// A state that advances the clock by > 0 ns and sleeps until then. kForever: until the component is stopped; such a
+  /// state leads nowhere, and needs no next(). [setup]
   State& wait(std::string name, time_ns_t duration_ns);
   /// Waits for a write to the resource that a read port is connected to. The clock goes on to the event's time, but
-  /// by min_interarrival at least; or by the timeout when no event comes. Both > 0 ns. [setup]
+  /// by min_interarrival at least; or by the timeout when no event comes (kForever: an event alone ends it). Both > 0 ns.
+  /// [setup]
   State& wait_event(std::string name, PortBase& port, time_ns_t timeout_ns, time_ns_t min_interarrival_ns);
   void set_initial(State& state) noexcept { initial_ = &state; }
   /// Where a state goes when no transition's guard holds. Every state needs one.
@@ -200,7 +206,8 @@ class Fsm : public FsmBase {
     state.max_execution_ns = max_execution_ns;
     return state;
   }
-  /// Goes to `to` when the guard holds after the state; guards are asked in the order of declaration.
+  /// Goes to `to` when the guard holds after the state, of a wait state when the wait has ended; guards are asked on the
+  /// component's thread, in the order of declaration.
   void transition(State& from, std::string guard_name, bool (CoreType::*guard)(), State& to) {
     from.transitions.push_back(
         {add_method(Method::guard<CoreType>(std::move(guard_name), method_count(), guard)), &to});

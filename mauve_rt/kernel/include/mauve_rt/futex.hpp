@@ -9,8 +9,6 @@
 
 namespace mauve {
 
-inline constexpr time_ns_t kForever = INT64_MAX;
-
 /// Sleeps while the word holds `expected`, at most until the instant. [rt]
 /// Returns false at the instant, true when the word changed or a wake came (re-check the word).
 bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,

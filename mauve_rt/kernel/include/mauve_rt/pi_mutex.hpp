@@ -10,11 +10,15 @@
 namespace mauve {
 
 /// PTHREAD_PRIO_INHERIT mutex. Keep sections to a copy: a contended lock costs microseconds.
+/// Its holder may not take it again. Who does gets it, rather than wait for itself for ever, and a component is FAULTED for
+/// it at the end of the state; so is one that lets go of a lock that it does not hold.
 ///
 /// | member    | written by            | under         | hot |
 /// |-----------|-----------------------|---------------|-----|
 /// | mutex_    | lock, unlock          | itself        | yes |
 /// | holder_   | the thread that locks | mutex_        | yes |
+/// | depth_    | lock, unlock          | mutex_        | yes |
+/// | below_    | lock, unlock          | mutex_        | yes |
 /// | trace_id_ | set_trace_id [setup]  | before start  | no  |
 class PiMutex {
  public:
@@ -36,14 +40,21 @@ class PiMutex {
   static int held_by_this_thread() noexcept;
   /// The same for others to look at, while the calling thread lives. [rt]
   static const std::atomic<int>& count_of_this_thread() noexcept;
+  /// Unlocks what the calling thread has locked since it held so many. [rt]
+  static void let_go_of_all_but(int held) noexcept;
+  /// Whether the calling thread has, since the last call, taken a lock twice or let go of one it did not hold. [rt]
+  static bool was_misused_by_this_thread() noexcept;
 
  private:
-  void lock_contended() noexcept;
+  bool lock_contended() noexcept;
   void note_holder() noexcept;
+  void forget_held() noexcept;
 
   pthread_mutex_t mutex_;
   std::atomic<std::int32_t> holder_{0};  // thread id, for the trace only
   std::uint32_t trace_id_{0};
+  std::uint32_t depth_{0};   // how often its holder has taken it again
+  PiMutex* below_{nullptr};  // the one that its holder had locked last before it
 };
 
 }  // namespace mauve

@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "mauve_rt/due_queue.hpp"
 #include "mauve_rt/futex.hpp"
 #include "mauve_rt/host.hpp"
 
@@ -23,11 +24,17 @@ class SimulatedClock final : public Clock {
     return false;
   }
   void spend(time_ns_t declared_ns) const noexcept override { now_ns_ += declared_ns; }
+  void due_changed(Task& task) const noexcept override { queue_.update(task, now_ns_); }
+  void leave(Task& task) const noexcept override { queue_.forget(task); }
+  /// The task that lives by this clock and can begin first; nullptr: none waits for an instant. [rt]
+  Task* next() const noexcept { return queue_.next(now_ns_); }
   /// Goes forward to the instant, never back. [rt]
   void advance_to(time_ns_t instant_ns) noexcept { now_ns_ = std::max(now_ns_, instant_ns); }
 
  private:
-  mutable time_ns_t now_ns_;  // spend() is const, for a clock is const to the task that lives by it
+  // Mutable, for a clock is const to the task that lives by it.
+  mutable time_ns_t now_ns_;
+  mutable DueQueue queue_{};
 };
 
 struct SimulationOptions {
@@ -66,8 +73,6 @@ class SimulatedHost final : public Host {
   struct Processor {
     Architecture* architecture;
     SimulatedClock clock;
-    std::vector<std::shared_ptr<Component>> components{};  // as of the last look at the architecture's lists
-    std::uint64_t seen_lists{0};
   };
 
   /// Takes the architecture, which has no host. Throws Error: not_configured, already_running; out_of_range (stack).
@@ -97,8 +102,8 @@ class Simulation {
   /// Takes in a configured architecture, which outlives the simulation or its shutdown(), and returns its host, which
   /// lives as long as the simulation. Before deploy(). Throws Error: not_configured, already_running (deployed).
   SimulatedHost& add(Architecture& architecture);
-  /// Gives all tasks of all architectures one epoch, now + max(20 ms, 1 ms x components), and starts them.
-  /// Throws Error (already_running).
+  /// Gives all tasks of all architectures one epoch, now + 20 ms, and starts them.
+  /// Throws Error: already_running, not_configured (a core).
   void deploy();
   /// Shuts every host down, and forgets the callbacks.
   void shutdown() noexcept;

@@ -13,6 +13,7 @@
 
 #include "mauve_rt/commit.hpp"
 #include "mauve_rt/context.hpp"
+#include "mauve_rt/due_queue.hpp"
 #include "mauve_rt/execution_word.hpp"
 #include "mauve_rt/fsm.hpp"
 #include "mauve_rt/pi_mutex.hpp"
@@ -97,6 +98,7 @@ struct ChangeSignal {
 /// |                        |                                       | stop, events | waits for all who use it           |
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
+/// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | current_               | machine                               | anyone       | relaxed: a lone fact               |
 /// | present_               | machine                               | anyone       | its own: present_state.hpp         |
@@ -105,8 +107,9 @@ struct ChangeSignal {
 /// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
 /// | demoted_               | who condemns, machine                 | machine      | execution_                         |
 /// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
-/// | shell_, fsm_, core_,   | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
-/// | grid_                  |                                       |              |                                    |
+/// | shell_, fsm_, core_    | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
+/// | reference_ns_,         | the same                              | anyone       | relaxed: lone numbers              |
+/// | period_ns_             |                                       |              |                                    |
 /// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | condemns     |                                    |
@@ -154,6 +157,8 @@ class Task {
   void simulate(const Clock& clock, bool trace);
   void end_simulation() noexcept;
   bool is_simulated() const noexcept { return simulated_; }
+  /// For the simulation's queue alone.
+  QueuePlace& queue_place() noexcept { return queue_place_; }
   const Clock& clock() const noexcept { return *clock_; }
 
   /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt]
@@ -163,17 +168,23 @@ class Task {
 
   /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
   time_ns_t join(time_ns_t epoch_ns) noexcept;
-  const Grid& grid() const noexcept { return grid_; }
+  /// The grid now; another commit may change it any moment. [rt]
+  Grid grid() const noexcept {
+    return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
+            .period_ns = period_ns_.load(std::memory_order_relaxed)};
+  }
 
   /// Enters the initial state at exactly this instant; for deployment. Does not wait for the thread. [non-rt]
   void start_at(time_ns_t instant_ns);
   /// Returns once the thread has taken up a start. [non-rt]
   void wait_started() noexcept;
-  /// Enters the initial state at the first clock + k * period later than now + 200 us (Listing 3). [non-rt]
+  /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
+  /// is still to come is the start itself; without one it is the deployment's first instant. [non-rt]
   /// Throws Error: already_running, faulted, not_configured.
   void start(std::optional<time_ns_t> clock_ns = std::nullopt);
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
   /// A commit that the component takes part in is called off, unless its change is being made; waits for nobody else.
+  /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
   void stop(time_ns_t timeout_ns = s_to_ns(1));
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
@@ -310,6 +321,8 @@ class Task {
   void order_stop();
   time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
   time_ns_t restart_instant(const Participant& place) const noexcept;
+  void require_startable() const;
+  bool is_called_from_own_state() const noexcept;
   void begin_trace(bool trace);
 
   // the thread
@@ -324,6 +337,10 @@ class Task {
   void warm_up() noexcept;
   void run_to_next_wait();
   const State* execute(const State& state);
+  void step();
+  const State* successor(const State& state) const;
+  const State* leave_wait();
+  static void check_locks(int held_before);
   void enter_wait(const State& state);
   void tell_wait() noexcept;
   void settle_event() noexcept;
@@ -338,6 +355,8 @@ class Task {
   std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
   void exchange_state(ComponentState from, ComponentState to) noexcept;
   void continue_after(Participant& place) noexcept;
+  time_ns_t resynchronise(time_ns_t epoch_ns) noexcept;
+  void trace_deployment() noexcept;
   void refuse_commit() noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
@@ -377,7 +396,8 @@ class Task {
   Shell* shell_{nullptr};
   const FsmBase* fsm_{nullptr};
   CoreBinding* core_{nullptr};
-  Grid grid_;
+  std::atomic<time_ns_t> reference_ns_{0};
+  std::atomic<time_ns_t> period_ns_{0};
 
   std::mutex command_mutex_;
   PiMutex order_mutex_;
@@ -398,6 +418,7 @@ class Task {
   std::atomic<std::uint32_t> parked_{1};
   std::atomic<std::uint32_t> ready_{0};
   std::atomic<std::uint32_t> ended_{0};
+  std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
   Lent<Participant> place_;
   time_ns_t start_at_ns_{0};
   std::atomic<std::uint32_t> current_{0};  // the state's name in the trace; 0: none yet
@@ -413,13 +434,15 @@ class Task {
   // the machine's own
   const State* waiting_{
       nullptr};  // the state it waits in; the initial one before its first release; nullptr: parked
-  const State* next_{nullptr};  // where it goes on after the wait
+  const State* next_{nullptr};  // where a start goes on; nullptr: the wait's guards tell when it has ended
+  QueuePlace queue_place_{};    // of a simulated one
   time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
   bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
   time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
   int deferrals_{0};            // releases a commit was put off for want of time
   time_ns_t grid_place_ns_{
       0};                  // where the instant pending belongs: the waits since the initial state, modulo g
+  bool in_resume_{false};  // its code is on some stack: what it calls must not resume it
   bool is_cold_{false};    // started, and not woken ahead of its first release yet
   bool left_gate_{false};  // it came to the gate in this wait, and left for its instant
   bool is_abandoned_{false};  // what it did or waited for at the gate lasted too long

@@ -7,11 +7,25 @@
 
 namespace mauve {
 
+class Task;
+
 using time_ns_t = std::int64_t;
 
 constexpr time_ns_t us_to_ns(std::int64_t us) { return us * 1'000; }
 constexpr time_ns_t ms_to_ns(std::int64_t ms) { return ms * 1'000'000; }
 constexpr time_ns_t s_to_ns(std::int64_t s) { return s * 1'000'000'000; }
+
+/// An instant that never comes, and a length of time that never ends.
+inline constexpr time_ns_t kForever = INT64_MAX;
+/// What an fsm's waits may last together, and an offset: 73 years. Added to any instant of the clock it is one still.
+inline constexpr time_ns_t kLongest = INT64_MAX / 4;
+
+/// instant + length; kForever when that is later than there are instants. [rt]
+constexpr time_ns_t later_by(time_ns_t instant_ns, time_ns_t length_ns) noexcept {
+  time_ns_t later = 0;
+  if (!__builtin_add_overflow(instant_ns, length_ns, &later)) return later;
+  return length_ns > 0 ? kForever : INT64_MIN;
+}
 
 /// Where a component's time comes from.
 class Clock {
@@ -25,6 +39,10 @@ class Clock {
                            std::uint32_t expected) const noexcept = 0;
   /// An execution state has ended that takes so much time where time is simulated: that passes by it. [rt]
   virtual void spend(time_ns_t /*simulated_ns*/) const noexcept {}
+  /// A simulated task waits for another instant now, or for none. [rt]
+  virtual void due_changed(Task& /*task*/) const noexcept {}
+  /// A simulated task lives by this clock no longer. [rt]
+  virtual void leave(Task& /*task*/) const noexcept {}
 };
 
 /// CLOCK_MONOTONIC, with absolute futex waits.

@@ -95,6 +95,10 @@ class Transaction {
   /// run before the commit, on its present parts, with the properties that the transaction sets. Where another step is
   /// refused it is in its state of before; where its own hooks refuse, it is UNCONFIGURED.
   Transaction& configure(const std::string& component);
+  /// A new common epoch: the commit's instant + 20 ms. Every running component goes on in its place, all its instants
+  /// later by the same, less than a period, so that they lie on the new epoch's grid; one that has no period is left
+  /// alone. The stopped ones take the epoch when they start. Not for an architecture that is not deployed.
+  Transaction& resynchronise();
 
   const std::vector<std::unique_ptr<TransactionStep>>& steps() const noexcept { return steps_; }
 

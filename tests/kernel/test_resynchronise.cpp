@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A new common epoch for an architecture that runs.
+#include "both_hosts.hpp"
+
+namespace mauve::testing {
+namespace {
+
+template <typename Host>
+class Resynchronise : public OnBothHosts<Host> {
+ protected:
+  TransactionReport resynchronise() {
+    Transaction transaction;
+    transaction.resynchronise();
+    return this->host.commit(std::move(transaction));
+  }
+  const StepReport& line_of(const TransactionReport& report, const std::string& component) {
+    for (const StepReport& line : report.steps) {
+      if (line.component == component) return line;
+    }
+    ADD_FAILURE() << "no line of " << component;
+    return report.steps.front();
+  }
+  time_ns_t epoch_ns() const { return this->architecture.deployment_epoch_ns(); }
+};
+TYPED_TEST_SUITE(Resynchronise, BothHosts);
+
+TYPED_TEST(Resynchronise, AllGoOnOnTheGridsOfTheNewEpoch) {
+  Component& fast = this->add("fast", 3);
+  Component& slow = this->add("slow", 20, {.offset_ns = us_to_ns(700)});
+  Component& uneven = add_free(this->architecture, "uneven", [](FreeFsm& fsm) {
+    State& first = fsm.run("First");
+    State& second = fsm.run("Second");
+    State& brief = fsm.wait("Brief", ms_to_ns(3));
+    State& rest = fsm.wait("Rest", ms_to_ns(7));
+    fsm.set_initial(first);
+    fsm.next(first, brief);
+    fsm.next(brief, second);
+    fsm.next(second, rest);
+    fsm.next(rest, first);
+  });
+  this->deploy();
+  const time_ns_t before_ns = this->epoch_ns();
+  this->wait_runs(uneven, 4);
+  const TransactionReport report = this->resynchronise();
+  const time_ns_t after_ns = this->epoch_ns();
+  EXPECT_GT(after_ns, before_ns);
+  EXPECT_TRUE(report.is_complete);
+  EXPECT_EQ(4U, report.steps.size()) << "the step's line, then one for each component";
+  for (Component* component : {&fast, &slow, &uneven}) {
+    const StepReport& line = this->line_of(report, component->name());
+    EXPECT_EQ(0, line.missed_releases);
+    EXPECT_GE(line.shift_ns, 0);
+    EXPECT_LT(line.shift_ns, component->task().grid().period_ns);
+    EXPECT_EQ(after_ns + component->task().settings().offset_ns, component->task().grid().reference_ns);
+    const int runs = this->core(*component).runs;
+    this->wait_runs(*component, runs + 3);
+  }
+  this->host.shutdown();
+  // Whatever the machine does, an instant lies on one of the two grids, and no two come closer than the waits between.
+  for (Component* component : {&fast, &slow}) {
+    const auto& instants = this->core(*component).instants;
+    const Grid grid = component->task().grid();
+    EXPECT_EQ(0, grid.phase_error(instants.back()));
+    for (std::size_t i = 1; i < instants.size(); ++i)
+      EXPECT_GE(instants[i] - instants[i - 1], grid.period_ns) << component->name() << " at " << i;
+  }
+  EXPECT_EQ(0, uneven.task().grid().phase_error(uneven.task().get_time()))
+      << "its initial state is on the grid";
+  EXPECT_GE(uneven.task().get_time(), after_ns - ms_to_ns(20));
+}
+
+TYPED_TEST(Resynchronise, BringsThoseTogetherThatWereStartedOnClocksOfTheirOwn) {
+  Component& a = this->add("a", 10);
+  Component& b = this->add("b", 10);
+  this->deploy();
+  this->wait_runs(b, 1);
+  this->host.stop("b");
+  this->host.start("b", a.task().get_time() + us_to_ns(3'300));
+  this->wait_runs(b, 3);
+  EXPECT_EQ(us_to_ns(3'300), a.task().grid().phase_error(b.task().get_time()));
+  this->resynchronise();
+  const int runs = this->core(b).runs;
+  this->wait_runs(b, runs + 2);
+  EXPECT_EQ(0, a.task().grid().phase_error(b.task().get_time()));
+  EXPECT_EQ(a.task().grid().reference_ns, b.task().grid().reference_ns);
+}
+
+TYPED_TEST(Resynchronise, StoppedOnesAndThoseAddedTakeItWhenTheyStart) {
+  Component& first = this->add("first", 3);
+  Component& stopped = this->add("stopped", 7);
+  this->deploy();
+  this->wait_runs(first, 2);
+  this->host.stop("stopped");
+  this->resynchronise();
+  EXPECT_EQ(this->epoch_ns(), stopped.task().grid().reference_ns);
+  EXPECT_EQ(ComponentState::stopped, stopped.task().state());
+  Transaction transaction;
+  transaction.template add_component<TestShell, TestCore, TestFsm>(
+      "later", {.properties = {{"period_ms", std::int64_t{5}}}});
+  transaction.start("later").start("stopped");
+  this->host.commit(std::move(transaction));
+  Component& later = this->architecture.component("later");
+  this->wait_runs(later, 1);
+  const int runs = this->core(stopped).runs;
+  this->wait_runs(stopped, runs + 1);
+  const Grid five{.reference_ns = this->epoch_ns(), .period_ns = ms_to_ns(5)};
+  const Grid seven{.reference_ns = this->epoch_ns(), .period_ns = ms_to_ns(7)};
+  EXPECT_EQ(0, five.phase_error(later.task().get_time()));
+  EXPECT_EQ(0, seven.phase_error(stopped.task().get_time()));
+}
+
+TYPED_TEST(Resynchronise, BesideAnAddedComponentOneEpochServesAll) {
+  Component& first = this->add("first", 3);
+  this->deploy();
+  this->wait_runs(first, 2);
+  Transaction transaction;
+  transaction.template add_component<TestShell, TestCore, TestFsm>("runs");
+  transaction.template add_component<TestShell, TestCore, TestFsm>("rests");
+  transaction.start("runs").resynchronise();
+  this->host.commit(std::move(transaction));
+  for (const auto& component : this->architecture.components())
+    EXPECT_EQ(this->epoch_ns(), component->task().grid().reference_ns) << component->name();
+}
+
+TYPED_TEST(Resynchronise, TheTraceTellsOfTheNewEpoch) {
+  Component& component = this->add("c", 5);
+  this->deploy();
+  this->wait_runs(component, 2);
+  const time_ns_t before_ns = this->epoch_ns();
+  this->resynchronise();
+  this->wait_runs(component, 4);
+  const auto told = records_of(this->architecture.drain_trace(), TraceKind::deployment);
+  ASSERT_EQ(2U, told.size());
+  EXPECT_EQ(before_ns, told[0].a);
+  EXPECT_EQ(this->epoch_ns(), told[1].a);
+  EXPECT_EQ(ms_to_ns(5), told[1].c);
+}
+
+TYPED_TEST(Resynchronise, LeavesAFaultedOneAloneAndASporadicOneInPlace) {
+  Component& first = this->add("first", 3);
+  Component& faulted = this->add("faulted", 3);
+  Component& listens = add_free(this->architecture, "listens", [](FreeFsm& fsm) {
+    State& run = fsm.run("Run");
+    State& rest = fsm.wait_event("Rest", fsm.ports().input, ms_to_ns(1), us_to_ns(500));
+    fsm.set_initial(run);
+    fsm.next(run, rest);
+    fsm.next(rest, run);
+  });
+  this->core(faulted).work = [] { throw 42; };
+  this->deploy();
+  this->wait_state(faulted, ComponentState::faulted);
+  this->wait_runs(listens, 2);
+  const TransactionReport report = this->resynchronise();
+  EXPECT_EQ(0, this->line_of(report, "listens").shift_ns);
+  EXPECT_EQ(ComponentState::faulted, faulted.task().state());
+  EXPECT_EQ(this->epoch_ns(), faulted.task().grid().reference_ns) << "for when it was repaired";
+  EXPECT_EQ(this->epoch_ns(), first.task().grid().reference_ns);
+}
+
+struct RefusingCore : TestCore {
+  bool adopt(const CoreBase& /*old*/) override { return false; }
+};
+
+TYPED_TEST(Resynchronise, ThatIsRefusedChangesNothing) {
+  Component& component = this->add("c", 5);
+  this->deploy();
+  this->wait_runs(component, 2);
+  const time_ns_t before_ns = this->epoch_ns();
+  Transaction transaction;
+  transaction.resynchronise().replace_core("c", std::make_unique<RefusingCore>());
+  EXPECT_EQ(ErrorCode::adopt_refused, this->code_of([&] { this->host.commit(std::move(transaction)); }));
+  EXPECT_EQ(before_ns, this->epoch_ns());
+  EXPECT_EQ(before_ns, component.task().grid().reference_ns);
+}
+
+TEST(ResynchroniseUndeployed, IsRefused) {
+  Architecture architecture;
+  architecture.add_component<TestShell, TestCore, TestFsm>("c");
+  architecture.configure();
+  Deployer deployer(architecture);
+  Transaction transaction;
+  transaction.resynchronise();
+  try {
+    deployer.commit(std::move(transaction));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(ErrorCode::not_configured, error.code());
+    EXPECT_EQ("resynchronise", error.detail().step_name);
+  }
+}
+
+TEST(ResynchroniseInVirtualTime, MovesEachInstantToTheFirstOfTheNewGrid) {
+  Architecture architecture;
+  Component& component = architecture.add_component<TestShell, TestCore, TestFsm>("c");
+  component.set_property("period_ms", std::int64_t{10});
+  component.core_as<TestCore>().instants.reserve(100);
+  architecture.configure();
+  Simulation simulation;
+  SimulatedHost& host = simulation.add(architecture);
+  simulation.deploy();
+  const time_ns_t epoch = simulation.epoch_ns();
+  simulation.at(epoch + ms_to_ns(13), [&] {
+    Transaction transaction;
+    transaction.resynchronise();
+    const TransactionReport report = host.commit(std::move(transaction));
+    EXPECT_EQ(ms_to_ns(3), report.steps.back().shift_ns)
+        << "20 pending, 33 new: 23 is the first not before 20";
+  });
+  simulation.run_until(epoch + ms_to_ns(45));
+  EXPECT_EQ(epoch + ms_to_ns(33), architecture.deployment_epoch_ns());
+  std::vector<time_ns_t> expected;
+  for (const std::int64_t ms : {0, 10, 23, 33, 43}) expected.push_back(epoch + ms_to_ns(ms));
+  EXPECT_EQ(expected, component.core_as<TestCore>().instants);
+}
+
+}  // namespace
+}  // namespace mauve::testing

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Eight clients that all change and look at one architecture at once, for ThreadSanitizer above all.
+// MAUVE_STORM_OPERATIONS says how many operations each of them makes.
+#include <array>
+#include <cstdlib>
+#include <random>
+
+#include "free_fsm.hpp"
+
+namespace mauve::testing {
+namespace {
+
+constexpr int kClients = 8;
+
+int operations() {
+  constexpr int kFew = 150;
+  const char* wanted =
+      std::getenv("MAUVE_STORM_OPERATIONS");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+  return wanted != nullptr ? std::atoi(wanted) : kFew;
+}
+
+/// Writes every time, and wakes who waits for it.
+struct WritingCore : TestCore {
+  void act() override {
+    TestCore::act();
+    exposed_shell().output.write({.value = static_cast<double>(runs.load(std::memory_order_relaxed))});
+  }
+};
+
+class Storm : public ::testing::Test {
+ protected:
+  Storm() {
+    architecture_.add_resource<SharedData<Number>>("one");
+    architecture_.add_resource<SharedData<Number>>("other");
+    for (int i = 0; i < 4; ++i) {
+      const std::string name = "c" + std::to_string(i);
+      names_.push_back(name);
+      architecture_
+          .add_component(name, std::make_unique<TestShell>(), std::make_unique<WritingCore>(),
+                         std::make_unique<TestFsm>(), {}, [] { return std::make_unique<TestFsm>(); })
+          .set_property("period_ms", std::int64_t{1 + i});
+      architecture_.connect(name, "output", i % 2 == 0 ? "one" : "other", "write");
+    }
+    add_free(architecture_, "listens", [](FreeFsm& fsm) {
+      State& run = fsm.run("Run");
+      State& rest = fsm.wait_event("Rest", fsm.ports().input, ms_to_ns(5), us_to_ns(300));
+      fsm.set_initial(run);
+      fsm.next(run, rest);
+      fsm.next(rest, run);
+    });
+    names_.emplace_back("listens");
+    architecture_.connect("listens", "input", "one", "read");
+    architecture_.configure();
+    deployer_.deploy();
+  }
+
+  using Random = std::mt19937;
+
+  void client(unsigned seed) {
+    Random random(seed);
+    for (int i = 0; i < operations(); ++i) {
+      try {
+        if (random() % 3 == 0) {
+          change(random, "own_" + std::to_string(seed));
+        } else {
+          look_or_command(random);
+        }
+        ++done_;
+      } catch (const Error& error) {  // one was faster, or it is too soon
+        EXPECT_NE(ErrorCode::internal, error.code()) << error.what();
+        ++refused_;
+      }
+    }
+  }
+
+  const std::string& any(Random& random) const { return names_[random() % names_.size()]; }
+
+  void change(Random& random, const std::string& own) {
+    Transaction transaction;
+    switch (random() % 8) {
+      case 0:
+        transaction.replace_core(any(random), std::make_unique<WritingCore>());
+        break;
+      case 1:
+        transaction.set_property(any(random), "gain", static_cast<double>(random() % 10));
+        transaction.set_property(any(random), "gain", static_cast<double>(random() % 10));
+        break;
+      case 2:
+        transaction.add_component<TestShell, TestCore, TestFsm>(own).start(own);
+        break;
+      case 3:
+        transaction.remove_component(own);
+        break;
+      case 4:
+        transaction.disconnect("listens", "input")
+            .connect("listens", "input", random() % 2 == 0 ? "one" : "other", "read");
+        break;
+      case 5:
+        transaction.resynchronise();
+        break;
+      case 6:
+        transaction.stop(any(random));
+        break;
+      default:
+        transaction.start(any(random));
+    }
+    const time_ns_t phase_ns = random() % 4 == 0 ? ms_to_ns(20) : 0;
+    deployer_.commit(std::move(transaction),
+                     {.timeouts = {.commit_ns = ms_to_ns(200), .phase_ns = phase_ns}});
+  }
+
+  void look_or_command(Random& random) {
+    switch (random() % 8) {
+      case 0:
+        return deployer_.stop(any(random));
+      case 1:
+        return deployer_.start(any(random));
+      case 2:
+        deployer_.set_property(any(random), "gain", 2.0, {.commit_ns = ms_to_ns(200), .phase_ns = 0});
+        return;
+      case 3:
+        EXPECT_GE(architecture_.describe().components.size(), names_.size());
+        return;
+      case 4:
+        deployer_.drain_trace();
+        return;
+      case 5:
+        for (const auto& component : architecture_.components()) {
+          const StateAge age = component->task().state_age();
+          EXPECT_GE(age.age_ns, 0);
+          EXPECT_EQ("", component->task().fault().what);
+        }
+        return;
+      case 6:
+        EXPECT_GE(architecture_.hold_component(any(random))->task().grid().reference_ns, 0);
+        return;
+      default:
+        deployer_.wait_change(static_cast<std::uint32_t>(architecture_.revision() - 1),
+                              monotonic_now_ns() + us_to_ns(200));
+    }
+  }
+
+  AwayFromComponents away_;
+  std::vector<std::string> names_;
+  Architecture architecture_;
+  Deployer deployer_{architecture_};
+  std::atomic<int> done_{0};
+  std::atomic<int> refused_{0};
+};
+
+TEST_F(Storm, LeavesAnArchitectureThatDoesAsItIsTold) {
+  std::vector<std::thread> clients;
+  for (unsigned i = 0; i < kClients; ++i) clients.emplace_back([this, i] { client(i + 1); });
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(kClients * operations(), done_ + refused_);
+  EXPECT_GT(done_, refused_ / 10) << "most of it is possible";
+  for (const std::string& name : names_) {
+    Component& component = architecture_.component(name);
+    wait_until([&] { return component.task().state() != ComponentState::stopping; }, "its stop");
+    if (component.task().state() == ComponentState::stopped) deployer_.start(name);
+    const auto released = component.task().statistics().releases.load();
+    wait_until([&] { return component.task().statistics().releases > released; }, "a release");
+    EXPECT_EQ("", component.task().fault().what);
+    EXPECT_EQ(architecture_.deployment_epoch_ns(), component.task().grid().reference_ns);
+  }
+}
+
+}  // namespace
+}  // namespace mauve::testing
