@@ -165,6 +165,7 @@ class StepReport:
     phase_nominal_ns: Final[int]
     phase_actual_ns: Final[int]  # NOT_MEASURED until the first release after the commit
     remark: Final[str]  # why releases were missed; empty when none was
+    shift_ns: Final[int]  # by which a new epoch made its instants later
 
 NOT_MEASURED: Final[int]
 
@@ -395,6 +396,12 @@ class Transaction:
         """
     def start(self, component: str, clock_ns: int | None = None) -> Transaction: ...
     def stop(self, component: str) -> Transaction: ...
+    def resynchronise(self) -> Transaction:
+        """A new common epoch, 20 ms after the commit.
+
+        Every component goes on in its place, all its instants later by the same, less than a period. The
+        report has a line for each, with its `shift_ns`.
+        """
 
 @final
 class TransactionReport:

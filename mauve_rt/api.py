@@ -43,9 +43,10 @@ from mauve_rt.resources import (
     service,
 )
 from mauve_rt.shells import NativeShell, Shell
-from mauve_rt.time import ms_to_ns, s_to_ns, us_to_ns
+from mauve_rt.time import FOREVER, ms_to_ns, s_to_ns, us_to_ns
 
 __all__ = [
+    "FOREVER",
     "NOT_MEASURED",
     "AnyResource",
     "Architecture",

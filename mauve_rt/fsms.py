@@ -61,7 +61,10 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         return State(name)
 
     def wait(self, name: str, duration_ns: int) -> State:
-        """A state that advances the component's clock by a duration > 0 and sleeps until then."""
+        """A state that advances the component's clock by a duration > 0 and sleeps until then.
+
+        `FOREVER`: until the component is stopped; such a state leads nowhere, and needs no next().
+        """
         self._machine.wait(name, duration_ns)
         return State(name)
 
@@ -86,7 +89,10 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         self._machine.next(state.name, to.name)
 
     def transition(self, state: State, guard: str | Callable[[CoreT], bool], to: State) -> None:
-        """Go to `to` when the guard holds after the state; guards are asked in the order of declaration."""
+        """Go to `to` when the guard holds after the state, of a wait when it has ended.
+
+        Guards are asked in the order of declaration.
+        """
         self._machine.transition(state.name, _method_name(guard), to.name)
 
     @property

@@ -1,6 +1,9 @@
 """Durations in the kernel's unit: whole nanoseconds."""
 
-__all__ = ["ms_to_ns", "s_to_ns", "us_to_ns"]
+__all__ = ["FOREVER", "ms_to_ns", "s_to_ns", "us_to_ns"]
+
+FOREVER = 2**63 - 1
+"""A length of time that never ends, in ns."""
 
 
 def us_to_ns(microseconds: float) -> int:

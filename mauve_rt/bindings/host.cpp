@@ -125,7 +125,8 @@ void bind_reports(py::module_& module) {
       .def_readonly("missed_releases", &StepReport::missed_releases)
       .def_readonly("phase_nominal_ns", &StepReport::phase_nominal_ns)
       .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns)
-      .def_readonly("remark", &StepReport::remark);
+      .def_readonly("remark", &StepReport::remark)
+      .def_readonly("shift_ns", &StepReport::shift_ns);
   py::class_<RealtimeStatus>(module, "RealtimeStatus")
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);
@@ -147,7 +148,8 @@ std::vector<PyHost::PublishedSample> PyHost::wait_published(time_ns_t timeout_ns
   const time_ns_t until = host().is_simulated() ? 0 : monotonic_now_ns() + timeout_ns;
   std::vector<PublishedSample> samples;
   for (;;) {
-    const std::uint32_t word = architecture_.publications().word();  // before the look: what comes after is noticed
+    const std::uint32_t word =
+        architecture_.publications().word();  // before the look: what comes after is noticed
     PublishedSample sample;
     auto& [resource, message, time_ns] = sample;
     while (architecture_.next_published(resource, message, time_ns)) samples.push_back(sample);
@@ -237,8 +239,8 @@ void bind_host(py::module_& module) {
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(
           "set_property",
-          [](PyHost& self, const std::string& component, const std::string& name,
-             const PropertyValue& value, time_ns_t commit_timeout_ns) {
+          [](PyHost& self, const std::string& component, const std::string& name, const PropertyValue& value,
+             time_ns_t commit_timeout_ns) {
             return self.host().set_property(component, name, value, timeouts(commit_timeout_ns, 0));
           },
           py::arg("component"), py::arg("name"), py::arg("value"), py::kw_only(),

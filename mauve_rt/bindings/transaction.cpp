@@ -160,7 +160,9 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
           [](Self self, const std::string& component) -> Self {
             return self.add([=](Steps steps, Registry) { steps.configure(component); });
           },
-          py::arg("component"));
+          py::arg("component"))
+      .def("resynchronise",
+           [](Self self) -> Self { return self.add([](Steps steps, Registry) { steps.resynchronise(); }); });
 }
 
 }  // namespace

@@ -75,9 +75,11 @@ _LONGEST_MS = 1e9
 _PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
 _ROS_WORDS = r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*"
 PLUGIN_NAME = Text(_PLUGIN, "package/Class")
-IDENTIFIER = Text(
-    r"[A-Za-z]\w*",
-    "a name of letters, digits and single underscores that starts with a letter",
+MAX_NAME = 100
+IDENTIFIER = Text(  # the kernel's rule for whatever has a name: check_name() of names.hpp
+    rf"[A-Za-z]\w{{0,{MAX_NAME - 1}}}",
+    "a name of letters, digits and single underscores that starts with a letter, "
+    f"at most {MAX_NAME} characters",
     without="__",
 )
 ROS_NAME = Text(rf"(?:~/|/)?{_ROS_WORDS}", "a ROS name such as scan, /map or ~/status", without="__")

@@ -35,9 +35,11 @@ StepKind = Literal[
     "start",
     "stop",
     "configure",
+    "resynchronise",
 ]
 STEP_KINDS: tuple[str, ...] = get_args(StepKind)
 _NEED_NAME = ("replace_core", "replace_fsm", "replace_shell", "set_property", "connect", "disconnect")
+_FOR_ALL = ("resynchronise",)  # no target: all components
 _NEED_VALUE = ("connect", "add_component", "add_resource")  # a property's value may be an empty text
 
 
@@ -53,12 +55,16 @@ class Step(Section):
     """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
 
     kind: StepKind = setting(Choice(*STEP_KINDS))
-    target: str = setting(IDENTIFIER)
+    target: str = setting(IDENTIFIER, default="")
     name: str = setting(Text(), default="")
     value: str = setting(_YamlText(), default="")
 
     def misfit(self) -> Fault | None:
-        """Some kinds need a name, some a value."""
+        """Most kinds need a target, some a name, some a value."""
+        if self.kind in _FOR_ALL and self.target:
+            return Fault((), "rule", limit=f"a step of kind '{self.kind}' takes no target")
+        if self.kind not in _FOR_ALL and not self.target:
+            return Fault((), "missing", limit="target")
         for key, kinds in (("name", _NEED_NAME), ("value", _NEED_VALUE)):
             if not getattr(self, key) and self.kind in kinds:
                 return Fault((), "rule", limit=f"a step of kind '{self.kind}' needs a {key}")

@@ -59,12 +59,14 @@ def _done(steps: tuple[Step, ...], measured: TransactionReport) -> str:
 
 def reports_of(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Report, ...]:
     """What every step changed and cost, as far as it is known."""
-    if len(steps) == 1:  # then all of it was for this one
+    if len(measured.steps) == 1:  # then all of it was for this one
         alone, complete = measured.steps[0], measured.is_complete
         return (_report(steps[0], alone, prepare_ns=measured.prepare_ns, is_complete=complete),)
+    # Lines beyond the steps' own are of components that a step for all was about.
+    for_all = [Step("resynchronise", "")] * (len(measured.steps) - len(steps))
     return tuple(
         _report(step, report, prepare_ns=report.prepare_ns, is_complete=measured.is_complete)
-        for step, report in zip(steps, measured.steps, strict=True)
+        for step, report in zip([*steps, *for_all], measured.steps, strict=True)
     )
 
 

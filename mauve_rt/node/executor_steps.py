@@ -120,13 +120,10 @@ class Plan:
                 self._component(step)
                 ask = {"stop": transaction.stop, "configure": transaction.configure}
                 ask.get(step.kind, transaction.start)(name)
-            case "connect":
-                self._component(step)
-                resource, service = _service(step)
-                transaction.connect(name, step.name, resource, service)
-            case "disconnect":
-                self._component(step)
-                transaction.disconnect(name, step.name)
+            case "resynchronise":
+                self._resynchronise(step)
+            case "connect" | "disconnect":
+                self._connect(step)
             case "set_property":
                 transaction.set_property(name, step.name, _property_value(step, self._component(step)))
             case _:
@@ -150,6 +147,20 @@ class Plan:
             text = f"component '{name}' is protected: it was declared with reconfigurable: false"
             raise RefusalError(Code.NOT_RECONFIGURABLE, text)
         return sketch
+
+    def _connect(self, step: Step) -> None:
+        self._component(step)
+        if step.kind == "disconnect":
+            self.transaction.disconnect(step.target, step.name)
+        else:
+            resource, service = _service(step)
+            self.transaction.connect(step.target, step.name, resource, service)
+
+    def _resynchronise(self, step: Step) -> None:
+        if step.target:
+            text = f"a step of kind 'resynchronise' is for all components; found target {shown(step.target)}"
+            raise RefusalError(Code.INVALID, text)
+        self.transaction.resynchronise()
 
     def _replace(self, step: Step) -> None:
         kind = step.kind.removeprefix("replace_")

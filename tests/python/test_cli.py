@@ -62,6 +62,8 @@ def test_a_steps_file_may_allow_releases_to_be_missed() -> None:
         ("max_missed: 1\nsteps: [{kind: stopp, target: a}]", ":2:16: steps[0].kind: input should be"),
         ("- {kind: stopp, target: a}", ":1:10: [0].kind: input should be"),
         ("- {kind: stop}", "[0].target is missing"),
+        ("- {kind: resynchronise, target: a}", "a step of kind 'resynchronise' takes no target"),
+        (f"- {{kind: stop, target: {'a' * 101}}}", "at most 100 characters"),
         ("- {kind: connect, target: a, value: b.c}", "a step of kind 'connect' needs a name"),
         ("- {kind: add_component, target: a}", "a step of kind 'add_component' needs a value"),
         ("- {kind: stop, target: a, nmae: b}", "[0].nmae is no known key"),
