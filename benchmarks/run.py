@@ -30,7 +30,7 @@ from reconfiguration import (
 from recording import recording_rows
 from recording_killed import kill_rows
 from rows import Row, markdown, not_available
-from scale import idle_rows, scale_rows
+from scale import idle_rows, scale_rows, simulation_rows
 from service_calls import service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
 from start import start_rows
@@ -57,6 +57,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "inversion": inversion_rows,
     "scale": scale_rows,
     "idle": idle_rows,
+    "simulation": simulation_rows,
     "soak": soak_rows,
     "service": service_rows,
     "service-stop": service_stop_rows,

@@ -64,6 +64,19 @@ def idle_rows(settings: Settings) -> Iterator[Row]:
     yield exactly_zero(what, rates)
 
 
+def simulation_rows(settings: Settings) -> Iterator[Row]:
+    """A thousand components in virtual time, all due at once or one after the other."""
+    rounds = native.interleaved(
+        settings.rounds,
+        *[lambda _, spread=spread: native.run("bench_simulation", spread=spread) for spread in (0, 1)],
+    )
+    for place, how in enumerate(("at one instant", "at instants of their own")):
+        passed = [found[place]["virtual_ns"] / found[place]["real_ns"] for found in rounds]
+        each = [found[place]["real_ns"] / found[place]["releases"] for found in rounds]
+        note = f"{sorted(each)[len(each) // 2]:.0f} ns a release; no trace; target 1000"
+        yield alone(f"1000 components at 10 Hz, due {how}: virtual time", passed, unit="s/s", note=note)
+
+
 def _measure(count: int, duration_s: float) -> native.Measure:
     def measure(_: int) -> dict[str, Any]:
         return native.run("bench_scale", components=count, duration_ms=round(duration_s * 1000))
