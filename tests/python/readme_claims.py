@@ -436,7 +436,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
     ),
     "Fig. 3, 5 and 6 drawn from traces": ("system/test_figures.py::test_the_drawings_are_whole",),
-    "its whole declared stack (512 KiB unless told) in memory": ("Prefaulted.TheWholeDeclaredStackIsInMemory",),
+    "its whole declared stack (512 KiB unless told) in memory": (
+        "Prefaulted.TheWholeDeclaredStackIsInMemory",
+    ),
     "What parts have allocated in their constructors and in configure is put into memory before they run": (
         "Prefaulted.WhatANewCoreAllocatedIsInMemory",
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
@@ -633,12 +635,32 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| stop in mid-execution, beyond what was left of it": (
         "bench: stop in mid-execution, 20 ms left, 5 s period, over the 20 ms, p",
     ),
-    "| core replaced at 1 kHz with 100 us of work, blackout": ("bench: , blackout p",),
+    "| core replaced at 1 kHz with 100 us of work, blackout": (
+        "bench: , blackout p",
+        "bench: , blackout p99.9",
+    ),
+    "| the same with an ordinary thread busy on each CPU": ("bench: , an ordinary thread busy on each CPU",),
     "| releases missed in 1,000 such replacements": ("bench: , releases missed",),
     "| transaction over 5 running 1 kHz components, rewiring two": (
         "bench: transaction over 5 running 1 kHz components, rewiring two",
     ),
     "| releases missed for it, components touched or not": ("bench: , releases missed by ",),
+    "| releases that a 1 kHz component missed for 100 transactions refused": (
+        (
+            "bench: transactions over a 1 kHz component and one in a 150 ms state: "
+            "releases that the 1 kHz one missed"
+        ),
+    ),
+    "| `stop` while a transaction over the component waits": (
+        "bench: stop of a 1 kHz component while ",
+        "bench: a transaction over it waits for a component in a 100 ms state",
+    ),
+    "| page faults of a component's thread after its core was replaced": (
+        "bench: page faults of a component's thread after its core was replaced by one with 8 MiB",
+    ),
+    "| wake-ups a second of 8 components that wait": (
+        "bench: 8 components that wait, none with a bound: wake-ups a second of all threads",
+    ),
     "| `shared_data` read, 16 B / 4 KiB": ("bench: SharedData ",),
     "| `latest_value` read, 16 B": ("bench: LatestValue read, 16 B", "bench: , against a hammering writer"),
     "| one activation of a two-state fsm": ("bench: one activation of a two-state FSM, kernel work only, ",),
@@ -728,7 +750,7 @@ PROMISE_NOTHING = (
     "Intel Xeon, 2 CPUs, a **virtual machine**",
     "Your machine will show others",
     "The soak is from `--full`",
-    "(*) From a later run",
+    "(5*) Of 2026-11-23",
     "(**) Of the same day",
     "(***) Of the evening",
     "(****) Of the night after",
