@@ -491,8 +491,21 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "leaves for its own instant and comes back, so it misses no release": (
         "Rule7Threads.WhoWaitsForALongExecutionOfAnotherMissesNoRelease",
     ),
-    "until all have met or the transaction is refused": (
+    "until all have met or the commit time-out (`--timeout`) refuses the transaction": (
         "Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",
+        "Rule10Gate.WhoWaitsInVainIsNeverHeldOverItsInstant",
+    ),
+    "A request may allow some releases to be missed; the report tells how many were": (
+        "Rule10Missed.AllowedReleasesAreSkippedAndReportedAndAreNoOverrun",
+    ),
+    "A stop, a fault or a shutdown meanwhile calls the commit off and waits for nobody": (
+        "Rule10Gate.AStopCallsACommitOffAndWaitsForNobody",
+        "Rule10Gate.AFaultCallsTheCommitOff",
+        "Rule10Gate.TheConductorCallsOffWhatIsUnderWay",
+    ),
+    "an adopt that takes longer refuses the change, after a longer take the component is `FAULTED`": (
+        "Rule10Gate.AnAdoptOverItsDeclaredBudgetIsRefused",
+        "Rule10Gate.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
     ),
     "leaves the architecture as it was, and the error names the step": (
         "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
@@ -511,8 +524,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheCondemnedOneHolds",),
     "repaired in place by a step `configure` or `replace_core`, then started": (
-        "Rule11Repaired/0.AndStartedInOneTransaction",
-        "Rule11Repaired/0.ByConfiguringItAnew",
+        "Rule11Repaired.AndStartedInOneTransaction",
+        "Rule11Repaired.ByConfiguringItAnew",
     ),
     "is removed and added anew, in one transaction": (
         "Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",
