@@ -402,11 +402,11 @@ def test_a_faulted_component_is_repaired_in_place(runtime: Runtime, control: Con
         Step("start", "weak"),
     )
     assert _ask(control, *steps).success
-    runtime.deployer.write_resource("poison", POISON)
+    runtime.host.write_resource("poison", POISON)
     _wait(lambda: _part(runtime, "weak").state == "FAULTED")
     refused = _ask(control, Step("start", "weak"))
     assert (refused.code, "replace_core" in refused.message) == (Code.FAULTED, True)
-    runtime.deployer.write_resource("poison", b"\0\1\0\0" + struct.pack("<d", 1.0))
+    runtime.host.write_resource("poison", b"\0\1\0\0" + struct.pack("<d", 1.0))
     outcome = _ask(control, repair)
     assert outcome.success, outcome.message
     assert (_part(runtime, "weak").state, _part(runtime, "weak").fault) == ("STOPPED", "")
