@@ -154,6 +154,7 @@ def _step_report(report: Report) -> Any:
         phase_actual_ns=report.phase_actual_ns,
         from_core=report.from_core,
         to_core=report.to_core,
+        remark=report.remark,
     )
 
 

@@ -29,16 +29,15 @@ class Following:
 
 def message_of(steps: tuple[Step, ...], measured: TransactionReport) -> str:
     """What was done, in one line, and which components are known to have missed releases for it."""
-    missed: dict[str, int] = {}
-    for report in measured.steps:  # every step of a component tells of all that it missed
-        if report.missed_releases > missed.get(report.component, 0):
-            missed[report.component] = report.missed_releases
-    told = [f"component '{name}' missed {_releases(count)}" for name, count in missed.items()]
-    return "; ".join([_done(steps, measured), *told])
+    # Every step of a component tells of all that it missed.
+    missed = {report.component: report for report in measured.steps if report.missed_releases > 0}
+    return "; ".join([_done(steps, measured), *(_missed(report) for report in missed.values())])
 
 
-def _releases(count: int) -> str:
-    return f"{count:,} release{'s' if count > 1 else ''}"
+def _missed(report: StepReport) -> str:
+    count = report.missed_releases
+    text = f"component '{report.component}' missed {count:,} release{'s' if count > 1 else ''}"
+    return f"{text} ({report.remark})" if report.remark else text
 
 
 def _done(steps: tuple[Step, ...], measured: TransactionReport) -> str:
@@ -88,4 +87,5 @@ def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: b
         phase_actual_ns=measured.phase_actual_ns,
         from_core=measured.from_core,
         to_core=measured.to_core,
+        remark=measured.remark,
     )

@@ -179,6 +179,7 @@ class Report:
     phase_actual_ns: int = NOT_MEASURED
     from_core: str = ""
     to_core: str = ""
+    remark: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -63,6 +63,7 @@ struct StepReport {
   std::int64_t phase_actual_ns{};
   mauve::BoundedString<64> from_core;
   mauve::BoundedString<64> to_core;
+  mauve::BoundedString<128> remark;
 };
 
 struct Stop {
@@ -104,7 +105,7 @@ MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s)
 MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
-           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core)
+           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
            instance_id, revision, report)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")

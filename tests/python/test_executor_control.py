@@ -143,13 +143,13 @@ def test_what_may_be_missed_is_the_request_s(
 def test_releases_that_were_missed_are_in_the_message() -> None:
     steps = (Step("replace_core", "a", "p/B"), Step("set_property", "a", "x", "1"), Step("stop", "b"))
     nothing = SimpleNamespace(component="a", missed_releases=0, from_core="p/A", to_core="p/B")
-    two = SimpleNamespace(component="a", missed_releases=2)
+    two = SimpleNamespace(component="a", missed_releases=2, remark="it was held")
     unknown = SimpleNamespace(component="b", missed_releases=NOT_MEASURED)
     measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0)
     assert message_of(steps[:1], measured) == "component 'a' runs p/B, before p/A"
     measured.steps = [two, two, unknown]
     done = "3 steps are in force; prepared in 0 ms"
-    assert message_of(steps, measured) == f"{done}; component 'a' missed 2 releases"
+    assert message_of(steps, measured) == f"{done}; component 'a' missed 2 releases (it was held)"
 
 
 def test_a_transaction_adds_wires_and_starts_and_another_one_removes(
