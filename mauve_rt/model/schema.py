@@ -76,12 +76,12 @@ _PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
 _ROS_WORDS = r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*"
 PLUGIN_NAME = Text(_PLUGIN, "package/Class")
 MAX_NAME = 100
-IDENTIFIER = Text(  # the kernel's rule for whatever has a name: check_name() of names.hpp
-    rf"[A-Za-z]\w{{0,{MAX_NAME - 1}}}",
-    "a name of letters, digits and single underscores that starts with a letter, "
-    f"at most {MAX_NAME} characters",
-    without="__",
+_IDENTIFIER = rf"[A-Za-z]\w{{0,{MAX_NAME - 1}}}"  # the kernel's rule for all names: check_name() of names.hpp
+_SUCH_NAMES = (
+    f"of letters, digits and single underscores that starts with a letter, at most {MAX_NAME} characters"
 )
+IDENTIFIER = Text(_IDENTIFIER, f"a name {_SUCH_NAMES}", without="__")
+IDENTIFIER_OR_NONE = Text(f"({_IDENTIFIER})?", f"a name {_SUCH_NAMES}", without="__")
 ROS_NAME = Text(rf"(?:~/|/)?{_ROS_WORDS}", "a ROS name such as scan, /map or ~/status", without="__")
 _NAMESPACE = Text(
     rf"/*(?:{_ROS_WORDS})?/*",

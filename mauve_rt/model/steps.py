@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Text, Whole
-from mauve_rt.model.schema import IDENTIFIER
+from mauve_rt.model.schema import IDENTIFIER_OR_NONE
 from mauve_rt.model.schema_errors import expected
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.words import did_you_mean, shown
@@ -55,7 +55,7 @@ class Step(Section):
     """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
 
     kind: StepKind = setting(Choice(*STEP_KINDS))
-    target: str = setting(IDENTIFIER, default="")
+    target: str = setting(IDENTIFIER_OR_NONE, default="")
     name: str = setting(Text(), default="")
     value: str = setting(_YamlText(), default="")
 

@@ -464,6 +464,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
         "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
     ),
+    "A transition may carry a guard, a wait's too": ("ComponentLife.AWaitsGuardIsAskedWhenTheWaitHasEnded",),
+    "`wait(kForever)` lasts until the component is stopped": ("ComponentLife.AWaitForEverLastsUntilTheStop",),
+    "A state may stop its own component": ("ComponentLife.AStateMayStopItsOwnComponent",),
+    "`resynchronise` gives all components a new common epoch": (
+        "Resynchronise.AllGoOnOnTheGridsOfTheNewEpoch",
+        "ResynchroniseInVirtualTime.MovesEachInstantToTheFirstOfTheNewGrid",
+    ),
     "so that it misses no release either": (
         "Rule7Restart.ThePendingInstantIsTakenWhenItIsOnTheNewGrid",
         "Rule7RestartOnThreads.NoReleaseIsMissedOnAnEqualGrid",

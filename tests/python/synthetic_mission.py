@@ -214,6 +214,7 @@ class FakeRobot:
             phase_actual_ns=WAKEUP_NS,
             from_core=self.core,
             to_core=core,
+            remark="",
         )
         event = self.messages.cdr(
             "mauve_msgs/msg/ReconfigurationEvent",

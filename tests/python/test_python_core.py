@@ -255,11 +255,12 @@ def test_what_it_raises_is_a_fault_of_its_component_alone(stage: Stage, core: st
     assert output.data == 0.0, "its output is safe"
     releases = stage.describe("neighbour").releases
     stage.until(lambda: stage.describe("neighbour").releases > releases)
-    refused = stage.replace(METRONOME)
-    assert refused is not None
-    assert refused.code == "faulted"
     with pytest.raises(MauveError, match="FAULTED"):
         stage.deployer.start("metronome")
+    stage.deployer.replace_core("metronome", METRONOME)
+    assert stage.describe().state == "STOPPED", "it is repaired"
+    stage.deployer.start("metronome")
+    stage.beats(1)
 
 
 @pytest.mark.parametrize(

@@ -182,7 +182,7 @@ def test_missed_releases_and_a_lost_phase_are_told():
     run(source, "c", 20, begin_ns=pending + 2 * PERIOD_NS + 3)
     found = verdict_on(trace_of(source))
     assert found.level == "bad"
-    assert found.sentence == "No: 2 releases missed in reconfigurations and a phase that was not kept."
+    assert found.sentence == "No: 3 releases missed in reconfigurations and a phase that was not kept."
     assert "1 reconfiguration left the component off its grid, by up to 3 ns" in said(found)
 
 

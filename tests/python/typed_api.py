@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import assert_type
 
 from mauve_rt.api import (
+    FOREVER,
     NOT_MEASURED,
     AnyResource,
     Architecture,
@@ -20,6 +21,7 @@ from mauve_rt.api import (
     EventCounter,
     EventPort,
     Fsm,
+    Host,
     LatestValue,
     MauveError,
     PluginRegistry,
@@ -31,6 +33,7 @@ from mauve_rt.api import (
     Sample,
     SharedData,
     Shell,
+    SimulatedHost,
     Simulation,
     State,
     StepReport,
@@ -160,7 +163,7 @@ class EventFsm(Fsm[HoverShell, HoverCore]):
         self.wait_event("Wrong", self.shell.target, 1, 1)  # type: ignore[arg-type]
 
 
-def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
+def change(architecture: Architecture, host: Host) -> TransactionReport:
     before = architecture.describe()
     assert_type(before, ArchitectureDescription)
     transaction = (
@@ -179,9 +182,9 @@ def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
         .remove_component("mixed")
         .remove_resource("count")
     )
-    deployer.commit(transaction, dry_run=True)
+    host.commit(transaction, dry_run=True)
     assert_type(str(architecture.describe()), str)
-    return deployer.commit(
+    return host.commit(
         transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50), max_missed=1
     )
 
@@ -189,6 +192,7 @@ def change(architecture: Architecture, deployer: Deployer) -> TransactionReport:
 def simulate(architecture: Architecture) -> TraceDrain:
     simulation = Simulation(trace=True, begin_ns=s_to_ns(1))
     host = simulation.add(architecture)
+    assert_type(host, SimulatedHost)
     simulation.deploy()
     simulation.at(simulation.epoch_ns() + ms_to_ns(10), lambda: host.stop("hover"))
     simulation.every(simulation.now_ns(), ms_to_ns(1), lambda: host.get_time("hover"))
@@ -228,7 +232,7 @@ def run(registry: PluginRegistry) -> StepReport:
     deployer.deploy()
     assert_type(deployer.realtime_status(), RealtimeStatus)
     clock = deployer.get_time("hover")
-    deployer.stop("hover")
+    deployer.stop("hover", timeout_ns=FOREVER)
     hover.cleanup_core()
     hover.replace_core(OtherCore)
     hover.configure_core()
