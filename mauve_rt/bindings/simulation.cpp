@@ -44,7 +44,8 @@ void bind_simulation(py::module_& module) {
       .def(
           "add",
           [](PySimulation& self, PyArchitecture& architecture) {
-            return std::make_unique<PySimulatedHost>(architecture, self.simulation.add(architecture.architecture));
+            return std::make_unique<PySimulatedHost>(architecture,
+                                                     self.simulation.add(architecture.architecture));
           },
           py::arg("architecture"), py::keep_alive<1, 2>(), py::keep_alive<0, 1>())
       .def(

@@ -259,8 +259,7 @@ TYPED_TEST(HostConformance, AddAndRemoveComponents) {
   remove.remove_component("second").remove_component("third").add_component("third", parts);
   this->commit(remove);
   EXPECT_EQ(nullptr, this->architecture.find_component("second"));
-  EXPECT_EQ(ErrorCode::unknown_component,
-            this->refusal([&] { held->set_property("gain", 2.0); }).code());
+  EXPECT_EQ(ErrorCode::unknown_component, this->refusal([&] { held->set_property("gain", 2.0); }).code());
   const std::uint64_t before = this->releases("first");
   this->run_for(ms_to_ns(10));
   EXPECT_GT(this->releases("first"), before);

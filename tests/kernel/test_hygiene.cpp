@@ -267,7 +267,8 @@ TEST_F(Prefaulted, WhatANewCoreAllocatedIsInMemory) {
     commit(std::make_unique<LargeCore>());
     wait_runs(component, 2);
     EXPECT_EQ(0U, faults());
-  }).join();
+  })
+      .join();
 }
 
 TEST_F(Prefaulted, WhatTheFirstCoreAllocatedIsInMemory) {

@@ -110,7 +110,9 @@ class OnThreads {
 
 class InVirtualTime {
  public:
-  explicit InVirtualTime(Architecture& architecture) : host_(simulation_.add(architecture)) { host_.deploy(); }
+  explicit InVirtualTime(Architecture& architecture) : host_(simulation_.add(architecture)) {
+    host_.deploy();
+  }
   TransactionReport commit(Transaction transaction) { return host_.commit(std::move(transaction)); }
   void run_on(FutureCore& core, int runs) {
     while (core.runs.load() < runs) simulation_.run_until(simulation_.now_ns() + ms_to_ns(1));
@@ -270,7 +272,8 @@ TYPED_TEST(PreparedFuture, AShellSeesItsOwnFuture) {
 TYPED_TEST(PreparedFuture, AnEventWaitListensWhereItsPortWillLead) {
   Transaction transaction;
   transaction.replace_fsm("c", std::make_unique<EventFsm>()).replace_core("c", this->make_core());
-  transaction.add_resource("new", std::make_unique<SharedData<Number>>()).connect("c", "input", "new", "read");
+  transaction.add_resource("new", std::make_unique<SharedData<Number>>())
+      .connect("c", "input", "new", "read");
   this->host->commit(std::move(transaction));
   auto& fresh = dynamic_cast<SharedData<Number>&>(this->architecture.resource("new"));
   for (int run = 0; run < 3; ++run) {

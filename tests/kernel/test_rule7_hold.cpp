@@ -85,7 +85,8 @@ TEST_F(Rule7Simulated, ANewFsmStartsInItsInitialStateOnItsOwnPeriod) {
     host().commit(std::move(change));
   });
   run_to(ms_to_ns(21));
-  EXPECT_THAT(instants_ms(component), ElementsAre(0, 10, 16, 20)) << "the first multiple of 4 that is not before 15";
+  EXPECT_THAT(instants_ms(component), ElementsAre(0, 10, 16, 20))
+      << "the first multiple of 4 that is not before 15";
   EXPECT_THAT(entered, ElementsAre("First", "Second", "Run0", "Run1"));
   EXPECT_EQ(ms_to_ns(4), component.task().grid().period_ns);
   EXPECT_EQ(simulation.epoch_ns(), component.task().grid().reference_ns);

@@ -179,8 +179,7 @@ TEST_F(StructuralSimulation, TheInstantsFollowTheNewFsm) {
   run_to(ms_to_ns(3));
   Transaction alone;
   alone.set_property("c", "period_ms", 5);
-  EXPECT_EQ(ErrorCode::structural_property,
-            refusal_of([&] { host().commit(std::move(alone)); }).code());
+  EXPECT_EQ(ErrorCode::structural_property, refusal_of([&] { host().commit(std::move(alone)); }).code());
   Transaction beside;
   beside.set_property("c", "period_ms", 5).replace_fsm("c", std::make_unique<BudgetFsm>());
   host().commit(std::move(beside));

@@ -94,7 +94,8 @@ std::vector<Candidate> candidates(const std::vector<Mapping>& mappings) {
     Range range = mapping.range;
     if (!mapping.is_private_memory || range.end - range.begin > kMostOfOneMapping) continue;
     const auto is_barred = [&](std::size_t other) { return !mappings[other].is_accessible; };
-    const bool room_above = i + 1 < mappings.size() && mappings[i + 1].range.begin == range.end && is_barred(i + 1);
+    const bool room_above =
+        i + 1 < mappings.size() && mappings[i + 1].range.begin == range.end && is_barred(i + 1);
     const bool guard_below = i > 0 && mappings[i - 1].range.end == range.begin && is_barred(i - 1);
     const bool is_arena = mapping.is_main_heap || (room_above && range.begin % kArenaAlignment == 0);
     // Above a guard lies a thread's stack; what was allocated right above that may be one mapping with it.
