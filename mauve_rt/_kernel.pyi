@@ -512,8 +512,8 @@ class TraceDrain:
 class Host:
     """What runs an architecture: a Deployer, on threads, or a SimulatedHost, in virtual time.
 
-    An architecture has one host at a time. Every call releases the interpreter's lock. In virtual time nothing
-    happens while the caller waits: waits return at once, and preparing takes no time.
+    An architecture has one host at a time. Every call releases the interpreter's lock. In virtual time
+    nothing happens while the caller waits: waits return at once, and preparing takes no time.
     """
 
     def prepare_process(self) -> None:
@@ -524,8 +524,8 @@ class Host:
     def deploy(self) -> None:
         """Publishes the epoch and starts every component; a simulation deploys all its hosts at once.
 
-        On threads: creates these, meets them at the barrier first. Shortens the interpreter's switch interval to
-        0.1 ms where it is longer, for components in Python.
+        On threads: creates these, meets them at the barrier first. Shortens the interpreter's switch interval
+        to 0.1 ms where it is longer, for components in Python.
         """
     def shutdown(self) -> None:
         """Stops in reverse order (outputs written), joins the threads; waits for nobody's preparation.

@@ -105,7 +105,7 @@ def _measure(trace: Trace, component: str, parked: int, armed: int) -> Reconfigu
 
 
 def _period_before(trace: Trace, component: str, parked: int) -> int:
-    """Return g at the park: a new fsm tells its own before it is armed, in virtual time at the same instant."""
+    """Return g at the park: a new fsm tells its own before it is armed, maybe at the same instant."""
     deployed = trace.of(component)["kind"] == Kind.DEPLOYMENT
     later = int(np.count_nonzero(deployed[parked:]))
     grids = trace.deployments(component)
