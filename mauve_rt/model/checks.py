@@ -143,10 +143,11 @@ class Checks:
                 self._loader.require_type(resource.type, type_kind)
             self._resources[name] = describe_resource(resource, self._loader.registry)
         except MauveError as error:
-            what = f"bad type '{resource.type}' of resource '{name}': {error}"
+            about = "type" if resource.type else "kind"
+            what = f"bad {about} '{resource.type or resource.kind}' of resource '{name}': {error}"
             known = self._loader.names(type_kind)
             remedy = did_you_mean(resource.type, known) if error.code == "unknown_type" else ""
-            yield self._model.problem((*place, "type"), what, remedy=remedy, code=error.code)
+            yield self._model.problem((*place, about), what, remedy=remedy, code=error.code)
             return
         if resource.topic is not None and message_class(self._resources[name].type) is None:
             what = (
