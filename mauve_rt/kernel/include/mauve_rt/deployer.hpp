@@ -29,7 +29,7 @@ class Deployer final : public Host {
 
   /// Asks for the real-time rights; deploy() does it if it was not done. [setup]
   void prepare_process() override;
-  /// Creates the threads, meets them at a barrier, publishes epoch = now + max(20 ms, 1 ms x components),
+  /// Creates the threads, meets them at a barrier, publishes epoch = now + 20 ms,
   /// starts all. [setup] Throws Error as Host::deploy(); no thread is left then.
   void deploy() override;
   /// Also ends the threads: those that execute a state for half a second more are left behind. [non-rt]
