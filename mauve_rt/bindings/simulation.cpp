@@ -37,7 +37,7 @@ class PySimulatedHost final : public PyHost {
 }  // namespace
 
 void bind_simulation(py::module_& module) {
-  py::class_<PySimulatedHost, PyHost>(module, "SimulatedHost");
+  const py::class_<PySimulatedHost, PyHost> simulated_host(module, "SimulatedHost");
   py::class_<PySimulation>(module, "Simulation")
       .def(py::init<bool, time_ns_t>(), py::kw_only(), py::arg("trace") = true,
            py::arg("begin_ns") = SimulationOptions{}.begin_ns)

@@ -91,7 +91,7 @@ void Architecture::reap() {
     const auto has_ended = [](const Leaving& leaving) {
       return leaving.component->task().end_thread(monotonic_now_ns());
     };
-    const auto first = std::stable_partition(leaving_.begin(), leaving_.end(),
+    const auto first = std::partition(leaving_.begin(), leaving_.end(),
                                              [&](const Leaving& leaving) { return !has_ended(leaving); });
     ended.assign(std::make_move_iterator(first), std::make_move_iterator(leaving_.end()));
     leaving_.erase(first, leaving_.end());

@@ -13,7 +13,8 @@ namespace mauve {
 namespace {
 
 /// An execution that has ended took longer than it declared.
-struct OverBound {
+struct OverBound : std::exception {
+  explicit OverBound(time_ns_t bound) : bound_ns(bound) {}
   time_ns_t bound_ns;
 };
 
@@ -140,7 +141,7 @@ const State* Task::execute(const State& state) {
   check_locks(held_before);
   if (was_condemned) return nullptr;
   if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
-    throw OverBound{state.max_execution_ns};
+    throw OverBound(state.max_execution_ns);
   return next;
 }
 

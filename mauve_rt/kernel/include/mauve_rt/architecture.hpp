@@ -62,9 +62,9 @@ class Architecture final : public Configurable {
   std::string description() const override { return "architecture"; }
 
   /// Configures resources, then components; does nothing when that was done. [non-rt]
-  void configure();
+  void configure() override;
   /// Cleans up all, in reverse order. [non-rt] Throws Error (already_running) when a component is not parked.
-  void cleanup();
+  void cleanup() override;
 
   /// Carries out a transaction; one at a time. [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
@@ -85,7 +85,7 @@ class Architecture final : public Configurable {
   /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone.
   Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
                            std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                           const TaskSettings& settings, Component::FsmFactory make_fsm = {});
+                           const TaskSettings& settings, const Component::FsmFactory& make_fsm = {});
   /// Adds a component of registered parts. [non-rt] Throws Error: unknown_shell, unknown_core, unknown_fsm
   /// besides.
   Component& add_component(const std::string& name, const std::string& shell, const std::string& core,

@@ -162,8 +162,8 @@ class Component final : public Configurable {
   void set_architecture(Architecture* architecture) noexcept;
 
   /// Both under the architecture's change lock. [non-rt] Throw Error (already_running) unless it is parked.
-  void configure();
-  void cleanup();
+  void configure() override;
+  void cleanup() override;
 
   /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone. [setup]
   void set_parts(Parts parts, FsmFactory make_fsm = {});

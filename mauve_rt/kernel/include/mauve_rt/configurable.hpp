@@ -19,9 +19,9 @@ class Configurable {
   /// Runs the hook; does nothing when already configured. [non-rt]
   /// Throws Error (configure_failed) with the reason and stays unconfigured when the hook throws or returns
   /// false.
-  void configure();
+  virtual void configure();
   /// Runs the cleanup hook if configured. [non-rt] Throws Error when it cannot be cleaned up now; nothing was done then.
-  void cleanup();
+  virtual void cleanup();
 
   /// What messages call this object, e.g. "core mauve_examples/Guidance".
   virtual std::string description() const = 0;
