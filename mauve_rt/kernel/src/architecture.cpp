@@ -141,8 +141,7 @@ PluginRegistry& Architecture::require_registry() const {
 
 Component& Architecture::add_component(const std::string& name, std::unique_ptr<Shell> shell,
                                        std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                                       const TaskSettings& settings,
-                                       const Component::FsmFactory& make_fsm) {
+                                       const TaskSettings& settings, const Component::FsmFactory& make_fsm) {
   Parts parts{.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)};
   commit_one(
       std::move(Transaction().add_component(name, std::move(parts), {.settings = settings}, make_fsm)));

@@ -92,7 +92,7 @@ void Architecture::reap() {
       return leaving.component->task().end_thread(monotonic_now_ns());
     };
     const auto first = std::partition(leaving_.begin(), leaving_.end(),
-                                             [&](const Leaving& leaving) { return !has_ended(leaving); });
+                                      [&](const Leaving& leaving) { return !has_ended(leaving); });
     ended.assign(std::make_move_iterator(first), std::make_move_iterator(leaving_.end()));
     leaving_.erase(first, leaving_.end());
   }
