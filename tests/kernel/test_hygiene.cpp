@@ -237,6 +237,16 @@ struct LargeCore : TestCore {
   }
 };
 
+/// As large as another one, wherever the system puts it.
+struct MappedCore : TestCore {
+  FreshPages pages{kLargeBytes / kPage};
+
+  void act() override {
+    if (runs.load() == 0) pages.touch();
+    TestCore::act();
+  }
+};
+
 class Prefaulted : public Deployed {
  protected:
   /// Page faults of "c" from here on.
@@ -269,6 +279,20 @@ TEST_F(Prefaulted, WhatANewCoreAllocatedIsInMemory) {
     EXPECT_EQ(0U, faults());
   })
       .join();
+}
+
+TEST_F(Prefaulted, WhatTakesThePlaceOfWhatWasGivenBackIsInMemory) {
+  Component& component = add("c", 1);
+  deploy();
+  wait_runs(component, 3);
+  auto others = std::make_unique<FreshPages>(kLargeBytes / kPage);
+  commit(std::make_unique<TestCore>());
+  wait_runs(component, 2);
+  begin();
+  others.reset();  // the process is as big again with what the core maps
+  commit(std::make_unique<MappedCore>());
+  wait_runs(component, 2);
+  EXPECT_EQ(0U, faults());
 }
 
 TEST_F(Prefaulted, WhatTheFirstCoreAllocatedIsInMemory) {

@@ -17,7 +17,9 @@ void note_allocated_before() noexcept;
 /// constructors or in configure, whether they have touched it or not. No kernel can tell who owns which allocation;
 /// so this is for the process, not for one part. Left alone: threads' stacks, mappings of files, shared memory, and
 /// single mappings over 1 GiB (reserved, hardly meant to be used). Bigger parts of the main heap and of the allocator's
-/// arenas that were there before are included: new parts get their memory there too. [non-rt]
+/// arenas that were there before are included: new parts get their memory there too. Cheap while the process has not
+/// grown since the last call: then it only asks which pages are missing, 1 ns a page (of the shared page of zeros it is
+/// told that it is there). [non-rt]
 void prefault_allocated() noexcept;
 
 }  // namespace mauve
