@@ -21,6 +21,18 @@ struct SlowCore : TestCore {
   Latch& latch;
 };
 
+/// The same of its adopt.
+struct SlowToAdopt : TestCore {
+  explicit SlowToAdopt(SlowCore::Latch& whose) : latch(whose) {}
+  bool adopt(const CoreBase& /*old*/) override {
+    latch.entered = true;
+    Backoff back_off;
+    while (!latch.open) back_off();
+    return true;
+  }
+  SlowCore::Latch& latch;
+};
+
 class HostShutdown : public Deployed {
  protected:
   /// A change that is being prepared on another thread, until `latch` opens.
@@ -70,6 +82,35 @@ TEST_F(HostShutdown, WaitsForNobodysPreparation) {
   deployer.deploy();  // and all is as before
   const int runs = core(drive).runs;
   wait_runs(drive, runs + 2);
+  deployer.shutdown();
+}
+
+TEST_F(HostShutdown, WaitsForNoAdoptOfAStoppedComponent) {
+  Component& drive = add("drive");
+  Component& changed = add("changed");
+  deploy();
+  wait_runs(drive, 1);
+  deployer.stop("changed");
+  CoreBase* const old = &changed.core();
+  Transaction change;
+  change.replace_core("changed", std::make_unique<SlowToAdopt>(latch)).start("changed");
+  std::thread other = prepare(std::move(change));  // the adopt runs on that thread, the component being parked
+  deployer.stop("drive");
+  deployer.start("drive");
+  wait_runs(drive, core(drive).runs + 2);
+  deployer.shutdown();  // it returns while the adopt lasts
+  EXPECT_FALSE(latch.open);
+  EXPECT_FALSE(drive.task().has_thread());
+  EXPECT_EQ(nullptr, architecture.host());
+  latch.open = true;
+  other.join();
+  EXPECT_EQ(ErrorCode::not_configured, refusal);
+  EXPECT_EQ(old, &changed.core());
+  EXPECT_EQ(ComponentState::stopped, changed.task().state());
+  EXPECT_FALSE(changed.task().has_thread());
+  const int runs = core(changed).runs;
+  deployer.deploy();
+  wait_runs(changed, runs + 2);
   deployer.shutdown();
 }
 

@@ -102,6 +102,12 @@ void Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
   under_way_.recall(kForever);
 }
 
+void Conductor::make_alone(Commit& commit) noexcept {
+  under_way_.lend(commit);
+  commit.make_alone();
+  under_way_.recall(kForever);
+}
+
 void Conductor::withdraw() noexcept {
   under_way_.use([](Commit& commit) {
     commit.hurry();
@@ -240,7 +246,11 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
   commit.expect(running);
   if (running == 0) {
     for (Participant& place : commit.participants()) place.task->hold_parked(place);
-    commit.make_alone();
+    if (conductor != nullptr) {
+      conductor->make_alone(commit);
+    } else {
+      commit.make_alone();
+    }
   } else if (conductor != nullptr) {
     conductor->conduct(commit, timeout_ns);
   } else {

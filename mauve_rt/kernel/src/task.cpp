@@ -3,7 +3,9 @@
 #include "mauve_rt/task.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
+#include <thread>
 
 #include "mauve_rt/error.hpp"
 #include "mauve_rt/futex.hpp"
@@ -14,6 +16,8 @@ namespace {
 
 /// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
+/// For a lock that a commit may hold for long.
+constexpr std::chrono::microseconds kBetweenTries{500};
 /// What lasts for so many periods, and so long, is told as hung where no other figure was set.
 constexpr std::int64_t kHungPeriods = 10;
 constexpr time_ns_t kHungAtLeast = s_to_ns(1);
@@ -163,7 +167,12 @@ void Task::end_simulation() noexcept {
 }
 
 bool Task::end_thread(time_ns_t until_ns) noexcept {
-  const std::lock_guard lock(command_mutex_);
+  std::unique_lock lock(command_mutex_, std::defer_lock);
+  // Tried again and again: ThreadSanitizer does not know the timed lock of the monotonic clock.
+  while (!lock.try_lock()) {
+    if (monotonic_now_ns() >= until_ns) return false;
+    std::this_thread::sleep_for(kBetweenTries);
+  }
   if (!has_thread_) return true;
   control_.fetch_or(kStop | kExit, std::memory_order_acq_rel);
   futex_wake_all(control_);

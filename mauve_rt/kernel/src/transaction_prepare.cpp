@@ -259,6 +259,7 @@ void TransactionCommit::Work::leave_behind() {
 
 void TransactionCommit::Work::discard() noexcept {
   leave_behind();
+  settle_with_host();
   for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
   for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);

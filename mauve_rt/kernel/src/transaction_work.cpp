@@ -70,10 +70,11 @@ void TransactionCommit::Work::require_host_open() const {
               {.remedy = "deploy it, then ask again"});
 }
 
-/// Either a shutdown sees the threads of what was added, or they end here.
+/// Either a shutdown sees the threads of what was added, and gets those of what was changed, or they end here.
 void TransactionCommit::Work::settle_with_host() {
   if (!deployed_ || host_->is_deployed()) return;
   for (DraftComponent* added : prepared_added_) host_->detach(added->component->task());
+  for (const Change& change : changes_) host_->detach(change.draft->component->task());
 }
 
 void TransactionCommit::Work::draft_steps() {

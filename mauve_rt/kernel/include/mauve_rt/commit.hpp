@@ -268,7 +268,7 @@ void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
 /// | --------------- | ---------- | ---------- | ------------------------------------- |
 /// | order_ (futex)  | requester  | the thread | release/acquire: hands over commit_   |
 /// | finished_(futex)| the thread | requester  | release/acquire: the commit's end     |
-/// | under_way_      | the thread | anyone     | its own: lent.hpp                     |
+/// | under_way_      | requester  | anyone     | its own: lent.hpp                     |
 class Conductor {
  public:
   /// [setup] Without the right to SCHED_FIFO it is an ordinary thread.
@@ -279,6 +279,9 @@ class Conductor {
 
   /// conduct() on the thread; one caller at a time. [non-rt]
   void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+  /// Makes a commit whose tasks are all parked on the calling thread, where withdraw() finds it; one caller at a time.
+  /// [non-rt]
+  void make_alone(Commit& commit) noexcept;
   /// Calls off the commit under way, if there is one, and does not wait for its end; any thread. [rt]
   void withdraw() noexcept;
 

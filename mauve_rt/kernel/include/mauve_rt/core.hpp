@@ -20,7 +20,8 @@ class CoreBase : public Configurable {
   virtual bool accepts(const Shell& /*shell*/) const noexcept { return false; }
 
   /// Checks that the old core's state can be carried over; nothing is changed yet. [rt]
-  /// Runs on the component's thread, inside its wait. Returning false or throwing refuses the replacement.
+  /// Runs on the component's thread, inside its wait; while that is stopped on the requester's, who waits for its end
+  /// however long it lasts, and so does a start of this component; nobody else does. Returning false or throwing refuses the replacement.
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
   /// Moves the old core's state over; cannot fail. [rt]
   virtual void take(CoreBase& /*old*/) noexcept {}

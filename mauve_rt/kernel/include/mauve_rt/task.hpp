@@ -146,8 +146,8 @@ class Task {
   /// when told so; and Error (timeout) while an earlier thread of the task has not ended.
   void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
                      std::shared_ptr<Watchdog> watchdog = {});
-  /// Tells the thread to end, then joins it; false when it was still in user code at the instant. An abandoned one is
-  /// not waited for. [non-rt]
+  /// Tells the thread to end, then joins it; false when it was still in user code at the instant, or when a commit held
+  /// the task until then, in the adopt of a parked component's new core. An abandoned one is not waited for. [non-rt]
   bool end_thread(time_ns_t until_ns) noexcept;
   bool has_thread() const noexcept { return has_thread_.load(std::memory_order_acquire); }
   /// Whether its last thread has come to its end. [non-rt]
