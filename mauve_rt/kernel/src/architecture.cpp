@@ -75,7 +75,9 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
   {
     const std::lock_guard lock(host_mutex_);
     host = host_;
-    if (host != nullptr) use = host->use();  // only its end waits for that
+    // Only its end waits for that. Tried, as nobody has it: changes are made one at a time, and a host that ends was
+    // released before. A hook may shut down the host, which takes these locks the other way round.
+    if (host != nullptr) use = host->use();
   }
   auto work = std::make_unique<TransactionCommit>(*this, host, options);
   work->make(std::move(transaction));

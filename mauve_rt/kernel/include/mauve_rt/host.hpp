@@ -88,7 +88,7 @@ class Host {
   /// Who conducts commits of running components; nullptr: nobody, or nobody any more. [non-rt]
   virtual std::shared_ptr<Conductor> conductor() noexcept = 0;
   /// Held while a change uses the host. [non-rt], the architecture's change lock held.
-  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_); }
+  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
 
  protected:
   /// Throws Error: not_configured; already_running when it is deployed. [setup]
