@@ -216,7 +216,9 @@ void throw_if_off(Commit& commit, time_ns_t timeout_ns) {
                   {.remedy = "deploy it again first"});
     case Commit::Off::timed_out:
     case Commit::Off::overran:
-      if (commit.refused_by() != nullptr) throw_late_adopt(*commit.refused_by());
+      // A look at the states, which is no component's, was merely the last thing done before it was called off.
+      if (commit.refused_by() != nullptr && commit.refused_by()->task != nullptr)
+        throw_late_adopt(*commit.refused_by());
       throw_timeout(commit, timeout_ns);
     case Commit::Off::not_yet:
       if (commit.adopt_was_late()) throw_late_adopt(*commit.refused_by());

@@ -153,7 +153,7 @@ void TransactionCommit::Work::carry_out_commit() {
 }
 
 void TransactionCommit::Work::throw_refused(const std::string& what) const {
-  if (commit_->refused_by() == &guard_) {
+  if (commit_->refused_by() == &guard_ && guard_.changed() != nullptr) {
     throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
                 {.component = guard_.changed()->name(),
                  .element = "state",
