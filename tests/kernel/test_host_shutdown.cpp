@@ -94,7 +94,8 @@ TEST_F(HostShutdown, WaitsForNoAdoptOfAStoppedComponent) {
   CoreBase* const old = &changed.core();
   Transaction change;
   change.replace_core("changed", std::make_unique<SlowToAdopt>(latch)).start("changed");
-  std::thread other = prepare(std::move(change));  // the adopt runs on that thread, the component being parked
+  std::thread other =
+      prepare(std::move(change));  // the adopt runs on that thread, the component being parked
   deployer.stop("drive");
   deployer.start("drive");
   wait_runs(drive, core(drive).runs + 2);

@@ -47,9 +47,11 @@ Architecture::~Architecture() {
     // A thread that does not come back from its state is left behind with all it may use: nothing of that is freed.
     for (const auto& resource : resources_) resource->set_notifier(nullptr);
     keep_for_ever(std::move(resources_));
+    for (const Leaving& leaving : leaving_) leaving.component->task().detach_thread();
     keep_for_ever(std::move(leaving_));
     const auto has_ended = [](const auto& component) { return component->task().has_ended(); };
     const auto first = std::partition(components_.begin(), components_.end(), has_ended);
+    std::for_each(first, components_.end(), [](const auto& component) { component->task().detach_thread(); });
     keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components_.end()));
     components_.erase(first, components_.end());
     resources_.clear();

@@ -122,7 +122,7 @@ void Deployer::shutdown() noexcept {
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : architecture().components()) component->task().end_thread(until);
   conductor->withdraw();  // one that held a task until now is not to start it
-  watchdog_->stop();  // last: stopping is watched too
+  watchdog_->stop();      // last: stopping is watched too
   architecture().release_host(*this);
   architecture().changes().bump();
 }

@@ -65,8 +65,9 @@ std::string_view take_word(std::string_view& line) {
 }
 
 bool read_range(std::string_view word, Range& range) {
-  const char* const last = word.data() + word.size();
-  const auto begin = std::from_chars(word.data(), last, range.begin, 16);
+  const char* const first = word.data();
+  const char* const last = first + word.size();
+  const auto begin = std::from_chars(first, last, range.begin, 16);
   if (begin.ec != std::errc{} || begin.ptr == last) return false;
   return std::from_chars(begin.ptr + 1, last, range.end, 16).ec == std::errc{};
 }
@@ -103,7 +104,8 @@ std::uintptr_t private_pages() {
   for (int field = 0; field < 5; ++field) take_word(rest);
   const std::string_view word = take_word(rest);
   std::uintptr_t pages = 0;
-  std::from_chars(word.data(), word.data() + word.size(), pages);
+  const char* const first = word.data();
+  std::from_chars(first, first + word.size(), pages);
   return pages;
 }
 
@@ -165,9 +167,14 @@ std::vector<Range> common(const std::vector<Range>& ones, const std::vector<Rang
   return both;
 }
 
+/// Addresses come as text, out of a file.
+void* to_pointer(std::uintptr_t address) noexcept {
+  return reinterpret_cast<void*>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+
 /// Whether the pages are in memory now. Another thread may unmap them at any time: nothing is touched here.
 bool populate(Range range) noexcept {
-  void* const from = reinterpret_cast<void*>(range.begin);
+  void* const from = to_pointer(range.begin);
   const std::size_t bytes = range.end - range.begin;
   if (madvise(from, bytes, MADV_POPULATE_WRITE) == 0) return true;
   return errno == EINVAL && mlock(from, bytes) == 0;  // an older kernel; where memory may be locked
@@ -180,7 +187,7 @@ bool populate_missing(Range range) noexcept {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   while (range.begin < range.end) {
     const std::uintptr_t count = std::min((range.end - range.begin) / page, is_there.size());
-    if (mincore(reinterpret_cast<void*>(range.begin), count * page, is_there.data()) != 0) return false;
+    if (mincore(to_pointer(range.begin), count * page, is_there.data()) != 0) return false;
     for (std::uintptr_t at = 0; at < count;) {
       const std::uintptr_t first = at;
       while (at < count && (is_there[at] & 1U) == 0) ++at;
@@ -240,7 +247,7 @@ void prefault(void* from, std::size_t bytes) noexcept {
   if (begin >= end || populate({begin, end})) return;
   // By an operation that changes nothing whoever else writes there.
   for (std::uintptr_t at = begin; at < end; at += page)
-    std::atomic_ref(*reinterpret_cast<unsigned char*>(at)).fetch_or(0, std::memory_order_relaxed);
+    std::atomic_ref(*static_cast<unsigned char*>(to_pointer(at))).fetch_or(0, std::memory_order_relaxed);
 }
 
 void note_allocated_before() noexcept {

@@ -189,6 +189,10 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
   return true;
 }
 
+void Task::detach_thread() noexcept {
+  if (has_thread_) pthread_detach(thread_);
+}
+
 void Task::start_at(time_ns_t instant_ns) {
   const std::lock_guard lock(command_mutex_);
   post_start(instant_ns);

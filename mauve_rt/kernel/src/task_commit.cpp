@@ -178,7 +178,8 @@ void Task::finish_parked(Participant& place, bool committed) noexcept {
     return clock_->due_changed(*this);
   }
   if (committed && place.epoch_ns != nullptr) join(*place.epoch_ns);
-  const bool can_start = simulated_ || has_thread_;  // a shutdown may have come before the commit held the task
+  const bool can_start =
+      simulated_ || has_thread_;  // a shutdown may have come before the commit held the task
   if (committed && can_start && place.afterwards == Afterwards::restart) {
     post_start(next_instant(place.start_clock_ns));
     wait_started();

@@ -150,6 +150,8 @@ class Task {
   /// the task until then, in the adopt of a parked component's new core. An abandoned one is not waited for. [non-rt]
   bool end_thread(time_ns_t until_ns) noexcept;
   bool has_thread() const noexcept { return has_thread_.load(std::memory_order_acquire); }
+  /// Nobody will join its thread, which may come to its end long after: the task stays for ever. [non-rt]
+  void detach_thread() noexcept;
   /// Whether its last thread has come to its end. [non-rt]
   bool has_ended() const noexcept { return !has_thread() || ended_.load(std::memory_order_acquire) != 0; }
 
