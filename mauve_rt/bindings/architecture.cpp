@@ -39,7 +39,7 @@ void commit_one(PyArchitecture& self, Transaction transaction) {
 }
 
 /// A whole transaction without a host; where there is one, by it.
-TransactionReport commit(PyArchitecture& self, const PyTransaction& steps) {
+TransactionReport commit_transaction(PyArchitecture& self, const PyTransaction& steps) {
   Transaction transaction = steps.build(self.registry);
   const py::gil_scoped_release release;
   return self.architecture.commit(std::move(transaction));
@@ -120,7 +120,7 @@ void bind_architecture(py::module_& module) {
              const std::string& resource,
              const std::string& service) { self.architecture.connect(component, port, resource, service); },
           py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"), Unlocked())
-      .def("commit", &commit, py::arg("transaction"))
+      .def("commit", &commit_transaction, py::arg("transaction"))
       .def(
           "set_property",
           [](PyArchitecture& self, const std::string& component, const std::string& name,

@@ -282,6 +282,7 @@ TEST_F(Prefaulted, WhatANewCoreAllocatedIsInMemory) {
 }
 
 TEST_F(Prefaulted, WhatTakesThePlaceOfWhatWasGivenBackIsInMemory) {
+  if (allocation_counting() == AllocationCounting::none) GTEST_SKIP() << "a sanitizer's allocator";
   Component& component = add("c", 1);
   deploy();
   wait_runs(component, 3);
