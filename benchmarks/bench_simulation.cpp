@@ -3,7 +3,7 @@
 //   bench_simulation [--components 1000] [--period-us 100000] [--virtual-s 200] [--spread 0]
 // --spread 1: every component has an offset of its own, else all are due at one instant.
 // Prints {"virtual_ns": the time that passed, "real_ns": in so long, "releases": of all components}.
-#include "mauve_rt/simulation.hpp"
+#include "mauve_rt/deploy/simulation.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"

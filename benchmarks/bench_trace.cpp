@@ -5,7 +5,7 @@
 // bare clock_gettime(CLOCK_MONOTONIC), in picoseconds a call. Rings are emptied between blocks.
 #include <ctime>
 
-#include "mauve_rt/trace.hpp"
+#include "mauve_rt/base/trace.hpp"
 
 #include "support/micro.hpp"
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Check the dependencies that no other tool sees.
 
-C++ includes point one way: kernel <- bindings, bridge. Examples and benchmarks use what is public only: the
-headers <mauve_rt/*.hpp>, and of the Python package nothing whose name starts with an underscore.
-import-linter checks the layers inside the Python packages; it sees no compiled module.
+C++ includes point one way: kernel <- bindings, bridge; in the kernel a storey includes only those below it.
+Examples and benchmarks use what is public only: the headers <mauve_rt/*.hpp>, and of the Python package
+nothing whose name starts with an underscore. import-linter checks the layers inside the Python packages; it
+sees no compiled module.
 
     scripts/check_includes.py [ROOT]
 
@@ -50,9 +51,27 @@ RULES = (
     rule("tests/kernel", ROS + "|" + PYTHON, "kernel tests run where there is neither ROS nor Python"),
 )
 
-# Examples and benchmarks see the kernel as any user does.
+KERNEL = "mauve_rt/kernel"
+# Each knows only those before it.
+STOREYS = ("base", "data", "parts", "run", "architecture", "change", "deploy", "elements")
+# Includes that still point up: (file, included path).
+UPWARD = {
+    ("architecture/architecture.cpp", "mauve_rt/change/transaction_commit.hpp"),
+    ("architecture/architecture.cpp", "mauve_rt/deploy/host.hpp"),
+    ("change/prepare.cpp", "mauve_rt/deploy/host.hpp"),
+    ("change/work.cpp", "mauve_rt/deploy/host.hpp"),
+    ("data/client.cpp", "mauve_rt/run/task.hpp"),
+    ("include/mauve_rt/architecture/architecture.hpp", "mauve_rt/change/transaction.hpp"),
+    ("include/mauve_rt/run/component.hpp", "mauve_rt/architecture/change_lock.hpp"),
+    ("include/mauve_rt/run/task.hpp", "mauve_rt/deploy/due_queue.hpp"),
+    ("parts/event_input.cpp", "mauve_rt/run/task.hpp"),
+    ("run/component.cpp", "mauve_rt/architecture/architecture.hpp"),
+    ("run/component.cpp", "mauve_rt/change/transaction_commit.hpp"),
+}
+
+# Examples and benchmarks see the kernel as any user does: by the door and by headers of storeys.
 PUBLIC_ONLY = ("mauve_examples", "benchmarks")
-PRIVATE_PATH = re.compile(r"(\.\./)+mauve_rt/|.*\bkernel/|mauve_rt/(detail|internal)/|mauve_rt/.*\.(h|cpp)$")
+PRIVATE_PATH = re.compile(r"(\.\./)+mauve_rt/|.*\bkernel/|mauve_rt/.*\.(h|cpp)$|(" + "|".join(STOREYS) + ")/")
 
 
 def includes(path: Path) -> list[tuple[int, str]]:
@@ -100,9 +119,35 @@ def private_imports(root: Path, folder: str) -> list[str]:
     return lines
 
 
+def storey(path: str) -> int | None:
+    """Return the number of the kernel's storey that a path inside it, or an included path, belongs to."""
+    folder = path.removeprefix("include/").removeprefix("mauve_rt/").partition("/")[0]
+    return STOREYS.index(folder) if folder in STOREYS else None
+
+
+def upward_includes(kernel: Path) -> list[str]:
+    """Return one line per include of a higher storey of the kernel, and per exception that is none."""
+    lines, exceptions = [], set(UPWARD)
+    for path in cpp_files(kernel):
+        name = path.relative_to(kernel).as_posix()
+        own = storey(name)
+        if own is None and name != "include/mauve_rt/mauve_rt.hpp":
+            lines.append(f"{KERNEL}/{name}: in no storey: one of {', '.join(STOREYS)}")
+        for number, included in includes(path):
+            other = storey(included)
+            if own is None or other is None or other <= own:
+                continue
+            if (name, included) in UPWARD:
+                exceptions.discard((name, included))
+            else:
+                why = f"{STOREYS[own]} does not know {STOREYS[other]}"
+                lines.append(f"{KERNEL}/{name}:{number}: includes {included}: {why}")
+    return lines + [f"{KERNEL}/{name} does not include {included} any more" for name, included in exceptions]
+
+
 def violations(root: Path) -> list[str]:
     """Return one line per include or import that breaks a rule."""
-    lines = []
+    lines = upward_includes(root / KERNEL)
     for item in RULES:
         for path in cpp_files(root / item.folder):
             lines += [

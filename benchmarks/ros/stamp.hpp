@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace bench {
 

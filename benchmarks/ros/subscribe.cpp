@@ -6,7 +6,7 @@
 #include <chrono>
 #include <fstream>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "ros/bare_node.hpp"
 #include "ros/stamp.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "support/json_line.hpp"
 #include "support/options.hpp"

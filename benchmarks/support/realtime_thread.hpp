@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace bench {
 

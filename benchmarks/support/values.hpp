@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "mauve_rt/cdr.hpp"
+#include "mauve_rt/data/cdr.hpp"
 
 namespace bench {
 

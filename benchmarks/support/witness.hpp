@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "support/realtime_thread.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <span>
 
-#include "mauve_rt/thread_counters.hpp"
+#include "mauve_rt/base/thread_counters.hpp"
 
 #include "mauve_examples/explorer.hpp"
 #include "mauve_examples/pilot.hpp"

@@ -2,8 +2,8 @@
 // What runs an architecture, bound once: Deployer and SimulatedHost are made differently, and used alike.
 #include "host.hpp"
 
-#include "mauve_rt/deployer.hpp"
-#include "mauve_rt/futex.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/deploy/deployer.hpp"
 
 #include "transaction.hpp"
 

@@ -2,9 +2,9 @@
 // What runs an architecture, as Python holds it.
 #pragma once
 
-#include "mauve_rt/futex.hpp"
-#include "mauve_rt/host.hpp"
-#include "mauve_rt/trace_collector.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/deploy/trace_collector.hpp"
 
 #include "translate.hpp"
 

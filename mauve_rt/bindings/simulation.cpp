@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/simulation.hpp"
+#include "mauve_rt/deploy/simulation.hpp"
 
 #include "host.hpp"
 

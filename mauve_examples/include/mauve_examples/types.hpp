@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mauve_rt/bounded.hpp"
-#include "mauve_rt/cdr.hpp"
+#include "mauve_rt/data/bounded.hpp"
+#include "mauve_rt/data/cdr.hpp"
 #include "mauve_rt/elements/types.hpp"
 
 namespace mauve_examples {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/client.hpp"
-#include "mauve_rt/resource.hpp"
+#include "mauve_rt/data/client.hpp"
+#include "mauve_rt/data/resource.hpp"
 
 #include "receiver.hpp"
 #include "topic_events.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "bridge.hpp"
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
 

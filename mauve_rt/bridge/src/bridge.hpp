@@ -7,8 +7,8 @@
 #include <mutex>
 #include <vector>
 
-#include "mauve_rt/architecture.hpp"
-#include "mauve_rt/pi_mutex.hpp"
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
 
 #include "calls.hpp"
 #include "thread.hpp"

@@ -6,8 +6,8 @@
 
 #include <mutex>
 
-#include "mauve_rt/error.hpp"
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "rcl_error.hpp"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "mauve_rt/pi_mutex.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
 
 #include "binding.hpp"
 #include "owned.hpp"

@@ -3,7 +3,7 @@
 
 #include <rcl/error_handling.h>
 
-#include "mauve_rt/error.hpp"
+#include "mauve_rt/base/error.hpp"
 
 namespace mauve::bridge {
 

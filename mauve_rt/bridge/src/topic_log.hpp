@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace mauve::bridge {
 

@@ -3,7 +3,7 @@
 
 #include <rcl/error_handling.h>
 
-#include "mauve_rt/time.hpp"
+#include "mauve_rt/base/time.hpp"
 
 #include "rcl_error.hpp"
 #include "type_support.hpp"

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "mauve_rt/error.hpp"
+#include "mauve_rt/base/error.hpp"
 
 namespace mauve::bridge {
 

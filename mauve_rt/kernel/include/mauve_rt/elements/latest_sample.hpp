@@ -2,7 +2,7 @@
 // What a port read last, kept in place with its writer's time.
 #pragma once
 
-#include "mauve_rt/port.hpp"
+#include "mauve_rt/data/port.hpp"
 
 namespace mauve {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "mauve_rt/error.hpp"
-#include "mauve_rt/fsm.hpp"
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/parts/fsm.hpp"
 
 namespace mauve {
 

@@ -4,9 +4,9 @@
 
 #include <string>
 
+#include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/elements/multiplexer.hpp"
 #include "mauve_rt/elements/relay.hpp"
-#include "mauve_rt/plugin.hpp"
 
 namespace mauve {
 

@@ -2,7 +2,7 @@
 // Common shells: one input, one output, or both, and a period.
 #pragma once
 
-#include "mauve_rt/shell.hpp"
+#include "mauve_rt/parts/shell.hpp"
 
 namespace mauve {
 

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "mauve_rt/cdr.hpp"
+#include "mauve_rt/data/cdr.hpp"
 
 /// A type's identity is its name, and one name is one C++ struct: whoever needs one of these messages uses the
 /// struct from here. Units as in ROS: m, rad, m/s, rad/s.

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/architecture/architecture.hpp"
+
+#include <algorithm>
+#include <deque>
+
+#include "mauve_rt/architecture/plugin.hpp"
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/change/transaction_commit.hpp"
+#include "mauve_rt/deploy/host.hpp"
+
+#include "base/prefault.hpp"
+#include "parts/lookup.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr time_ns_t kEndTimeout = ms_to_ns(500);
+
+/// Until the process ends, and beyond the end of static objects.
+template <typename Objects>
+void keep_for_ever(Objects objects) {
+  static std::mutex mutex;
+  static auto* const kept = new std::deque<Objects>;
+  const std::lock_guard lock(mutex);
+  kept->push_back(std::move(objects));
+}
+
+template <typename Item>
+std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, const std::string& name) {
+  for (const auto& item : items) {
+    if (item->name() == name) return item;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
+  note_allocated_before();  // whatever comes after may be what its components own
+}
+
+Architecture::~Architecture() {
+  if (!end_threads()) {
+    // A thread that does not come back from its state is left behind with all it may use: nothing of that is freed.
+    for (const auto& resource : resources_) resource->set_notifier(nullptr);
+    keep_for_ever(std::move(resources_));
+    for (const Leaving& leaving : leaving_) leaving.component->task().detach_thread();
+    keep_for_ever(std::move(leaving_));
+    const auto has_ended = [](const auto& component) { return component->task().has_ended(); };
+    const auto first = std::partition(components_.begin(), components_.end(), has_ended);
+    std::for_each(first, components_.end(), [](const auto& component) { component->task().detach_thread(); });
+    keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components_.end()));
+    components_.erase(first, components_.end());
+    resources_.clear();
+  }
+  Configurable::cleanup();
+}
+
+void Architecture::configure() {
+  const auto change = change_lock_.join();
+  Configurable::configure();
+}
+
+void Architecture::cleanup() {
+  const auto change = change_lock_.join();
+  Configurable::cleanup();
+}
+
+std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
+                                                      const TransactionOptions& options) {
+  const std::lock_guard change(change_lock_);
+  Host* host = nullptr;
+  std::unique_lock<std::mutex> use;
+  {
+    const std::lock_guard lock(host_mutex_);
+    host = host_;
+    // Only its end waits for that. Tried, as nobody has it: changes are made one at a time, and a host that ends was
+    // released before. A hook may shut down the host, which takes these locks the other way round.
+    if (host != nullptr) use = host->use();
+  }
+  auto work = std::make_unique<TransactionCommit>(*this, host, options);
+  work->make(std::move(transaction));
+  return work;
+}
+
+TransactionReport Architecture::commit(Transaction transaction, const TransactionOptions& options) {
+  return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
+}
+
+std::unique_ptr<TransactionCommit> Architecture::make_one(Transaction transaction,
+                                                          const CommitTimeouts& timeouts) {
+  try {
+    return make(std::move(transaction), {.timeouts = timeouts});
+  } catch (const Error& failure) {  // who asked for one thing needs no number for it
+    ErrorDetail detail = failure.detail();
+    detail.step = 0;
+    detail.step_name.clear();
+    throw Error(failure.code(), failure.statement(), detail);
+  }
+}
+
+StepReport Architecture::commit_one(Transaction transaction, const CommitTimeouts& timeouts) {
+  return make_one(std::move(transaction), timeouts)->report(timeouts.phase_ns).steps.front();
+}
+
+Host* Architecture::host() const {
+  const std::lock_guard lock(host_mutex_);
+  return host_;
+}
+
+void Architecture::set_host(Host& host) {
+  const std::lock_guard lock(host_mutex_);
+  if (host_ != nullptr) {
+    throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
+                {.expected = "an architecture that nobody runs", .remedy = "shut its host down first"});
+  }
+  host_ = &host;
+}
+
+void Architecture::release_host(const Host& host) noexcept {
+  const std::lock_guard lock(host_mutex_);
+  if (host_ == &host) host_ = nullptr;
+}
+
+/// False when one still executes a state.
+bool Architecture::end_threads() noexcept {
+  const time_ns_t until = monotonic_now_ns() + kEndTimeout;
+  bool all_ended = true;
+  for (const auto& component : components_) {
+    all_ended &= component->task().end_thread(until);
+    component->set_architecture(nullptr);
+  }
+  for (const Leaving& leaving : leaving_) all_ended &= leaving.component->task().end_thread(until);
+  return all_ended;
+}
+
+PluginRegistry& Architecture::require_registry() const {
+  if (registry_ != nullptr) return *registry_;
+  throw Error(ErrorCode::invalid_argument, "the architecture has no plug-in registry",
+              {.remedy = "give one to its constructor, or add parts by type"});
+}
+
+Component& Architecture::add_component(const std::string& name, std::unique_ptr<Shell> shell,
+                                       std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
+                                       const TaskSettings& settings, const Component::FsmFactory& make_fsm) {
+  Parts parts{.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)};
+  commit_one(
+      std::move(Transaction().add_component(name, std::move(parts), {.settings = settings}, make_fsm)));
+  return component(name);
+}
+
+Component& Architecture::add_component(const std::string& name, const std::string& shell,
+                                       const std::string& core, const std::string& fsm,
+                                       const TaskSettings& settings) {
+  commit_one(std::move(
+      Transaction().add_component(name, {.shell = shell, .core = core, .fsm = fsm, .settings = settings})));
+  return component(name);
+}
+
+void Architecture::add_resource(const std::string& name, std::unique_ptr<Resource> resource) {
+  commit_one(std::move(Transaction().add_resource(name, std::move(resource))));
+}
+
+void Architecture::connect(Component& component, const std::string& port, Resource& resource,
+                           const std::string& service) {
+  connect(component.name(), port, resource.name(), service);
+}
+
+void Architecture::connect(const std::string& component, const std::string& port, const std::string& resource,
+                           const std::string& service) {
+  commit_one(std::move(Transaction().connect(component, port, resource, service)), {.phase_ns = 0});
+}
+
+void Architecture::publish(const std::string& name) {
+  const std::lock_guard change(change_lock_);
+  prepare_outward(resource(name), TopicBinding::publish);
+}
+
+void Architecture::subscribe(const std::string& name) {
+  const std::lock_guard change(change_lock_);
+  resource(name).bind_input();
+}
+
+void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
+  if (topic != TopicBinding::none && !resource.is_serializable()) {
+    throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
+                {.element = "resource " + resource.name(),
+                 .expected = "shared_data, ring_buffer, latest_value or event",
+                 .found = resource.kind()});
+  }
+  if (topic == TopicBinding::subscribe) resource.bind_input();
+  if (topic == TopicBinding::publish || resource.client() != nullptr) resource.set_notifier(&publications_);
+}
+
+std::vector<std::shared_ptr<Component>> Architecture::components() const {
+  const std::lock_guard lock(list_mutex_);
+  return components_;
+}
+
+std::vector<std::shared_ptr<Resource>> Architecture::resources() const {
+  const std::lock_guard lock(list_mutex_);
+  return resources_;
+}
+
+std::shared_ptr<Component> Architecture::hold_component(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  if (auto found = find_in(components_, name)) return found;
+  throw_no_component(name, components_);
+}
+
+std::shared_ptr<Resource> Architecture::hold_resource(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  if (auto found = find_in(resources_, name)) return found;
+  throw_no_resource(name, resources_);
+}
+
+std::shared_ptr<Component> Architecture::find_component(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  return find_in(components_, name);
+}
+
+std::shared_ptr<Resource> Architecture::find_resource(const std::string& name) const {
+  const std::lock_guard lock(list_mutex_);
+  return find_in(resources_, name);
+}
+
+Component& Architecture::component(const std::string& name) const { return *hold_component(name); }
+Resource& Architecture::resource(const std::string& name) const { return *hold_resource(name); }
+
+std::unique_ptr<CoreBase> Architecture::make_core(const std::string& implementation) const {
+  return require_registry().make_core(implementation);
+}
+
+bool Architecture::next_published(std::string& resource, std::vector<std::byte>& message,
+                                  time_ns_t& time_ns) {
+  for (const auto& published : resources()) {
+    if (!published->next_published(message, time_ns)) continue;
+    resource = published->name();
+    return true;
+  }
+  return false;
+}
+
+void Architecture::require_ready_cores() const {
+  for (const auto& component : components()) component->require_ready_core();
+}
+
+bool Architecture::configure_hook() {
+  try {
+    for (const auto& resource : resources_) resource->configure();
+    for (const auto& component : components_) component->configure();
+  } catch (...) {
+    cleanup_hook();
+    throw;
+  }
+  return true;
+}
+
+void Architecture::check_cleanup() const {
+  for (const auto& component : components()) {
+    if (component->task().is_parked()) continue;
+    throw Error(ErrorCode::already_running, "the component still executes a state",
+                {.component = component->name(),
+                 .element = "state " + component->task().current_state(),
+                 .expected = "a parked component",
+                 .found = std::string(to_string(component->task().state())),
+                 .remedy = "stop it, and wait for the state's end"});
+  }
+}
+
+void Architecture::cleanup_hook() {
+  for (auto component = components_.rbegin(); component != components_.rend(); ++component)
+    (*component)->cleanup();
+  for (auto resource = resources_.rbegin(); resource != resources_.rend(); ++resource) (*resource)->cleanup();
+}
+
+}  // namespace mauve

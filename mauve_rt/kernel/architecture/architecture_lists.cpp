@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// How an architecture's lists change while others look at them, and what stays of those removed.
+#include <algorithm>
+#include <iterator>
+
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/error.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr std::size_t kMostNumbers = UINT16_MAX;
+constexpr std::size_t kMostRetiredRecords = std::size_t{64} * 1024;
+
+/// A component and what it tells of its changes to; the architecture listens once it is listed.
+struct Member {
+  Member(const std::string& name, std::uint16_t number) : component(name, number, changes) {}
+
+  ChangeSignal changes;
+  Component component;
+};
+
+template <typename Item>
+void take_out(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::shared_ptr<Item>>& gone) {
+  if (gone.empty()) return;
+  std::erase_if(
+      items, [&gone](const auto& item) { return std::find(gone.begin(), gone.end(), item) != gone.end(); });
+}
+
+template <typename Item>
+void append(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::shared_ptr<Item>>& more) {
+  items.insert(items.end(), more.begin(), more.end());
+}
+
+}  // namespace
+
+std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) {
+  const std::lock_guard lock(list_mutex_);
+  if (names_.size() == kMostNumbers) {
+    throw Error(ErrorCode::out_of_range, "the trace has no number left for another component",
+                {.component = name,
+                 .expected = "at most " + std::to_string(kMostNumbers) + " components, removed ones included",
+                 .remedy = "start the executor anew"});
+  }
+  const auto member = std::make_shared<Member>(name, static_cast<std::uint16_t>(names_.size()));
+  names_.push_back(name);
+  return {member, &member->component};
+}
+
+std::size_t Architecture::numbers() const {
+  const std::lock_guard lock(list_mutex_);
+  return names_.size();
+}
+
+void Architecture::give_back_numbers(std::size_t numbers) {
+  const std::lock_guard lock(list_mutex_);
+  if (numbers < names_.size()) names_.resize(numbers);
+}
+
+void Architecture::change_lists(const ListChange& change) {
+  {
+    const std::lock_guard lock(list_mutex_);
+    for (const auto& component : change.removed_components) component->set_architecture(nullptr);
+    take_out(components_, change.removed_components);
+    take_out(resources_, change.removed_resources);
+    append(resources_, change.added_resources);
+    append(components_, change.added_components);
+    for (const auto& component : change.added_components) component->set_architecture(this);
+    for (Component* component : change.changed) component->show();
+  }
+  changes_.bump();
+}
+
+void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
+                                    const std::vector<std::shared_ptr<Resource>>& gone) {
+  Leaving leaving{.component = std::move(component), .was_listed = was_listed, .uses = {}};
+  std::vector<std::shared_ptr<Resource>> all = resources();
+  append(all, gone);
+  for (const auto& resource : all) {
+    if (leaving.component->uses(*resource)) leaving.uses.push_back(resource);
+  }
+  const std::lock_guard lock(list_mutex_);
+  leaving_.push_back(std::move(leaving));
+}
+
+void Architecture::reap() {
+  std::vector<Leaving> ended;
+  {
+    const std::lock_guard lock(list_mutex_);
+    const auto has_ended = [](const Leaving& leaving) {
+      return leaving.component->task().end_thread(monotonic_now_ns());
+    };
+    const auto first = std::partition(leaving_.begin(), leaving_.end(),
+                                      [&](const Leaving& leaving) { return !has_ended(leaving); });
+    ended.assign(std::make_move_iterator(first), std::make_move_iterator(leaving_.end()));
+    leaving_.erase(first, leaving_.end());
+  }
+  for (const Leaving& leaving : ended) {
+    for (const auto& port : leaving.component->shell().ports()) port->disconnect();
+    leaving.component->cleanup();
+    if (leaving.was_listed) retire_trace(leaving.component->task());
+  }
+}
+
+std::size_t Architecture::threads_left_behind() const {
+  const std::lock_guard lock(list_mutex_);
+  return static_cast<std::size_t>(std::count_if(leaving_.begin(), leaving_.end(), [](const Leaving& leaving) {
+    return !leaving.component->task().has_ended();
+  }));
+}
+
+bool Architecture::is_used_by_left_behind(const Resource& resource) const {
+  const std::lock_guard lock(list_mutex_);
+  return std::any_of(leaving_.begin(), leaving_.end(),
+                     [&resource](const Leaving& leaving) { return leaving.component->uses(resource); });
+}
+
+std::vector<std::string> Architecture::trace_components() const {
+  const std::lock_guard lock(list_mutex_);
+  return names_;
+}
+
+void Architecture::retire_trace(Task& task) {
+  const std::lock_guard lock(trace_mutex_);
+  const std::unique_ptr<TraceRing> ring = task.release_ring();
+  if (ring == nullptr) return;
+  std::vector<TraceRecord> records;
+  ring->drain(records);
+  if (finals_.size() <= task.number()) finals_.resize(task.number() + std::size_t{1});
+  finals_[task.number()] = {.written = ring->offered(), .dropped = ring->dropped()};
+  retired_.insert(retired_.end(), records.begin(), records.end());
+  for (; retired_.size() > kMostRetiredRecords; retired_.pop_front())
+    ++finals_[retired_.front().component].dropped;
+}
+
+TraceDrain Architecture::drain_trace() {
+  const std::lock_guard lock(trace_mutex_);
+  const auto present = components();
+  TraceDrain drain;
+  drain.records.assign(retired_.begin(), retired_.end());
+  retired_.clear();
+  retired_.shrink_to_fit();
+  const std::size_t count = std::max(numbers(), finals_.size());
+  drain.written.resize(count);
+  drain.dropped.resize(count);
+  for (std::size_t number = 0; number < finals_.size(); ++number) {
+    drain.written[number] = finals_[number].written;
+    drain.dropped[number] = finals_[number].dropped;
+  }
+  for (const auto& component : present) {
+    Task& task = component->task();
+    task.drain_ring(drain.records, drain.written[task.number()], drain.dropped[task.number()]);
+  }
+  drain.monotonic_ns = monotonic_now_ns();
+  drain.realtime_ns = realtime_now_ns();
+  return drain;
+}
+
+}  // namespace mauve

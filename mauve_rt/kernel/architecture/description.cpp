@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/architecture/description.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/error.hpp"
+
+namespace mauve {
+
+namespace {
+
+ComponentFacts facts_of(Component& component, time_ns_t epoch_ns) {
+  Task& task = component.task();
+  const TaskSettings& settings = task.settings();
+  return {.name = component.name(),
+          .parts = component.shown(),
+          .state = settled(task.state()),
+          .period_ns = task.context().period_ns.load(std::memory_order_relaxed),
+          .offset_ns = settings.offset_ns,
+          .reference_ns = task.grid().reference_ns == 0 ? 0 : task.grid().reference_ns - epoch_ns,
+          .priority = settings.priority,
+          .cpus = settings.cpus,
+          .alternatives = component.alternatives(),
+          .fallback = component.fallback_implementation(),
+          .reconfigurable = component.is_reconfigurable()};
+}
+
+ResourceFacts facts_of(const Resource& resource) {
+  ResourceFacts facts{
+      .name = resource.name(), .kind = resource.kind(), .type = resource.type(), .services = {}};
+  for (const ServiceBase* service : resource.services())
+    facts.services.push_back({.name = service->name(), .kind = service->kind(), .type = service->type()});
+  return facts;
+}
+
+template <typename Facts>
+void sort_by_name(std::vector<Facts>& facts) {
+  std::sort(facts.begin(), facts.end(), [](const Facts& a, const Facts& b) { return a.name < b.name; });
+}
+
+std::string numbers(const std::vector<int>& values) {
+  std::vector<std::string> words;
+  words.reserve(values.size());
+  for (const int value : values) words.push_back(std::to_string(value));
+  return join(words);
+}
+
+std::string text_of(const ComponentFacts& facts) {
+  std::string text = "component " + facts.name + "\n  state " + std::string(to_string(facts.state)) + "\n";
+  text +=
+      "  shell " + facts.parts.shell + "\n  core " + facts.parts.core + "\n  fsm " + facts.parts.fsm + "\n";
+  text += "  period_ns " + std::to_string(facts.period_ns) + "\n  offset_ns " +
+          std::to_string(facts.offset_ns) + "\n  reference_ns " + std::to_string(facts.reference_ns) + "\n";
+  text += "  priority " + std::to_string(facts.priority) + "\n  cpus " + numbers(facts.cpus) + "\n";
+  text += "  alternatives " + join(facts.alternatives) + "\n";
+  if (!facts.fallback.empty()) text += "  fallback " + facts.fallback + "\n";
+  if (!facts.reconfigurable) text += "  reconfigurable false\n";
+  for (const ShownProperty& property : facts.parts.properties)
+    text += "  property " + property.name + " " + to_string(property.value) + "\n";
+  for (const ShownPort& port : facts.parts.ports) {
+    text += "  port " + port.name + " " + std::string(to_string(port.kind)) + " " + port.type;
+    text += port.resource.empty() ? "\n" : " -> " + port.resource + "." + port.service + "\n";
+  }
+  return text;
+}
+
+std::string text_of(const ResourceFacts& facts) {
+  std::string text = "resource " + facts.name + " " + facts.kind + " " + facts.type + "\n";
+  for (const ServiceFacts& service : facts.services)
+    text +=
+        "  service " + service.name + " " + std::string(to_string(service.kind)) + " " + service.type + "\n";
+  return text;
+}
+
+}  // namespace
+
+ArchitectureDescription Architecture::describe() const {
+  ArchitectureDescription description;
+  {
+    const std::lock_guard lock(list_mutex_);
+    const time_ns_t epoch_ns = deployment_epoch_ns();
+    for (const auto& component : components_)
+      description.components.push_back(facts_of(*component, epoch_ns));
+    for (const auto& resource : resources_) description.resources.push_back(facts_of(*resource));
+  }
+  sort_by_name(description.components);
+  sort_by_name(description.resources);
+  return description;
+}
+
+std::string to_string(const ArchitectureDescription& description) {
+  std::string text;
+  for (const ComponentFacts& component : description.components) text += text_of(component);
+  for (const ResourceFacts& resource : description.resources) text += text_of(resource);
+  return text;
+}
+
+}  // namespace mauve

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What a transaction does in its commit beside putting in parts and property values.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/architecture/architecture.hpp"
+
+namespace mauve {
+
+/// Refuses the commit when a component is no longer as the draft found it. Comes first.
+class StateGuard final : public CommitAction {
+ public:
+  /// A participant and the state it was found in. [non-rt], before the commit.
+  void expect(const Participant& place, ComponentState found) { found_.push_back({&place, found}); }
+
+  bool adopt() override {
+    for (const Found& found : found_) {
+      const bool ran = found.state == ComponentState::running;
+      if (found.place->in_flight == ran && (ran || found.place->task->state() == found.state)) continue;
+      changed_ = found.place->task;
+      return false;
+    }
+    return true;
+  }
+  void take() noexcept override {}
+  time_ns_t budget_ns() const noexcept override { return us_to_ns(1); }
+  /// The one that changed. [non-rt], after a refusal.
+  const Task* changed() const noexcept { return changed_; }
+
+ private:
+  struct Found {
+    const Participant* place;
+    ComponentState state;
+  };
+  std::vector<Found> found_;
+  const Task* changed_{nullptr};
+};
+
+/// Gives the architecture a new epoch; the participants take it as they go on.
+class NewEpoch final : public CommitAction {
+ public:
+  NewEpoch(Architecture& architecture, const Clock& clock) : architecture_(architecture), clock_(clock) {}
+  void take() noexcept override {
+    epoch_ns_ = clock_.now_ns() + kDeploymentLead;
+    architecture_.set_deployment_epoch(epoch_ns_);
+  }
+  time_ns_t budget_ns() const noexcept override { return us_to_ns(1); }
+  /// Where participants find it, once it was taken.
+  const time_ns_t& epoch_ns() const noexcept { return epoch_ns_; }
+
+ private:
+  Architecture& architecture_;
+  const Clock& clock_;
+  time_ns_t epoch_ns_{0};
+};
+
+/// Exchanges a port's connection for one made ready.
+class WiringChange final : public CommitAction {
+ public:
+  WiringChange(PortBase& port, PortConnection connection)
+      : port_(port),
+        connection_(std::move(connection)),
+        trace_id_(TraceNames::intern("wire " + port.name())) {}
+  void take() noexcept override { port_.swap(connection_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  PortBase& port_;
+  PortConnection connection_;
+  std::uint32_t trace_id_;
+};
+
+/// Listens to a rewired port's new resource for an event wait: has its place there before the commit, as nothing may
+/// fail after it, and passes events on from the commit, so that none is missed.
+///
+/// | member | written by             | read by | order                                  |
+/// | ------ | ---------------------- | ------- | -------------------------------------- |
+/// | live_  | who makes the change   | writers | release: what was changed before it    |
+/// | input_ | [setup]                | writers | listening publishes it                 |
+class ListenerChange final : public CommitAction, public EventListener {
+ public:
+  /// Throws Error (out_of_range) when the resource takes no more listeners. [non-rt]
+  ListenerChange(Resource& resource, EventInput& input) : resource_(resource), input_(input) {
+    resource_.listen(*this);
+  }
+  ~ListenerChange() override { resource_.unlisten(*this); }
+  void take() noexcept override { live_.store(true, std::memory_order_release); }
+  void on_event(time_ns_t time_ns) noexcept override {
+    if (live_.load(std::memory_order_acquire)) input_.on_event(time_ns);
+  }
+  /// Lets the event wait listen itself. [non-rt], after the commit
+  void hand_over() noexcept { input_.listen_for(*this, resource_); }
+
+ private:
+  Resource& resource_;
+  EventInput& input_;
+  std::atomic<bool> live_{false};
+};
+
+/// Forgets a fault: the component is STOPPED then, with new parts or parts configured anew.
+class Repair final : public CommitAction {
+ public:
+  explicit Repair(Component& component) : component_(component), trace_id_(TraceNames::intern("repair")) {}
+  void take() noexcept override {
+    Task& repaired = component_.task();
+    repaired.swap_fault(none_);
+    for (const auto& port : component_.shell().ports()) port->reopen();
+    repaired.set_state(ComponentState::stopped);
+  }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  Component& component_;
+  FaultNote none_;
+  std::uint32_t trace_id_;
+};
+
+/// Takes a component off its resources: its last outputs are written before anybody else gets to write there.
+class Retreat final : public CommitAction {
+ public:
+  explicit Retreat(const Shell& shell) {
+    for (const auto& port : shell.ports()) {
+      if (port->is_connected()) ports_.emplace_back(port.get(), PortConnection{});
+    }
+  }
+  /// Whose component it is. [non-rt], before the commit.
+  void set_place(const Participant& place) noexcept { place_ = &place; }
+  void take() noexcept override {
+    if (place_->in_flight) place_->task->write_outputs(false);
+    for (auto& [port, connection] : ports_) {
+      if (place_->left_behind) {
+        port->leave_behind();  // its thread still uses it
+      } else {
+        port->swap(connection);
+      }
+    }
+  }
+  time_ns_t budget_ns() const noexcept override {
+    return us_to_ns(5) * static_cast<time_ns_t>(ports_.size() + 1);
+  }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  const Participant* place_{nullptr};
+  std::vector<std::pair<PortBase*, PortConnection>> ports_;
+  std::uint32_t trace_id_{TraceNames::intern("remove")};
+};
+
+}  // namespace mauve

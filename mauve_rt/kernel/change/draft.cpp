@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "change/draft.hpp"
+
+#include <algorithm>
+
+#include "parts/lookup.hpp"
+
+namespace mauve {
+
+namespace {
+
+DraftComponent present(std::shared_ptr<Component> component) {
+  DraftComponent draft;
+  draft.state = settled(component->task().state());
+  draft.ran = draft.runs = draft.state == ComponentState::running;
+  for (const auto& port : component->shell().ports()) {
+    if (!port->is_connected()) continue;
+    draft.wires.emplace(port->name(),
+                        Wire{.resource = port->resource_name(), .service = port->service(), .step = 0});
+  }
+  draft.wires_before = draft.wires;
+  draft.component = std::move(component);
+  return draft;
+}
+
+bool leads_to(const Wire& wire, const Resource& resource) {
+  const auto& services = resource.services();
+  return std::find(services.begin(), services.end(), wire.service) != services.end();
+}
+
+[[noreturn]] void throw_taken(const std::string& what, const std::string& name) {
+  throw Error(ErrorCode::duplicate_name, "the name is taken",
+              {.element = what + " " + name, .remedy = "give each " + what + " a name of its own"});
+}
+
+}  // namespace
+
+bool Draft::is_removed(const std::string& component) const noexcept {
+  return std::any_of(removed_components_.begin(), removed_components_.end(),
+                     [&](const DraftComponent& each) { return each.name() == component; });
+}
+
+/// Those there will be, as far as is known by now.
+std::vector<std::string> Draft::component_names() const {
+  std::vector<std::string> names;
+  for (const auto& component : architecture_.components()) {
+    if (!is_removed(component->name())) names.push_back(component->name());
+  }
+  for (const DraftComponent& component : components_) {
+    if (component.is_added) names.push_back(component.name());
+  }
+  return names;
+}
+
+DraftComponent* Draft::find(const std::string& name) noexcept {
+  const auto found = by_name_.find(name);
+  return found != by_name_.end() ? found->second : nullptr;
+}
+
+DraftComponent& Draft::touch(const std::string& name) {
+  DraftComponent* component = find(name);
+  if (component == nullptr) {
+    auto found = is_removed(name) ? nullptr : architecture_.find_component(name);
+    if (found == nullptr) throw_no_component(name, component_names());
+    components_.push_back(present(std::move(found)));
+    component = &components_.back();
+    component->first_step = step_;
+    by_name_.emplace(name, component);
+  }
+  if (component->state == ComponentState::stopping) {
+    component->component->task().throw_state_running("the component is STOPPING", 0,
+                                                     "try again when it has stopped");
+  }
+  return *component;
+}
+
+DraftComponent& Draft::change(const std::string& name) {
+  DraftComponent& component = touch(name);
+  if (component.is_added) return component;  // whoever adds it decides on all of it
+  if (component.component->is_configured()) component.component->check_reconfigurable();
+  const Task& task = component.component->task();
+  if (component.state == ComponentState::faulted && !task.is_parked()) {
+    throw Error(ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
+                {.component = name,
+                 .element = "state " + task.current_state(),
+                 .found = "still executing",
+                 .remedy = Task::kLeftBehindRemedy});
+  }
+  return component;
+}
+
+std::shared_ptr<Resource> Draft::find_resource(const std::string& name) const {
+  if (const auto added = resources_by_name_.find(name); added != resources_by_name_.end())
+    return added->second->resource;
+  auto present = architecture_.find_resource(name);
+  const bool is_removed =
+      std::find(removed_resources_.begin(), removed_resources_.end(), present) != removed_resources_.end();
+  return is_removed ? nullptr : present;
+}
+
+Resource& Draft::resource(const std::string& name) {
+  if (const auto found = find_resource(name)) return *found;
+  std::vector<std::string> names = names_of(resources_);
+  for (const auto& present : architecture_.resources()) {
+    if (find_resource(present->name()) == present) names.push_back(present->name());
+  }
+  throw_no_resource(name, names);
+}
+
+DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
+  check_name("component", name);
+  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
+    throw_taken("component", name);
+  DraftComponent added;
+  added.component = architecture_.make_unlisted(name);
+  added.component->set_settings(settings);
+  added.is_added = true;
+  added.state = ComponentState::stopped;
+  added.first_step = step_;
+  components_.push_back(std::move(added));
+  by_name_.emplace(name, &components_.back());
+  return components_.back();
+}
+
+void Draft::remove_component(const std::string& name) {
+  DraftComponent& component = touch(name);
+  if (!component.is_added && component.component->is_configured())
+    component.component->check_reconfigurable();
+  const auto place = std::find_if(components_.begin(), components_.end(),
+                                  [&](const DraftComponent& each) { return &each == &component; });
+  by_name_.erase(name);
+  if (component.is_added) {
+    components_.erase(place);
+  } else {
+    removed_components_.splice(removed_components_.end(), components_, place);
+  }
+}
+
+void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
+  check_name("resource", name);
+  if (find_resource(name) != nullptr) throw_taken("resource", name);
+  resource->set_name(name);
+  architecture_.prepare_outward(*resource, topic);
+  resources_.push_back({.resource = std::move(resource), .added_step = step_});
+  resources_by_name_.emplace(name, &resources_.back());
+}
+
+/// The ports that will be connected to it.
+std::vector<std::string> Draft::ports_of(const Resource& resource) const {
+  std::vector<std::string> ports;
+  const auto look = [&](const DraftComponent& component) {
+    for (const auto& [port, wire] : component.wires) {
+      if (leads_to(wire, resource)) ports.push_back(component.name() + "." + port);
+    }
+  };
+  for (const DraftComponent& component : components_) look(component);
+  for (const auto& component : architecture_.components()) {
+    if (!by_name_.contains(component->name()) && !is_removed(component->name())) look(present(component));
+  }
+  return ports;
+}
+
+void Draft::remove_resource(const std::string& name) {
+  const Resource& removed = resource(name);
+  if (const std::vector<std::string> ports = ports_of(removed); !ports.empty()) {
+    throw Error(ErrorCode::invalid_argument, "the resource is still connected",
+                {.element = "resource " + name,
+                 .expected = "no port",
+                 .found = join(ports),
+                 .remedy = "disconnect these in a step before"});
+  }
+  if (resources_by_name_.erase(name) == 0) {
+    removed_resources_.push_back(architecture_.find_resource(name));
+  } else {
+    resources_.remove_if([&](const DraftResource& each) { return each.resource.get() == &removed; });
+  }
+}
+
+void Draft::connect(DraftComponent& component, const std::string& port_name, const std::string& resource_name,
+                    const std::string& service_name) {
+  const PortBase& port = find_port(component.shell(), port_name, component.name());
+  if (const auto wired = component.wires.find(port_name); wired != component.wires.end()) {
+    throw Error(ErrorCode::duplicate_name, "the port is connected already",
+                {.component = component.name(),
+                 .element = "port " + port_name,
+                 .found = "a connection to " + wired->second.resource + "." + wired->second.service->name(),
+                 .remedy = "disconnect it in a step before"});
+  }
+  ServiceBase& service = find_service(resource(resource_name), service_name, component.name(), port_name);
+  try {
+    port.check(service);
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), step_);
+  }
+  component.wires.emplace(port_name, Wire{.resource = resource_name, .service = &service, .step = step_});
+}
+
+void Draft::disconnect(DraftComponent& component, const std::string& port) {
+  if (component.wires.erase(port) != 0) {
+    component.disconnected.insert_or_assign(port, step_);
+    return;
+  }
+  find_port(component.shell(), port, component.name());
+  throw Error(ErrorCode::invalid_argument, "the port is not connected",
+              {.component = component.name(), .element = "port " + port, .remedy = "leave the step out"});
+}
+
+void Draft::set_property(DraftComponent& component, const std::string& name, const PropertyValue& value) {
+  const PropertyBase& property = find_property(component.shell(), name, component.name());
+  try {
+    component.properties.insert_or_assign(name,
+                                          DraftProperty{.value = property.checked(value), .step = step_});
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), step_);
+  }
+}
+
+void Draft::resynchronise() {
+  if (!deployed_) {
+    throw Error(ErrorCode::not_configured, "the architecture is not deployed",
+                {.remedy = "deploy it: that gives all components one epoch"});
+  }
+  resynchronise_step_ = step_;
+  for (const auto& component : architecture_.components()) {
+    const ComponentState state = component->task().state();
+    const bool can_take_part = state != ComponentState::faulted && state != ComponentState::unconfigured;
+    if (can_take_part && !is_removed(component->name())) touch(component->name());
+  }
+}
+
+}  // namespace mauve

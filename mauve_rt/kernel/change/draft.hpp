@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Draft: what the steps of a transaction, one after another, will have made of an architecture.
+#pragma once
+
+#include <algorithm>
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/architecture/plugin.hpp"
+#include "mauve_rt/base/error.hpp"
+
+namespace mauve {
+
+/// Steps count from 1; 0 stands for what was there before.
+struct Wire {
+  std::string resource;
+  ServiceBase* service{nullptr};
+  int step{0};
+};
+
+struct DraftProperty {
+  PropertyValue value;  // as PropertyBase::checked returned it
+  int step{0};
+};
+
+struct DraftComponent {
+  std::shared_ptr<Component> component;
+  bool is_added{false};
+  ComponentState state{ComponentState::unconfigured};  // as the draft found it; HELD is RUNNING
+  bool ran{false};
+  bool runs{false};      // afterwards
+  bool restarts{false};  // because it was stopped and started
+  std::optional<time_ns_t> clock_ns{};
+  Parts fresh{};  // of an added one: all its parts
+  Component::FsmFactory make_fsm{};
+  std::map<std::string, Wire> wires_before{};  // by port
+  std::map<std::string, Wire> wires{};
+  std::map<std::string, int> disconnected{};  // by port: the last step that disconnected it
+  std::map<std::string, DraftProperty> properties{};
+  int shell_step{0};
+  int fsm_step{0};
+  int core_step{0};
+  bool core_unready{false};  // the new core is put in as it is
+  int configure_step{0};     // the last that configures it anew
+  int first_step{0};
+
+  const std::string& name() const noexcept { return component->name(); }
+  /// The shell that will be in force.
+  Shell& shell() const noexcept { return fresh.shell != nullptr ? *fresh.shell : component->shell(); }
+  /// The parts that are configured anew; with a new shell the fsm is, whether it is another one or not.
+  ReadBy replaced() const noexcept {
+    ReadBy parts = core_step != 0 ? ReadBy::core : ReadBy::none;
+    if (fsm_step != 0) parts = parts | ReadBy::fsm;
+    if (shell_step != 0) parts = parts | ReadBy::shell | ReadBy::fsm;
+    if (configure_step != 0) parts = parts | ReadBy::core | ReadBy::fsm | ReadBy::shell;
+    return parts;
+  }
+  /// Whether it was FAULTED, and is STOPPED or RUNNING afterwards.
+  bool is_repaired() const noexcept { return state == ComponentState::faulted && replaced() != ReadBy::none; }
+  bool sets_structural() const noexcept {
+    return std::any_of(properties.begin(), properties.end(), [this](const auto& set) {
+      return component->require_property(set.first).options().structural != ReadBy::none;
+    });
+  }
+  bool has_new_parts() const noexcept {
+    return fresh.shell != nullptr || fresh.core != nullptr || fresh.fsm != nullptr;
+  }
+};
+
+struct DraftResource {
+  std::shared_ptr<Resource> resource;
+  int added_step{0};
+
+  const std::string& name() const noexcept { return resource->name(); }
+};
+
+/// An overlay of an architecture: what the steps touch of it, and nothing else, however large it is. Nothing of it is in
+/// force. Ordinary threads, the architecture's change lock held.
+class Draft {
+ public:
+  Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {}
+
+  Architecture& architecture() const noexcept { return architecture_; }
+  bool is_deployed() const noexcept { return deployed_; }
+  const PluginRegistry& registry() const { return architecture_.require_registry(); }
+
+  /// The step being entered.
+  void begin(int step) noexcept { step_ = step; }
+  int step() const noexcept { return step_; }
+
+  /// Marks it as touched by this step. Throws Error: unknown_component.
+  DraftComponent& touch(const std::string& name);
+  /// The same for what `reconfigurable: false` forbids, and a FAULTED thread that still executes.
+  /// Throws Error: not_reconfigurable, faulted besides.
+  DraftComponent& change(const std::string& name);
+  /// The component that a step has touched, or nullptr.
+  DraftComponent* find(const std::string& name) noexcept;
+  /// Throws Error: unknown_resource.
+  Resource& resource(const std::string& name);
+
+  /// Throws Error: duplicate_name, out_of_range (settings).
+  DraftComponent& add_component(const std::string& name, const TaskSettings& settings);
+  void remove_component(const std::string& name);
+  void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic);
+  /// Throws Error (invalid_argument) while it is connected or bound to a topic.
+  void remove_resource(const std::string& name);
+  void connect(DraftComponent& component, const std::string& port, const std::string& resource,
+               const std::string& service);
+  void disconnect(DraftComponent& component, const std::string& port);
+  void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
+
+  /// Touches all that can take a new epoch. Throws Error: not_configured when nothing is deployed.
+  void resynchronise();
+  /// The step that did; 0: none.
+  int resynchronise_step() const noexcept { return resynchronise_step_; }
+
+  /// Checks what only the whole shows: faults repaired, kept connections of new shells, structural properties, ports that must
+  /// lead somewhere, ports per service. Throws Error with the step.
+  void finish() const;
+
+  /// Those that are there afterwards and were touched, in the order of the steps.
+  std::list<DraftComponent>& components() noexcept { return components_; }
+  std::list<DraftComponent>& removed_components() noexcept { return removed_components_; }
+  /// Those that are added.
+  std::list<DraftResource>& resources() noexcept { return resources_; }
+  std::vector<std::shared_ptr<Resource>>& removed_resources() noexcept { return removed_resources_; }
+
+ private:
+  bool is_removed(const std::string& component) const noexcept;
+  std::shared_ptr<Resource> find_resource(const std::string& name) const;
+  std::vector<std::string> component_names() const;
+  std::vector<std::string> ports_of(const Resource& resource) const;
+  void check_kept_wires(const DraftComponent& component) const;
+  static void check_structural(const DraftComponent& component);
+  static void check_repaired(const DraftComponent& component);
+  static void check_core(const DraftComponent& component);
+  void check_required_ports(const DraftComponent& component) const;
+  void check_port_counts() const;
+
+  Architecture& architecture_;
+  bool deployed_;
+  int step_{0};
+  int resynchronise_step_{0};
+  std::list<DraftComponent> components_;
+  std::map<std::string, DraftComponent*> by_name_;  // of components_
+  std::list<DraftComponent> removed_components_;    // those that were there before
+  std::list<DraftResource> resources_;
+  std::map<std::string, DraftResource*> resources_by_name_;
+  std::vector<std::shared_ptr<Resource>> removed_resources_;
+};
+
+/// An error of a thing that knows neither its component nor the step.
+[[noreturn]] void rethrow_as_of(const Error& failure, const std::string& component, int step);
+
+}  // namespace mauve

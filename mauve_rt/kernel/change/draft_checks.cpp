@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What only the whole draft shows.
+#include <algorithm>
+
+#include "change/draft.hpp"
+#include "parts/lookup.hpp"
+
+namespace mauve {
+
+void rethrow_as_of(const Error& failure, const std::string& component, int step) {
+  ErrorDetail detail = failure.detail();
+  if (detail.component.empty()) detail.component = component;
+  if (detail.step == 0) detail.step = step;
+  throw Error(failure.code(), failure.statement(), detail);
+}
+
+void Draft::finish() const {
+  for (const DraftComponent& component : components_) {
+    check_repaired(component);
+    if (component.shell_step != 0) check_kept_wires(component);
+    if (!component.is_added) check_structural(component);
+    if (architecture_.is_configured()) check_required_ports(component);
+    if (component.core_unready && component.runs) {
+      throw Error(ErrorCode::not_configured, "the core is not configured",
+                  {.component = component.name(),
+                   .remedy = "configure it first, or replace it by a replace_core step",
+                   .step = component.core_step});
+    }
+    if (component.runs && !component.ran) check_core(component);
+  }
+  check_port_counts();
+}
+
+void Draft::check_repaired(const DraftComponent& component) {
+  if (component.first_step == 0 || component.state != ComponentState::faulted || component.is_repaired())
+    return;
+  throw Error(ErrorCode::faulted, "the component is FAULTED: " + component.component->task().fault().what,
+              {.component = component.name(), .remedy = Task::kRepairRemedy, .step = component.first_step});
+}
+
+void Draft::check_kept_wires(const DraftComponent& component) const {
+  for (const auto& [name, wire] : component.wires) {
+    const PortBase* port = component.shell().find_port(name);
+    if (port == nullptr) {
+      throw Error(ErrorCode::unknown_port, "the new shell lacks a port that is connected",
+                  {.component = component.name(),
+                   .element = "port " + name,
+                   .expected = "a port for " + wire.resource + "." + wire.service->name(),
+                   .found = "none of that name",
+                   .remedy = "disconnect it in the same transaction",
+                   .step = component.shell_step});
+    }
+    try {
+      port->check(*wire.service);
+    } catch (const Error& failure) {
+      rethrow_as_of(failure, component.name(), std::max(wire.step, component.shell_step));
+    }
+  }
+}
+
+void Draft::check_structural(const DraftComponent& component) {
+  for (const auto& [name, property] : component.properties) {
+    try {
+      component.component->check_structural(*component.shell().find_property(name), property.value,
+                                            component.replaced());
+    } catch (const Error& failure) {
+      rethrow_as_of(failure, component.name(), property.step);
+    }
+  }
+}
+
+/// A core that is put in is configured by then.
+void Draft::check_core(const DraftComponent& component) {
+  if (component.is_added || component.core_step != 0) return;
+  try {
+    component.component->require_ready_core();
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), component.first_step);
+  }
+}
+
+void Draft::check_required_ports(const DraftComponent& component) const {
+  for (const auto& port : component.shell().ports()) {
+    if (!port->is_required() || component.wires.contains(port->name())) continue;
+    const auto disconnected = component.disconnected.find(port->name());
+    const int step = disconnected != component.disconnected.end() ? disconnected->second
+                     : component.shell_step != 0                  ? component.shell_step
+                                                                  : component.first_step;
+    throw_not_connected(*port, component.name(), step);
+  }
+}
+
+void Draft::check_port_counts() const {
+  struct Count {
+    std::int64_t before{0};
+    std::int64_t after{0};
+    int step{0};  // the last that connected to it
+    std::string component;
+  };
+  std::map<ServiceBase*, Count> counts;
+  const auto count_before = [&](const DraftComponent& component) {
+    for (const auto& [port, wire] : component.wires_before) ++counts[wire.service].before;
+  };
+  for (const DraftComponent& component : removed_components_) count_before(component);
+  for (const DraftComponent& component : components_) {
+    count_before(component);
+    for (const auto& [port, wire] : component.wires) {
+      Count& count = counts[wire.service];
+      ++count.after;
+      if (wire.step <= count.step) continue;
+      count.step = wire.step;
+      count.component = component.name();
+    }
+  }
+  for (const auto& [service, count] : counts) {
+    if (count.step == 0) continue;
+    try {
+      // Others than components may have ports of their own.
+      service->check_ports(static_cast<std::uint32_t>(service->ports() + count.after - count.before));
+    } catch (const Error& failure) {
+      rethrow_as_of(failure, count.component, count.step);
+    }
+  }
+}
+
+}  // namespace mauve

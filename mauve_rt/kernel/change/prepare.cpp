@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What a transaction makes ready before its commit, and throws away when there is none.
+#include <algorithm>
+
+#include "mauve_rt/deploy/host.hpp"
+
+#include "base/prefault.hpp"
+#include "change/work.hpp"
+
+namespace mauve {
+
+namespace {
+
+void connect_all(Shell& shell, const std::map<std::string, Wire>& wires) {
+  for (const auto& [name, wire] : wires) {
+    PortBase& port = *shell.find_port(name);
+    PortConnection connection = port.prepare(*wire.service, wire.resource);
+    port.swap(connection);
+  }
+}
+
+void set_all(Shell& shell, const std::map<std::string, DraftProperty>& properties) {
+  for (const auto& [name, property] : properties) {
+    PropertyValue value = property.value;
+    shell.find_property(name)->swap(value);
+  }
+}
+
+/// While it lives the calling thread finds the properties and the wiring of a shell as they will be.
+class Preview {
+ public:
+  Preview() = default;
+  ~Preview() {
+    for (PropertyBase* property : properties_) property->end_preview();
+    for (PortBase* port : ports_) port->end_preview();
+  }
+  Preview(const Preview&) = delete;
+  Preview& operator=(const Preview&) = delete;
+
+  void begin(const Shell& shell, const DraftComponent& draft) {
+    for (const auto& [name, property] : draft.properties) {
+      properties_.push_back(shell.find_property(name));
+      properties_.back()->preview(property.value);
+    }
+    for (const auto& port : shell.ports()) {
+      const auto wire = draft.wires.find(port->name());
+      const bool is_wired = wire != draft.wires.end();
+      ports_.push_back(port.get());
+      port->preview(is_wired ? port->prepare(*wire->second.service, wire->second.resource)
+                             : PortConnection{});
+    }
+  }
+
+ private:
+  std::vector<PropertyBase*> properties_;
+  std::vector<PortBase*> ports_;
+};
+
+void restore_state(Component& component, ComponentState before, FaultNote& fault) {
+  component.show();  // it was configured with what would have been
+  component.update_listening();
+  if (component.task().state() != ComponentState::stopped) return;  // somebody has started it
+  if (before == ComponentState::unconfigured) return component.cleanup();
+  component.task().swap_fault(fault);
+  component.task().set_state(before);
+}
+
+}  // namespace
+
+template <typename Action>
+Action& TransactionCommit::Work::keep(const Component& component, std::unique_ptr<Action> action) {
+  Action& kept = *action;
+  kept.task = &component.task();
+  actions_.push_back(std::move(action));
+  return kept;
+}
+
+void TransactionCommit::Work::prepare() {
+  if (draft_->resynchronise_step() != 0) prepare_epoch();
+  for (DraftResource& resource : draft_->resources())
+    at_step(resource.added_step, [&] { prepare_resource(resource); });
+  for (DraftComponent& component : draft_->removed_components())
+    at_step(component.first_step, [&] { prepare_removed(component); });
+  for (DraftComponent& component : draft_->components()) {
+    if (component.is_added) {
+      at_step(component.first_step, [&] { prepare_added(component); });
+    } else {
+      prepare_change(component);
+    }
+  }
+  prefault_parts();
+}
+
+void TransactionCommit::Work::prefault_parts() {
+  const bool has_new_parts =
+      std::any_of(changes_.begin(), changes_.end(),
+                  [](const Change& change) {
+                    return change.parts != nullptr && change.draft->component->task().has_thread();
+                  }) ||
+      std::any_of(prepared_added_.begin(), prepared_added_.end(),
+                  [](const DraftComponent* added) { return added->component->task().has_thread(); });
+  if (has_new_parts) prefault_allocated();
+}
+
+void TransactionCommit::Work::prepare_resource(DraftResource& added) {
+  prepared_resources_.push_back(added.resource);
+  if (architecture_.is_configured()) added.resource->configure();
+}
+
+void TransactionCommit::Work::prepare_added(DraftComponent& added) {
+  Component& component = *added.component;
+  prepared_added_.push_back(&added);
+  component.set_parts(std::move(added.fresh), added.make_fsm);
+  set_all(component.shell(), added.properties);
+  connect_all(component.shell(), added.wires);
+  if (!architecture_.is_configured()) return;
+  component.configure();
+  if (!deployed_ || options_.dry_run) return;
+  Task& task = component.task();
+  task.join(architecture_.deployment_epoch_ns());
+  host_->attach(task);
+  if (added.runs || new_epoch_ != nullptr) changes_.push_back({.draft = &added});
+}
+
+void TransactionCommit::Work::prepare_epoch() {
+  auto epoch = std::make_unique<NewEpoch>(architecture_, host_->clock());
+  new_epoch_ = epoch.get();
+  actions_.push_back(std::move(epoch));
+}
+
+void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
+  Retreat& retreat = keep(*removed.component, std::make_unique<Retreat>(removed.component->shell()));
+  changes_.push_back({.draft = &removed, .retreat = &retreat});
+}
+
+/// The one thing that is done before the commit: what hooks do cannot be taken back, but the state can.
+void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
+  Component& component = *changed.component;
+  if (!architecture_.is_configured() || options_.dry_run) return;
+  ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
+  component.task().swap_fault(before.fault);
+  Preview preview;
+  preview.begin(component.shell(), changed);
+  component.configure_anew();
+  configured_anew_.push_back(std::move(before));
+  changed.state = ComponentState::stopped;
+}
+
+void TransactionCommit::Work::prepare_repair(const DraftComponent& changed) {
+  if (!changed.is_repaired()) return;
+  repairs_.push_back(std::make_unique<Repair>(*changed.component));
+  repairs_.back()->task = &changed.component->task();
+}
+
+void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
+  if (changed.configure_step != 0) at_step(changed.configure_step, [&] { configure_anew(changed); });
+  prepare_repair(changed);
+  changes_.push_back({.draft = &changed});
+  Change& change = changes_.back();
+  if (changed.has_new_parts()) {
+    const int step = changed.core_step != 0  ? changed.core_step
+                     : changed.fsm_step != 0 ? changed.fsm_step
+                                             : changed.shell_step;
+    at_step(step, [&] { prepare_parts(change); });
+  }
+  if (changed.shell_step != 0) return;
+  at_step(changed.first_step, [&] {
+    prepare_wiring(change);
+    prepare_properties(change);
+  });
+}
+
+void TransactionCommit::Work::prepare_parts(Change& change) {
+  DraftComponent& draft = *change.draft;
+  Component& component = *draft.component;
+  change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh), std::move(draft.make_fsm));
+  if (draft.core_unready) change.parts->leave_unready();
+  if (draft.shell_step != 0) {
+    set_all(change.parts->shell(), draft.properties);
+    connect_all(change.parts->shell(), draft.wires);
+    // The old ports let go in the commit, before the new ones are used.
+    for (const auto& port : component.shell().ports()) {
+      if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
+    }
+  }
+  if (draft.is_repaired()) change.parts->start_afresh();
+  Preview preview;
+  preview.begin(change.parts->shell(), draft);
+  change.parts->prepare();
+}
+
+void TransactionCommit::Work::prepare_wiring(Change& change) {
+  const DraftComponent& draft = *change.draft;
+  Component& component = *draft.component;
+  for (const auto& [name, before] : draft.wires_before) {
+    if (draft.wires.contains(name)) continue;
+    keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
+  }
+  for (const auto& [name, wire] : draft.wires) {
+    const auto before = draft.wires_before.find(name);
+    if (before != draft.wires_before.end() && before->second.service == wire.service) continue;
+    PortBase& port = component.require_port(name);
+    keep(component, std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
+    prepare_listening(change, port, *wire.service);
+  }
+}
+
+void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
+                                                ServiceBase& service) {
+  if (service.resource() == nullptr) return;
+  if (change.parts != nullptr && change.parts->restarts())
+    return;  // a new fsm has listened there since its prepare()
+  for (const auto& state : change.draft->component->fsm().states()) {
+    if (state->event == nullptr || &state->event->port() != &port) continue;
+    listener_changes_.push_back(&keep(*change.draft->component,
+                                      std::make_unique<ListenerChange>(*service.resource(), *state->event)));
+  }
+}
+
+void TransactionCommit::Work::prepare_properties(Change& change) {
+  Component& component = *change.draft->component;
+  for (const auto& [name, property] : change.draft->properties)
+    keep(component, std::make_unique<PropertyChange>(component.require_property(name), property.value));
+}
+
+/// Takes a component off its thread and its resources. A thread that is kept from ending (by a more urgent one that
+/// does not wait) is left to be reaped: what is under way goes on without it.
+void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component, bool was_listed) {
+  Task& task = component->task();
+  if (task.is_abandoned()) component->stop_listening();
+  const bool ended = host_ != nullptr ? host_->detach(task) : task.end_thread(monotonic_now_ns());
+  if (task.is_parked()) {
+    for (const auto& port : component->shell().ports()) port->disconnect();
+    if (component->is_configured()) component->update_listening();
+    component->cleanup();
+  }
+  if (!ended) {
+    architecture_.keep_until_ended(component, was_listed, draft_->removed_resources());
+  } else if (was_listed) {
+    architecture_.retire_trace(task);
+  }
+}
+
+/// The thread of a component that was given up may come back to what it was working with.
+void TransactionCommit::Work::leave_behind() {
+  struct Used {
+    std::vector<std::unique_ptr<CommitAction>> actions;
+    std::vector<std::unique_ptr<PartsChange>> parts;
+    std::unique_ptr<Commit> commit;
+  };
+  if (commit_ == nullptr || !commit_->is_abandoned()) return;
+  Task& task = *commit_->maker()->task;
+  auto used = std::make_shared<Used>();
+  for (Change& change : changes_) used->parts.push_back(std::move(change.parts));
+  used->actions = std::move(actions_);
+  used->commit = std::move(commit_);
+  task.leave_behind(std::move(used));
+}
+
+void TransactionCommit::Work::discard() noexcept {
+  leave_behind();
+  settle_with_host();
+  for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
+  for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
+  for (DraftComponent* added : prepared_added_) let_go(added->component, false);
+  for (const auto& resource : prepared_resources_) resource->cleanup();
+  architecture_.give_back_numbers(numbers_before_);
+}
+
+}  // namespace mauve

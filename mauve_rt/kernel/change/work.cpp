@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// From the draft to the report; what is prepared stands in transaction_prepare.cpp.
+#include "change/work.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/deploy/host.hpp"
+
+namespace mauve {
+
+TransactionCommit::TransactionCommit(Architecture& architecture, Host* host,
+                                     const TransactionOptions& options)
+    : work_(std::make_unique<Work>(architecture, host, options)) {}
+TransactionCommit::~TransactionCommit() = default;
+void TransactionCommit::make(Transaction transaction) { work_->make(std::move(transaction)); }
+TransactionReport TransactionCommit::report(time_ns_t phase_timeout_ns) {
+  return work_->report(phase_timeout_ns);
+}
+
+TransactionCommit::Work::Work(Architecture& architecture, Host* host, const TransactionOptions& options)
+    : architecture_(architecture),
+      host_(host),
+      deployed_(host != nullptr && host->is_deployed()),
+      is_simulated_(host != nullptr && host->is_simulated()),
+      options_(options) {}
+
+void TransactionCommit::Work::make(Transaction transaction) {
+  const time_ns_t began = monotonic_now_ns();
+  constexpr std::int64_t kMostMissed = 1'000'000;
+  if (options_.max_missed < 0 || options_.max_missed > kMostMissed) {
+    throw Error(ErrorCode::out_of_range, "so many releases cannot be allowed to be missed",
+                {.element = "max_missed",
+                 .expected = "0 to " + std::to_string(kMostMissed),
+                 .found = std::to_string(options_.max_missed)});
+  }
+  transaction_ = std::move(transaction);
+  if (const std::uint64_t revision = architecture_.revision();
+      options_.expected_revision != 0 && options_.expected_revision != revision) {
+    throw Error(ErrorCode::wrong_revision, "the architecture has changed since",
+                {.element = "revision",
+                 .expected = std::to_string(options_.expected_revision),
+                 .found = std::to_string(revision),
+                 .remedy = "look at it again, then decide again"});
+  }
+  architecture_.reap();
+  numbers_before_ = architecture_.numbers();
+  try {
+    draft_steps();
+    prepare();
+    prepare_ns_ = monotonic_now_ns() - began;
+    if (options_.dry_run) return discard();
+    require_host_open();
+    gather();
+    carry_out_commit();
+  } catch (...) {
+    discard();
+    throw;
+  }
+  tell_epoch();
+  publish();
+  settle_with_host();
+  retire();
+  keep_for_report();
+}
+
+/// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
+void TransactionCommit::Work::require_host_open() const {
+  if (!deployed_ || host_->is_deployed()) return;
+  throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
+              {.remedy = "deploy it, then ask again"});
+}
+
+/// Either a shutdown sees the threads of what was added, and gets those of what was changed, or they end here.
+void TransactionCommit::Work::settle_with_host() {
+  if (!deployed_ || host_->is_deployed()) return;
+  for (DraftComponent* added : prepared_added_) host_->detach(added->component->task());
+  for (const Change& change : changes_) host_->detach(change.draft->component->task());
+}
+
+void TransactionCommit::Work::draft_steps() {
+  draft_ = std::make_unique<Draft>(architecture_, deployed_);
+  reports_.resize(transaction_.steps().size());
+  int number = 0;
+  for (const auto& step : transaction_.steps()) {
+    draft_->begin(++number);
+    StepReport& report = reports_[static_cast<std::size_t>(number - 1)];
+    report.step = step->text();
+    report.component = step->component();
+    at_step(number, [&] { step->draft(*draft_); });
+    const DraftComponent* component = draft_->find(report.component);
+    if (component == nullptr || component->core_step != number) continue;
+    if (!component->is_added) report.from_core = component->component->core_implementation();
+    report.to_core = component->fresh.core->implementation();
+  }
+  try {
+    draft_->finish();
+  } catch (const Error& failure) {
+    rethrow_at(failure.detail().step, failure);
+  }
+}
+
+Afterwards TransactionCommit::Work::afterwards_of(const Change& change) const {
+  const DraftComponent& draft = *change.draft;
+  if (change.retreat != nullptr || (draft.ran && !draft.runs)) return Afterwards::stop;
+  if (!draft.runs) return Afterwards::go_on;
+  const bool anew = draft.restarts || (change.parts != nullptr && change.parts->restarts());
+  return !draft.ran || anew ? Afterwards::restart : Afterwards::go_on;
+}
+
+void TransactionCommit::Work::gather() {
+  // Wiring and properties are in before a new core takes over. adopt(), which may refuse, changes nothing.
+  std::vector<CommitAction*> actions{&guard_};
+  for (const auto& action : actions_) actions.push_back(action.get());
+  for (const Change& change : changes_) {
+    if (change.parts != nullptr) actions.push_back(change.parts.get());
+  }
+  for (const auto& repair : repairs_) actions.push_back(repair.get());
+  commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
+  commit_->set_max_missed(options_.max_missed);
+  auto place = commit_->participants().begin();
+  for (const Change& change : changes_) {
+    place->task = &change.draft->component->task();
+    place->afterwards = afterwards_of(change);
+    place->replaces_parts = change.parts != nullptr;
+    place->repairs = change.draft->is_repaired();
+    if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
+    if (new_epoch_ != nullptr) place->epoch_ns = &new_epoch_->epoch_ns();
+    if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
+    if (change.retreat != nullptr) change.retreat->set_place(*place);
+    guard_.expect(*place, change.draft->state);
+    places_.insert_or_assign(change.draft->name(), &*place);
+    ++place;
+  }
+}
+
+void TransactionCommit::Work::carry_out_commit() {
+  if (changes_.empty()) return;
+  try {
+    const auto conductor = deployed_ ? host_->conductor() : nullptr;
+    if (carry_out(*commit_, options_.timeouts.commit_ns, conductor.get())) {
+      committed_ = true;
+      return;
+    }
+  } catch (const Error& failure) {
+    require_host_open();  // else the commit was called off by a shutdown
+    const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->off() == Commit::Off::not_yet;
+    if (!is_adopts_own) rethrow_at(step_of(failure.detail().component), failure);
+    throw_refused(failure.what());
+  } catch (...) {
+    throw_refused(caught_text());
+  }
+  throw_refused("it refused the old core's state");
+}
+
+void TransactionCommit::Work::throw_refused(const std::string& what) const {
+  if (commit_->refused_by() == &guard_ && guard_.changed() != nullptr) {
+    throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
+                {.component = guard_.changed()->name(),
+                 .element = "state",
+                 .found = std::string(to_string(guard_.changed()->state())),
+                 .remedy = "look at the architecture again, then decide again",
+                 .step = step_of(guard_.changed()->name()),
+                 .step_name = text_of(step_of(guard_.changed()->name()))});
+  }
+  for (const Change& change : changes_) {
+    if (change.parts.get() != commit_->refused_by()) continue;
+    const DraftComponent& draft = *change.draft;
+    const int step = draft.core_step != 0 ? draft.core_step : draft.first_step;
+    throw Error(ErrorCode::adopt_refused, "adopt refused: " + what,
+                {.component = draft.name(),
+                 .remedy = "nothing was changed; all goes on as before",
+                 .step = step,
+                 .step_name = text_of(step)});
+  }
+  throw Error(ErrorCode::adopt_refused, what);
+}
+
+/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again.
+void TransactionCommit::Work::tell_epoch() {
+  if (new_epoch_ == nullptr) return;
+  if (!committed_) new_epoch_->take();  // there was nobody to commit with
+  for (const auto& component : architecture_.components()) {
+    if (!places_.contains(component->name())) component->task().join(new_epoch_->epoch_ns());
+  }
+}
+
+void TransactionCommit::Work::publish() {
+  ListChange lists;
+  for (const DraftComponent& component : draft_->components()) {
+    if (component.is_added) lists.added_components.push_back(component.component);
+    lists.changed.push_back(component.component.get());
+  }
+  for (const DraftComponent& component : draft_->removed_components())
+    lists.removed_components.push_back(component.component);
+  for (const DraftResource& resource : draft_->resources()) {
+    lists.added_resources.push_back(resource.resource);
+  }
+  lists.removed_resources = draft_->removed_resources();
+  architecture_.change_lists(lists);
+}
+
+/// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced
+/// or a structural property was set that it may have read.
+void TransactionCommit::Work::renew_fallback(Change& change) {
+  Component& component = *change.draft->component;
+  const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
+  std::unique_ptr<CoreBase> out = change.parts->give_back_core();
+  const std::string& fallback = component.fallback_implementation();
+  if (!component.is_configured()) return;
+  if (fallback.empty() || !(is_outdated || (out != nullptr && out->implementation() == fallback))) return;
+  try {
+    component.renew_fallback(std::move(out));
+  } catch (const Error&) {  // it cannot be configured anew; the change itself is in
+  }
+}
+
+void TransactionCommit::Work::retire() {
+  for (ListenerChange* change : listener_changes_) change->hand_over();
+  for (Change& change : changes_) {
+    Component& component = *change.draft->component;
+    if (change.retreat == nullptr && component.is_configured()) component.update_listening();
+    if (change.parts == nullptr) continue;
+    change.parts->retire();
+    renew_fallback(change);
+    change.parts.reset();
+  }
+  for (const DraftComponent& removed : draft_->removed_components()) {
+    try {  // somebody who still held it may have started it again
+      const Task& task = removed.component->task();
+      if (!task.is_parked() && !task.is_abandoned()) removed.component->task().stop();
+    } catch (const Error&) {  // it faulted, or is in a state: ending its thread is the answer
+    }
+    let_go(removed.component, true);
+  }
+  for (const auto& resource : draft_->removed_resources()) {
+    if (!architecture_.is_used_by_left_behind(*resource)) resource->cleanup();
+  }
+}
+
+/// Whoever waits for the report keeps nothing that others may take away meanwhile.
+void TransactionCommit::Work::keep_for_report() {
+  for (const Change& change : changes_) touched_.push_back(change.draft->component);
+  changes_.clear();
+  listener_changes_.clear();
+  actions_.clear();
+  repairs_.clear();
+  prepared_added_.clear();
+  prepared_resources_.clear();
+  draft_.reset();
+}
+
+TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
+  // In virtual time the releases that follow come only when this call has returned.
+  const time_ns_t until = later_by(monotonic_now_ns(), is_simulated_ ? 0 : phase_timeout_ns);
+  std::map<std::string, StepReport> measured;
+  for (const auto& [name, place] : places_) {
+    if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
+  }
+  TransactionReport report{.steps = reports_,
+                           .revision = architecture_.revision(),
+                           .prepare_ns = is_simulated_ ? 0 : prepare_ns_,
+                           .blackout_ns = 0};
+  for (const auto& [name, place] : places_) {
+    if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
+  }
+  const auto resynchronised = std::find_if(
+      reports_.begin(), reports_.end(), [](const StepReport& step) { return step.step == "resynchronise"; });
+  if (committed_ && resynchronised != reports_.end()) {  // a line each, after those of the steps
+    for (const auto& component : touched_) {
+      StepReport& line = report.steps.emplace_back();
+      line.step = resynchronised->step;
+      line.component = component->name();
+    }
+  }
+  for (StepReport& step : report.steps) {
+    if (is_simulated_) step.prepare_ns = 0;
+    const auto found = measured.find(step.component);
+    if (found == measured.end()) continue;
+    step.blackout_ns = found->second.blackout_ns;
+    step.missed_releases = found->second.missed_releases;
+    step.phase_nominal_ns = found->second.phase_nominal_ns;
+    step.phase_actual_ns = found->second.phase_actual_ns;
+    step.remark = found->second.remark;
+    step.shift_ns = places_.at(step.component)->shift_ns;
+    report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
+  }
+  return report;
+}
+
+const std::string& TransactionCommit::Work::text_of(int step) const {
+  return reports_[static_cast<std::size_t>(std::max(step, 1) - 1)].step;
+}
+
+int TransactionCommit::Work::step_of(const std::string& component) const {
+  for (const Change& change : changes_) {
+    if (change.draft->name() == component) return change.draft->first_step;
+  }
+  return 0;
+}
+
+void TransactionCommit::Work::rethrow_at(int step, const Error& failure) const {
+  ErrorDetail detail = failure.detail();
+  if (detail.step == 0) detail.step = step;
+  if (detail.step != 0) detail.step_name = text_of(detail.step);
+  throw Error(failure.code(), failure.statement(), detail);
+}
+
+}  // namespace mauve

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The work of one transaction, from its draft to its report.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "mauve_rt/change/transaction_commit.hpp"
+#include "mauve_rt/run/commit.hpp"
+
+#include "change/actions.hpp"
+#include "change/draft.hpp"
+
+namespace mauve {
+
+class TransactionCommit::Work {
+ public:
+  Work(Architecture& architecture, Host* host, const TransactionOptions& options);
+
+  void make(Transaction transaction);
+  TransactionReport report(time_ns_t phase_timeout_ns);
+
+ private:
+  /// A component that takes part in the commit.
+  struct Change {
+    DraftComponent* draft;
+    std::unique_ptr<PartsChange> parts{};
+    Retreat* retreat{nullptr};  // of a removed one
+  };
+
+  // draft
+  void draft_steps();
+  // prepare
+  void prepare();
+  void prepare_epoch();
+  void prepare_resource(DraftResource& added);
+  void prepare_added(DraftComponent& added);
+  void prepare_change(DraftComponent& changed);
+  void prepare_removed(DraftComponent& removed);
+  void prepare_parts(Change& change);
+  void configure_anew(DraftComponent& changed);
+  void prepare_repair(const DraftComponent& changed);
+  void prepare_wiring(Change& change);
+  void prepare_properties(Change& change);
+  void prefault_parts();
+  void prepare_listening(const Change& change, const PortBase& port, ServiceBase& service);
+  // commit
+  void gather();
+  void carry_out_commit();
+  void require_host_open() const;
+  [[noreturn]] void throw_refused(const std::string& what) const;
+  // after it
+  void publish();
+  void settle_with_host();
+  void retire();
+  void tell_epoch();
+  void keep_for_report();
+  static void renew_fallback(Change& change);
+  void leave_behind();
+  void discard() noexcept;
+  void let_go(const std::shared_ptr<Component>& component, bool was_listed);
+
+  template <typename Part>
+  void at_step(int step, Part&& part);
+  [[noreturn]] void rethrow_at(int step, const Error& failure) const;
+  int step_of(const std::string& component) const;
+  Afterwards afterwards_of(const Change& change) const;
+  const std::string& text_of(int step) const;
+  template <typename Action>
+  Action& keep(const Component& component, std::unique_ptr<Action> action);
+
+  Architecture& architecture_;
+  Host* host_;  // while it is made; nullptr: nobody runs the architecture
+  bool deployed_;
+  bool is_simulated_;
+  TransactionOptions options_;
+  Transaction transaction_;
+  std::size_t numbers_before_{0};
+  std::unique_ptr<Draft> draft_;
+
+  std::vector<StepReport> reports_;  // by step
+  time_ns_t prepare_ns_{0};
+  std::vector<std::shared_ptr<Resource>> prepared_resources_;
+  std::vector<DraftComponent*> prepared_added_;
+  struct ConfiguredAnew {
+    Component* component;
+    ComponentState before;
+    FaultNote fault;
+  };
+  std::vector<ConfiguredAnew> configured_anew_;
+  std::vector<std::unique_ptr<Repair>> repairs_;  // taken in last: the new parts are in
+  std::vector<Change> changes_;
+  std::vector<std::unique_ptr<CommitAction>>
+      actions_;                                    // in the order they are taken in; the new parts come after
+  std::vector<ListenerChange*> listener_changes_;  // among the actions
+  StateGuard guard_;
+  NewEpoch* new_epoch_{nullptr};                     // among the actions, when the transaction resynchronises
+  std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
+  std::unique_ptr<Commit> commit_;
+  std::map<std::string, Participant*> places_;  // by component
+  bool committed_{false};
+};
+
+/// Takes the time of a part of a step's preparation, and says of its errors whose they are.
+template <typename Part>
+void TransactionCommit::Work::at_step(int step, Part&& part) {
+  const time_ns_t began = monotonic_now_ns();
+  try {
+    part();
+  } catch (const Error& failure) {
+    rethrow_at(step, failure);
+  } catch (...) {
+    rethrow_at(step, Error(ErrorCode::prepare_failed, caught_text()));
+  }
+  reports_[static_cast<std::size_t>(step - 1)].prepare_ns += monotonic_now_ns() - began;
+}
+
+}  // namespace mauve

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/data/port.hpp"
+
+#include <mutex>
+#include <utility>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/data/call_type.hpp"
+#include "mauve_rt/data/resource.hpp"
+
+namespace mauve {
+
+std::string_view to_string(PortKind kind) noexcept {
+  switch (kind) {
+    case PortKind::read:
+      return "read";
+    case PortKind::write:
+      return "write";
+    case PortKind::call:
+      return "call";
+    case PortKind::event:
+      return "event";
+  }
+  return "unknown";
+}
+
+CallOutcome ServiceBase::call_serialized(std::span<const std::byte> /*request*/,
+                                         std::vector<std::byte>& /*reply*/) {
+  return CallOutcome::malformed;
+}
+
+void ServiceBase::check_ports(std::uint32_t wanted) const {
+  const std::uint32_t most = max_ports();
+  if (most == 0 || wanted <= most) return;
+  const std::string place = (resource_ == nullptr ? "" : resource_->name() + ".") + name_;
+  throw Error(ErrorCode::invalid_argument, "the service takes no more ports",
+              {.element = "service " + place,
+               .expected = "at most " + std::to_string(most) + " port" + (most == 1 ? "" : "s"),
+               .found = std::to_string(wanted),
+               .remedy = kind_ == PortKind::write ? "disconnect the other writer, or use shared_data"
+                                                  : "raise max_readers, or use shared_data"});
+}
+
+void PortBase::check(const ServiceBase& service) const {
+  const auto shown = [](PortKind kind, const std::string& type) {
+    return std::string(to_string(kind)) + (type.empty() ? "" : " of " + type);
+  };
+  const Resource* resource = service.resource();
+  const std::string place = (resource == nullptr ? "" : resource->name() + ".") + service.name();
+  if (service.kind() != kind_ || service.type() != type_) {
+    throw Error(ErrorCode::type_mismatch, "the port does not fit the service",
+                {.element = "port " + name_,
+                 .expected = shown(kind_, type_),
+                 .found = shown(service.kind(), service.type()) + " at " + place,
+                 .remedy = "connect it to a service of equal kind and type"});
+  }
+  if (service.representation() != representation()) {
+    throw Error(
+        ErrorCode::type_mismatch, "port and service hold the type in different ways",
+        {.element = "port " + name_,
+         .expected = "a service in " + std::string(representation()),
+         .found = "one in " + std::string(service.representation()) + " at " + place,
+         .remedy = "relay through a shared_data whose type a plug-in library registers; load that library "
+                   "before Python makes ports and resources of the type"});
+  }
+  if (!fits(service)) {
+    throw Error(ErrorCode::type_mismatch, "port and service mean different C++ types by one name",
+                {.element = "port " + name_,
+                 .expected = shown(kind_, type_) + " as the port's library declares it",
+                 .found = "another C++ type of that name at " + place,
+                 .remedy = "let both packages use one declaration of the type, from one header"});
+  }
+}
+
+PortConnection PortBase::prepare(ServiceBase& service, const std::string& resource_name) const {
+  check(service);
+  PortConnection connection{.service = &service, .resource = resource_name};
+  if (kind_ == PortKind::call) connection.trace_id = TraceNames::intern(resource_name + "." + service.name());
+  return connection;
+}
+
+void PortBase::swap(PortConnection& connection) noexcept {
+  attach(connection.service);
+  if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
+  is_counted_ = true;
+  if (connection.service != nullptr) connection.service->add_port();
+  const std::lock_guard lock(shown_mutex_);
+  std::swap(connection_, connection);
+}
+
+bool PortBase::make_safe(bool may_wait) noexcept {
+  if (is_safe_ || output().on_stop != OutputPolicy::set_zero) return true;
+  const TryWrite tried = try_write_zero();
+  is_safe_ = tried == TryWrite::done;
+  if (tried != TryWrite::must_wait || !may_wait) return is_safe_;
+  write_zero();
+  return is_safe_ = true;
+}
+
+void PortBase::leave_behind() noexcept {
+  closed_.store(kLeft, std::memory_order_release);
+  if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
+  is_counted_ = false;
+}
+
+void PortBase::connect(ServiceBase& service, const std::string& resource_name) {
+  PortConnection connection = prepare(service, resource_name);
+  if (&service != connection_.service) service.check_ports(service.ports() + 1);
+  swap(connection);
+}
+
+void PortBase::disconnect() noexcept {
+  PortConnection none;
+  swap(none);
+}
+
+void PortBase::preview(const PortConnection& connection) {
+  stand_in_ = make_stand_in();
+  stand_in_->set_context(context_);
+  stand_in_->attach(connection.service);
+  stand_in_->connection_ = connection;
+  previewer_.store(pthread_self(), std::memory_order_relaxed);
+}
+
+void PortBase::end_preview() noexcept {
+  previewer_.store(kNobody, std::memory_order_relaxed);
+  if (stand_in_ == nullptr) return;
+  stand_in_->attach(nullptr);
+  stand_in_.reset();
+}
+
+ConnectedTo PortBase::connected_to() const {
+  constexpr std::size_t kUsualLength = 64;  // nothing is allocated under the lock then
+  ConnectedTo shown;
+  shown.resource.reserve(kUsualLength);
+  shown.service.reserve(kUsualLength);
+  const std::lock_guard lock(shown_mutex_);
+  if (connection_.service == nullptr) return shown;
+  shown.resource = connection_.resource;
+  shown.service = connection_.service->name();
+  return shown;
+}
+
+}  // namespace mauve

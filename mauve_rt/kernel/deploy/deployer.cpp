@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deploy/deployer.hpp"
+
+#include <algorithm>
+#include <thread>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+
+#include "base/prefault.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr time_ns_t kStopTimeout = ms_to_ns(500);
+constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
+
+}  // namespace
+
+/// The barrier that component threads and deployer meet at.
+class Deployer::Barrier {
+ public:
+  explicit Barrier(std::size_t parties) : missing_(parties) {
+    pthread_barrier_init(&barrier_, nullptr, static_cast<unsigned>(parties));
+  }
+  ~Barrier() { pthread_barrier_destroy(&barrier_); }
+  Barrier(const Barrier&) = delete;
+  Barrier& operator=(const Barrier&) = delete;
+
+  pthread_barrier_t& get() noexcept { return barrier_; }
+  void created_one() noexcept { --missing_; }
+  void arrive() noexcept { pthread_barrier_wait(&barrier_); }
+  /// Lets those go on that have arrived, by standing in for whoever never will.
+  void stand_in() {
+    std::vector<std::thread> stand_ins;
+    for (; missing_ > 0; --missing_) stand_ins.emplace_back([this] { arrive(); });
+    for (std::thread& thread : stand_ins) thread.join();
+  }
+
+ private:
+  pthread_barrier_t barrier_{};
+  std::size_t missing_;
+};
+
+Deployer::Deployer(Architecture& architecture, DeployerOptions options)
+    : Host(architecture), options_(options) {}
+
+Deployer::~Deployer() {
+  shutdown();
+  wait_unused();
+}
+
+void Deployer::prepare_process() {
+  int highest = 1;
+  for (const auto& component : architecture().components()) {
+    highest = std::max(highest, component->task().settings().priority);
+  }
+  process_.acquire(highest, options_.require_realtime);
+}
+
+void Deployer::deploy() {
+  const std::lock_guard change(architecture().change_lock());
+  const std::lock_guard life(life_mutex_);
+  require_deployable();
+  prepare_process();
+  architecture().set_host(*this);
+  try {
+    auto conductor = std::make_shared<Conductor>();
+    create_threads();
+    const std::lock_guard lock(conductor_mutex_);
+    conductor_ = std::move(conductor);
+  } catch (...) {
+    architecture().release_host(*this);
+    throw;
+  }
+  // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it. Each finds its start
+  // waiting when the barrier opens, which one wake-up does for all: none runs while the others' are being posted.
+  start_all(monotonic_now_ns() + kDeploymentLead);
+  barrier_->arrive();
+  for (const auto& component : architecture().components()) component->task().wait_started();
+  set_deployed(true);
+}
+
+void Deployer::create_threads() {
+  const auto components = architecture().components();
+  for (const auto& component : components) {
+    Task& task = component->task();
+    if (!task.end_thread(monotonic_now_ns())) {  // left behind by a shutdown
+      task.throw_state_running("the component still executes a state of an earlier deployment", 0,
+                               "wait for its end, then deploy again");
+    }
+  }
+  barrier_ = std::make_unique<Barrier>(components.size() + 1);
+  watchdog_ = std::make_shared<Watchdog>();
+  try {
+    for (const auto& component : components) {
+      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace, watchdog_);
+      barrier_->created_one();
+    }
+  } catch (...) {
+    barrier_->stand_in();
+    for (const auto& component : components) component->task().end_thread(kForever);
+    watchdog_.reset();
+    throw;
+  }
+  prefault_allocated();
+}
+
+void Deployer::shutdown() noexcept {
+  const std::lock_guard life(life_mutex_);
+  if (!is_deployed()) return;
+  set_deployed(false);
+  std::shared_ptr<Conductor> conductor;
+  {
+    const std::lock_guard lock(conductor_mutex_);
+    conductor = std::move(conductor_);
+  }
+  conductor->withdraw();
+  stop_all(monotonic_now_ns() + kStopTimeout);
+  conductor->withdraw();  // a commit that had found the host open still
+  const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
+  for (const auto& component : architecture().components()) component->task().end_thread(until);
+  conductor->withdraw();  // one that held a task until now is not to start it
+  watchdog_->stop();      // last: stopping is watched too
+  architecture().release_host(*this);
+  architecture().changes().bump();
+}
+
+void Deployer::attach(Task& task) {
+  task.create_thread(nullptr, options_.require_realtime, options_.trace, watchdog_);
+}
+
+bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
+
+std::shared_ptr<Conductor> Deployer::conductor() noexcept {
+  const std::lock_guard lock(conductor_mutex_);
+  return conductor_;
+}
+
+}  // namespace mauve

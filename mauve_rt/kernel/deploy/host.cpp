@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deploy/host.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// For so long, all together, each component is stopped only when the one after it has come to rest.
+constexpr time_ns_t kInOrder = ms_to_ns(50);
+
+}  // namespace
+
+void Host::require_deployable() const {
+  if (is_deployed()) {
+    throw Error(ErrorCode::already_running, "the architecture is deployed already",
+                {.remedy = "shut it down first, to deploy it anew"});
+  }
+  if (architecture_.is_configured()) return architecture_.require_ready_cores();
+  throw Error(ErrorCode::not_configured, "the architecture is not configured",
+              {.remedy = "call configure() first"});
+}
+
+void Host::require_deployed() const {
+  if (is_deployed()) return;
+  throw Error(ErrorCode::not_configured, "the architecture is not deployed",
+              {.remedy = "call deploy() first"});
+}
+
+void Host::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
+  require_deployed();
+  architecture_.hold_component(component)->task().start(clock_ns);
+}
+
+void Host::stop(const std::string& component, time_ns_t timeout_ns) {
+  require_deployed();
+  architecture_.hold_component(component)->task().stop(is_simulated() ? 0 : timeout_ns);
+}
+
+time_ns_t Host::get_time(const std::string& component) const {
+  return architecture_.hold_component(component)->task().get_time();
+}
+
+void Host::require_own() const {
+  const Host* present = architecture_.host();
+  if (present == nullptr || present == this) return;
+  throw Error(ErrorCode::already_running, "another host runs the architecture",
+              {.remedy = "ask that one for the change, or shut it down first"});
+}
+
+std::unique_ptr<TransactionCommit> Host::make(Transaction transaction, const TransactionOptions& options) {
+  require_own();
+  return architecture_.make(std::move(transaction), options);
+}
+
+TransactionReport Host::commit(Transaction transaction, const TransactionOptions& options) {
+  return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
+}
+
+StepReport Host::replace_core(const std::string& component, const std::string& core,
+                              const CommitTimeouts& timeouts) {
+  require_own();
+  return architecture_.commit_one(std::move(Transaction().replace_core(component, core)), timeouts);
+}
+
+StepReport Host::set_property(const std::string& component, const std::string& name,
+                              const PropertyValue& value, const CommitTimeouts& timeouts) {
+  require_own();
+  return architecture_.commit_one(std::move(Transaction().set_property(component, name, value)), timeouts);
+}
+
+TraceDrain Host::drain_trace() {
+  TraceDrain drain = architecture_.drain_trace();
+  if (is_simulated()) drain.monotonic_ns = drain.realtime_ns = now_ns();
+  return drain;
+}
+
+std::uint32_t Host::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept {
+  const std::atomic<std::uint32_t>& word = architecture_.changes().word;
+  while (!is_simulated() && word.load(std::memory_order_acquire) == seen) {
+    if (!futex_wait_until(word, seen, until_ns)) break;
+  }
+  return word.load(std::memory_order_acquire);
+}
+
+void Host::start_all(time_ns_t epoch_ns) {
+  architecture_.set_deployment_epoch(epoch_ns);
+  for (const auto& component : architecture_.components()) {
+    Task& task = component->task();
+    const time_ns_t first = task.join(epoch_ns);
+    if (task.state() == ComponentState::stopped) task.start_at(first);
+  }
+}
+
+void Host::stop_all(time_ns_t until_ns) noexcept {
+  const auto components = architecture_.components();
+  const auto stop = [](Task& task, time_ns_t by_ns) {
+    try {
+      task.stop(std::max<time_ns_t>(0, by_ns - monotonic_now_ns()));
+    } catch (const Error&) {  // still in a state, or faulted by now: ending its thread is the answer
+    }
+  };
+  const time_ns_t in_order_until = std::min(until_ns, monotonic_now_ns() + kInOrder);
+  for (auto component = components.rbegin(); component != components.rend(); ++component) {
+    Task& task = (*component)->task();
+    if (settled(task.state()) == ComponentState::running) stop(task, in_order_until);
+  }
+  for (const auto& component : components) {
+    if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);
+  }
+}
+
+}  // namespace mauve

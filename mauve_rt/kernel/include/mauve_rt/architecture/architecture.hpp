@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Architecture: components and resources, connected.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture/change_lock.hpp"
+#include "mauve_rt/architecture/description.hpp"
+#include "mauve_rt/change/transaction.hpp"
+#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/run/component.hpp"
+
+namespace mauve {
+
+class Host;
+class PluginRegistry;
+class TransactionCommit;
+
+/// What drain_trace() yields; indices are component numbers, removed components included.
+struct TraceDrain {
+  std::vector<TraceRecord> records;
+  std::vector<std::uint64_t> written;
+  std::vector<std::uint64_t> dropped;
+  time_ns_t monotonic_ns{0};
+  time_ns_t realtime_ns{0};
+};
+
+/// From the instant that all threads are ready at to the epoch, however many they are (rule 5).
+inline constexpr time_ns_t kDeploymentLead = ms_to_ns(20);
+
+/// What a transaction puts on and takes off an architecture's lists, and whose looks it changed.
+struct ListChange {
+  std::vector<std::shared_ptr<Component>> added_components{};
+  std::vector<std::shared_ptr<Component>> removed_components{};
+  std::vector<std::shared_ptr<Resource>> added_resources{};
+  std::vector<std::shared_ptr<Resource>> removed_resources{};
+  std::vector<Component*> changed{};
+};
+
+/// Components and resources by name. Ordinary threads. Every change is a transaction of one step or more, carried out
+/// by the host that runs the architecture, or by itself while nobody does; they are made one at a time.
+///
+/// | member                          | written by            | read by | under                          |
+/// | ------------------------------- | --------------------- | ------- | ------------------------------ |
+/// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
+/// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
+/// | host_                           | hosts                 | anyone  | host_mutex_                    |
+/// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
+/// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
+class Architecture final : public Configurable {
+ public:
+  /// With a registry, parts can be named as well as given by type.
+  explicit Architecture(PluginRegistry* registry = nullptr);
+  ~Architecture() override;
+
+  std::string description() const override { return "architecture"; }
+
+  /// Configures resources, then components; does nothing when that was done. [non-rt]
+  void configure() override;
+  /// Cleans up all, in reverse order. [non-rt] Throws Error (already_running) when a component is not parked.
+  void cleanup() override;
+
+  /// Carries out a transaction; one at a time. [non-rt]
+  /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
+  TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
+  /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
+  std::unique_ptr<TransactionCommit> make(Transaction transaction, const TransactionOptions& options = {});
+  /// The same of a transaction of one step, whose errors tell no number. [non-rt]
+  StepReport commit_one(Transaction transaction, const CommitTimeouts& timeouts = {});
+  std::unique_ptr<TransactionCommit> make_one(Transaction transaction, const CommitTimeouts& timeouts = {});
+
+  /// Adds a component made of the given types. Once the architecture is configured so is the component, and once it is
+  /// deployed it arrives STOPPED. [non-rt] Throws Error: duplicate_name, out_of_range (settings); as configure() then.
+  template <typename ShellType, typename CoreType, typename FsmType>
+  Component& add_component(const std::string& name, const TaskSettings& settings = {}) {
+    return add_component(name, std::make_unique<ShellType>(), std::make_unique<CoreType>(),
+                         std::make_unique<FsmType>(), settings, [] { return std::make_unique<FsmType>(); });
+  }
+  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone.
+  Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
+                           std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
+                           const TaskSettings& settings, const Component::FsmFactory& make_fsm = {});
+  /// Adds a component of registered parts. [non-rt] Throws Error: unknown_shell, unknown_core, unknown_fsm
+  /// besides.
+  Component& add_component(const std::string& name, const std::string& shell, const std::string& core,
+                           const std::string& fsm, const TaskSettings& settings);
+
+  /// Adds a resource of a given type: add_resource<SharedData<Point>>("goal"). [non-rt]
+  template <typename ResourceType, typename... Args>
+  ResourceType& add_resource(const std::string& name, Args&&... args) {
+    auto resource = std::make_unique<ResourceType>(std::forward<Args>(args)...);
+    ResourceType& added = *resource;
+    add_resource(name, std::unique_ptr<Resource>(std::move(resource)));
+    return added;
+  }
+  void add_resource(const std::string& name, std::unique_ptr<Resource> resource);
+
+  /// Connects a port to a service; of a running component in its next wait. [non-rt] Throws Error: unknown_port,
+  /// unknown_service, type_mismatch, duplicate_name; once configured not_reconfigurable; timeout.
+  void connect(Component& component, const std::string& port, Resource& resource, const std::string& service);
+  void connect(const std::string& component, const std::string& port, const std::string& resource,
+               const std::string& service);
+
+  /// Lets who carries samples out of the architecture know of every write to a resource. [non-rt]
+  /// Throws Error (invalid_argument) when it has no samples.
+  void publish(const std::string& resource);
+  /// Counts who carries samples into the architecture as a writer of a resource. [non-rt] Throws as
+  /// Resource::bind_input().
+  void subscribe(const std::string& resource);
+
+  Component& component(const std::string& name) const;  // Throws Error: unknown_component
+  Resource& resource(const std::string& name) const;    // Throws Error: unknown_resource
+  /// The same, kept alive while the caller holds it, whatever is removed meanwhile. [non-rt]
+  std::shared_ptr<Component> hold_component(const std::string& name) const;
+  std::shared_ptr<Resource> hold_resource(const std::string& name) const;
+  /// The same; nullptr when there is none. [non-rt]
+  std::shared_ptr<Component> find_component(const std::string& name) const;
+  std::shared_ptr<Resource> find_resource(const std::string& name) const;
+  /// Throws Error (not_configured) when a component could not start for want of a configured core. [non-rt]
+  void require_ready_cores() const;
+  /// All there are now, in the order of declaration. [non-rt]
+  std::vector<std::shared_ptr<Component>> components() const;
+  std::vector<std::shared_ptr<Resource>> resources() const;
+
+  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. [non-rt]
+  ArchitectureDescription describe() const;
+
+  /// A new, unconfigured core of a registered implementation. Throws Error: unknown_core.
+  std::unique_ptr<CoreBase> make_core(const std::string& implementation) const;
+  /// Throws Error (invalid_argument) when there is none.
+  PluginRegistry& require_registry() const;
+  PluginRegistry* registry() const noexcept { return registry_; }
+
+  /// Threads of removed components that still execute what they were condemned for. [non-rt]
+  std::size_t threads_left_behind() const;
+
+  ChangeSignal& changes() noexcept { return changes_; }
+  /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
+  std::uint64_t revision() const noexcept {
+    return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
+  }
+  /// The instant that all grids are counted from; 0 before deployment. [rt]
+  time_ns_t deployment_epoch_ns() const noexcept {
+    return deployment_epoch_ns_.load(std::memory_order_relaxed);
+  }
+  /// By who deploys, and by a commit that resynchronises: now + kDeploymentLead. [rt]
+  void set_deployment_epoch(time_ns_t epoch_ns) noexcept {
+    deployment_epoch_ns_.store(epoch_ns, std::memory_order_relaxed);
+  }
+
+  /// Names by the numbers that trace records carry; those of removed components stay. [non-rt]
+  std::vector<std::string> trace_components() const;
+  /// Empties every ring, and what removed components left. [non-rt]
+  TraceDrain drain_trace();
+
+  /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one
+  /// thread.
+  bool next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns);
+  /// Told of the writes to published resources, and of clients' calls.
+  Notifier& publications() noexcept { return publications_; }
+  /// Wires a resource that nobody uses yet to those who carry things in and out. [non-rt] Throws as publish(), and
+  /// as Resource::bind_input().
+  void prepare_outward(Resource& resource, TopicBinding topic);
+
+  // ---- for hosts
+
+  /// Under it all changes are made. [non-rt]
+  ChangeLock& change_lock() noexcept { return change_lock_; }
+  /// Who runs it; nullptr: nobody. [non-rt]
+  Host* host() const;
+  /// [non-rt], the change lock held. Throws Error (already_running) when it has a host.
+  void set_host(Host& host);
+  /// Returns at once: a change that uses the host goes on, and finds it shut down. [non-rt]
+  void release_host(const Host& host) noexcept;
+
+  // ---- for transactions
+
+  /// A component with a number of its own, not listed yet: its changes are nobody's business. [non-rt]
+  /// Throws Error (out_of_range) when all numbers are used up.
+  std::shared_ptr<Component> make_unlisted(const std::string& name);
+  /// How many numbers were given out; give_back() forgets those from `numbers` on. [non-rt]
+  std::size_t numbers() const;
+  void give_back_numbers(std::size_t numbers);
+  /// Puts a change of the lists in force, as one for all who look. [non-rt]
+  void change_lists(const ListChange& change);
+  /// Keeps a component whose thread has not ended, and all it is connected to (`gone`: of resources that were removed
+  /// with it); reap() lets those go that have. [non-rt]
+  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
+                        const std::vector<std::shared_ptr<Resource>>& gone);
+  void reap();
+  /// Whether a thread that was left behind may still use a resource. [non-rt]
+  bool is_used_by_left_behind(const Resource& resource) const;
+  /// Keeps what a removed component's ring holds until the next drain. [non-rt]
+  void retire_trace(Task& task);
+
+ private:
+  struct Leaving {
+    std::shared_ptr<Component> component;
+    bool was_listed;
+    std::vector<std::shared_ptr<Resource>> uses;
+  };
+  struct Final {  // of a removed component
+    std::uint64_t written{0};
+    std::uint64_t dropped{0};
+  };
+
+  bool configure_hook() override;
+  void check_cleanup() const override;
+  void cleanup_hook() override;
+  bool end_threads() noexcept;
+
+  PluginRegistry* registry_;
+  ChangeLock change_lock_;
+  mutable std::mutex host_mutex_;
+  Host* host_{nullptr};
+  ChangeSignal changes_;
+  Notifier publications_;
+  std::atomic<time_ns_t> deployment_epoch_ns_{0};
+  mutable std::mutex list_mutex_;
+  std::vector<std::string> names_;  // by number
+  std::mutex trace_mutex_;
+  std::deque<TraceRecord> retired_;
+  std::vector<Final> finals_;  // by number
+  std::vector<std::shared_ptr<Resource>> resources_;
+  std::vector<Leaving> leaving_;
+  std::vector<std::shared_ptr<Component>>
+      components_;  // after the resources: ports go before what they connect to
+};
+
+}  // namespace mauve

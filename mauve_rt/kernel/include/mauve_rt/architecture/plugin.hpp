@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Plug-ins: shells, cores, fsms, resources and data types by name, from libraries opened at run time.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/data/client.hpp"
+#include "mauve_rt/data/latest_value.hpp"
+#include "mauve_rt/data/port.hpp"
+#include "mauve_rt/data/ring_buffer.hpp"
+#include "mauve_rt/data/shared_data.hpp"
+#include "mauve_rt/run/component.hpp"
+
+namespace mauve {
+
+struct ResourceParameters {
+  std::size_t capacity{0};                        // ring_buffer
+  bool overwrite{false};                          // ring_buffer
+  std::uint32_t max_readers{kDefaultMaxReaders};  // latest_value
+  time_ns_t timeout_ns{kDefaultCallTimeout};      // client
+};
+
+/// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at
+/// a time.
+class PluginRegistry {
+ public:
+  using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
+  using ResourceFactory = std::function<std::unique_ptr<Resource>(const ResourceParameters&)>;
+
+  /// Knows the kind event, which needs no type.
+  PluginRegistry();
+
+  /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call
+  /// does nothing. Throws Error (plugin) with the loader's words.
+  void load_library(const std::string& path);
+
+  template <typename ShellType>
+  void shell(const std::string& name) {
+    add_shell(name, [] { return std::make_unique<ShellType>(); });
+  }
+  /// `shell_name`: the shell it was written for.
+  template <typename CoreType>
+  void core(const std::string& name, const std::string& shell_name) {
+    add_core(name, shell_name, [] { return std::make_unique<CoreType>(); });
+  }
+  template <typename FsmType>
+  void fsm(const std::string& name, const std::string& shell_name) {
+    add_fsm(name, shell_name, [] { return std::make_unique<FsmType>(); });
+  }
+  /// A resource of the plug-in's own; `name` is its kind in architecture files.
+  template <typename ResourceType>
+  void resource(const std::string& name) {
+    add_resource(name, "", [](const ResourceParameters&) { return std::make_unique<ResourceType>(); });
+  }
+  /// A data type: makes shared_data, ring_buffer, ports and, if it can be copied as bytes, latest_value of it
+  /// possible.
+  template <Described T>
+  void type() {
+    // Ports of the C++ type that the resources are of, whoever else registers the name later.
+    if (!resources_.contains({"shared_data", type_name<T>()}))
+      ports_.insert_or_assign(type_name<T>(), data_ports<T>());
+    add_resource("shared_data", type_name<T>(),
+                 [](const ResourceParameters&) { return std::make_unique<SharedData<T>>(); });
+    add_resource("ring_buffer", type_name<T>(), [](const ResourceParameters& parameters) {
+      return std::make_unique<RingBuffer<T>>(parameters.capacity,
+                                             parameters.overwrite ? WhenFull::overwrite : WhenFull::refuse);
+    });
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      add_resource("latest_value", type_name<T>(), [](const ResourceParameters& parameters) {
+        return std::make_unique<LatestValue<T>>(parameters.max_readers);
+      });
+    }
+  }
+
+  /// The type of a ROS service: makes clients of it possible. Ports and offered calls need no registration.
+  template <DescribedCall S>
+  void call_type() {
+    add_resource("client", std::string(CallTraits<S>::name), [](const ResourceParameters& parameters) {
+      return std::make_unique<Client<S>>(parameters.timeout_ns);
+    });
+  }
+
+  // The same with a factory, for parts that are no C++ class of their own.
+
+  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
+  void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory);
+  void add_fsm(const std::string& name, const std::string& shell_name,
+               std::function<std::unique_ptr<FsmBase>()> factory);
+  void add_resource(const std::string& kind, const std::string& type, ResourceFactory factory);
+
+  std::unique_ptr<Shell> make_shell(const std::string& name) const;
+  std::unique_ptr<CoreBase> make_core(const std::string& name) const;
+  std::unique_ptr<FsmBase> make_fsm(const std::string& name) const;
+  /// Throws Error: unknown_resource (kind), unknown_type, type_mismatch (latest_value of a type that cannot be
+  /// copied as bytes), invalid_argument (a ring without capacity, an event with a type), out_of_range
+  /// (max_readers).
+  std::unique_ptr<Resource> make_resource(const std::string& kind, const std::string& type,
+                                          const ResourceParameters& parameters) const;
+
+  /// A read or write port of a registered type, or an event port (`type` is empty).
+  /// Throws Error: unknown_type, invalid_argument (a call port, whose signature only C++ knows).
+  std::unique_ptr<PortBase> make_port(PortKind kind, const std::string& type, const std::string& name,
+                                      const OutputOptions& output = {}) const;
+
+  const std::string& core_shell(const std::string& name) const;
+  const std::string& fsm_shell(const std::string& name) const;
+  /// What a value of a registered data type takes, in bytes; 0 when it is none.
+  std::size_t value_bytes(const std::string& type) const;
+  /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
+  /// (invalid_argument).
+  std::vector<std::string> names(const std::string& kind) const;
+
+ private:
+  template <typename Product>
+  struct Entry {
+    std::string shell;
+    std::function<std::unique_ptr<Product>()> make;
+  };
+  struct PortFactories {
+    std::unique_ptr<PortBase> (*read)(const std::string& name);
+    std::unique_ptr<PortBase> (*write)(const std::string& name, const OutputOptions& output);
+    std::size_t value_bytes;
+  };
+  template <Described T>
+  static PortFactories data_ports() {
+    return {[](const std::string& name) -> std::unique_ptr<PortBase> {
+              return std::make_unique<ReadPort<T>>(name);
+            },
+            [](const std::string& name, const OutputOptions& output) -> std::unique_ptr<PortBase> {
+              return std::make_unique<WritePort<T>>(name, output);
+            },
+            sizeof(T)};
+  }
+
+  [[noreturn]] void throw_unknown_type(const std::string& type) const;
+
+  std::set<std::string> libraries_;
+  std::map<std::string, Entry<Shell>> shells_;
+  std::map<std::string, Entry<CoreBase>> cores_;
+  std::map<std::string, Entry<FsmBase>> fsms_;
+  std::map<std::pair<std::string, std::string>, ResourceFactory> resources_;  // by (kind, type)
+  std::map<std::string, PortFactories> ports_;                                // by type
+};
+
+}  // namespace mauve
+
+/// Opens the registration function of a plug-in library, once a library:
+///   MAUVE_PLUGINS(registry) { registry.core<MyCore>("my_package/MyCore", "my_package/MyShell"); }
+// NOLINTBEGIN(bugprone-macro-parentheses): a parameter's name cannot stand in parentheses
+#define MAUVE_PLUGINS(registry)                                                  \
+  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins( \
+      mauve::PluginRegistry& registry)
+// NOLINTEND(bugprone-macro-parentheses)

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Futex waits and wakes on a 32-bit word, CLOCK_MONOTONIC, EINTR retried.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "mauve_rt/base/time.hpp"
+
+namespace mauve {
+
+/// Sleeps while the word holds `expected`, at most until the instant. [rt]
+/// Returns false at the instant, true when the word changed or a wake came (re-check the word).
+bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
+                      time_ns_t until_ns) noexcept;
+
+/// Wakes every thread that sleeps on the word. [rt]
+void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept;
+
+}  // namespace mauve

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Transaction: any number of changes to an architecture that come into force as one, or not at all.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture/plugin.hpp"
+#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/run/component.hpp"
+
+namespace mauve {
+
+class Draft;
+
+/// What a component to be added consists of; parts by their registered names.
+struct ComponentParts {
+  std::string shell{};
+  std::string core{};
+  std::string fsm{};
+  TaskSettings settings{};
+  std::map<std::string, PropertyValue> properties{};
+  std::vector<std::string> alternatives{};
+  std::string fallback{};
+  bool reconfigurable{true};
+};
+
+/// One step: checks itself against what the steps before it will have made of the architecture.
+class TransactionStep {
+ public:
+  TransactionStep() = default;
+  virtual ~TransactionStep() = default;
+  TransactionStep(const TransactionStep&) = delete;
+  TransactionStep& operator=(const TransactionStep&) = delete;
+
+  /// "connect mapping.scan lidar.read": kind, target, value. [non-rt]
+  virtual const std::string& text() const noexcept = 0;
+  /// The component it is about; empty for steps about resources. [non-rt]
+  virtual const std::string& component() const noexcept = 0;
+  /// Enters its effect into the draft; uses up the parts it was given. [non-rt] Throws Error.
+  virtual void draft(Draft& draft) = 0;
+};
+
+/// A list of steps, taken in order; nothing happens before Host::commit or Architecture::commit. Ordinary threads.
+/// Parts are given by registered name or as objects; objects serve one commit.
+class Transaction {
+ public:
+  /// By name: one of the component's declared alternatives, or the core it was declared with.
+  Transaction& replace_core(const std::string& component, const std::string& implementation);
+  Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core);
+  /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
+  Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
+  /// The new fsm starts in its initial state, on its own period, on the deployment's epoch.
+  Transaction& replace_fsm(const std::string& component, const std::string& implementation);
+  Transaction& replace_fsm(const std::string& component, std::unique_ptr<FsmBase> fsm);
+  /// Ports keep their connections by name, properties their values.
+  Transaction& replace_shell(const std::string& component, const std::string& implementation);
+  Transaction& replace_shell(const std::string& component, std::unique_ptr<Shell> shell);
+  Transaction& set_property(const std::string& component, const std::string& name,
+                            const PropertyValue& value);
+  Transaction& connect(const std::string& component, const std::string& port, const std::string& resource,
+                       const std::string& service);
+  Transaction& disconnect(const std::string& component, const std::string& port);
+
+  /// Arrives STOPPED; a start step starts it on the deployment's grid.
+  Transaction& add_component(const std::string& name, const ComponentParts& parts);
+  /// With its parts as objects; the names in `rest` stay unused, but for the fallback's where none is given.
+  Transaction& add_component(const std::string& name, Parts parts, const ComponentParts& rest = {},
+                             const Component::FsmFactory& make_fsm = {},
+                             std::unique_ptr<CoreBase> fallback = nullptr);
+  template <typename ShellType, typename CoreType, typename FsmType>
+  Transaction& add_component(const std::string& name, const ComponentParts& rest = {}) {
+    return add_component(std::move(name),
+                         Parts{.shell = std::make_unique<ShellType>(),
+                               .core = std::make_unique<CoreType>(),
+                               .fsm = std::make_unique<FsmType>()},
+                         std::move(rest), [] { return std::make_unique<FsmType>(); });
+  }
+  /// It is parked, its outputs written as on a stop, its ports disconnected.
+  Transaction& remove_component(const std::string& name);
+  /// `topic`: as Architecture::publish() or Resource::bind_input().
+  Transaction& add_resource(const std::string& name, const std::string& kind, const std::string& type,
+                            ResourceParameters parameters = {}, TopicBinding topic = TopicBinding::none);
+  Transaction& add_resource(const std::string& name, std::unique_ptr<Resource> resource,
+                            TopicBinding topic = TopicBinding::none);
+  /// Refused while a port is connected to it.
+  Transaction& remove_resource(const std::string& name);
+  /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.
+  Transaction& start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
+  Transaction& stop(const std::string& component);
+  /// Cleans up and configures anew a component that is not running; it is STOPPED then, a fault is forgotten. Its hooks
+  /// run before the commit, on its present parts, with the properties that the transaction sets. Where another step is
+  /// refused it is in its state of before; where its own hooks refuse, it is UNCONFIGURED.
+  Transaction& configure(const std::string& component);
+  /// A new common epoch: the commit's instant + 20 ms. Every running component goes on in its place, all its instants
+  /// later by the same, less than a period, so that they lie on the new epoch's grid; one that has no period is left
+  /// alone. The stopped ones take the epoch when they start. Not for an architecture that is not deployed.
+  Transaction& resynchronise();
+
+  const std::vector<std::unique_ptr<TransactionStep>>& steps() const noexcept { return steps_; }
+
+ private:
+  Transaction& add(std::unique_ptr<TransactionStep> step);
+
+  std::vector<std::unique_ptr<TransactionStep>> steps_;
+};
+
+struct TransactionOptions {
+  CommitTimeouts timeouts{};
+  bool dry_run{false};                 // check and prepare everything, then throw it away
+  std::uint64_t expected_revision{0};  // of the architecture; 0: any
+  std::int64_t max_missed{0};          // releases that a participant may be held past
+};
+
+struct TransactionReport {
+  std::vector<StepReport> steps;
+  std::uint64_t revision{0};  // of the architecture, after
+  time_ns_t prepare_ns{0};    // all of it
+  time_ns_t blackout_ns{0};   // the longest of any component's
+  bool is_complete{true};     // false: a release that follows has not come yet
+};
+
+}  // namespace mauve

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A register for one writer and a fixed number of readers that neither block nor retry.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <type_traits>
+
+#include "mauve_rt/base/sequence_cell.hpp"
+#include "mauve_rt/data/service.hpp"
+
+namespace mauve {
+
+/// Wait-free multi-word register by counting who took a slot and who gave it back: ARC (M. Ianni, A.
+/// Pellegrini, F. Quaglia: "A Wait-free Multi-word Atomic (1,N) Register for Large-scale Data Sharing on
+/// Multi-core Machines", CLUSTER 2017).
+///
+/// One word holds the index of the newest slot and how many readers took that slot while it was the newest. A
+/// reader keeps the slot it read last; while that one is still the newest, a read takes one load and the
+/// copy. The writer fills a slot that as many gave back as had taken, then exchanges the word, which tells it
+/// how many took the slot before. With readers + 2 slots one is always free: each reader keeps at most one,
+/// one is the newest.
+///
+/// Small values lie in front_ too, where a read costs what a sequence lock costs and writes nothing. A reader that
+/// meets writes there kCopies times goes to the slots. The writer fills front_ before it exchanges the word, so
+/// nobody who asks the slots is behind what front_ showed when he came, with one exception: the writer rests
+/// between the two. Then front_ is at rest too and can be copied; and if it is not, the exchange was made.
+///
+/// | member         | written by             | read by         | order                                           |
+/// | -------------- | ---------------------- | --------------- | ----------------------------------------------- |
+/// | word_          | writer, readers        | writer, readers | writer releases what it filled, readers acquire |
+/// | Slot::entry    | writer, nobody else in | who took it     | by word_ and released                           |
+/// | Slot::taken    | writer                 | writer          | -                                               |
+/// | Slot::released | readers; writer resets | writer          | readers release after the copy, writer acquires |
+template <typename T>
+class LatestRegister {
+  static_assert(std::is_trivially_copyable_v<T>, "a reader copies without a lock: use SharedData instead");
+
+ public:
+  struct Entry {
+    std::uint64_t sequence{0};  // 0: never written
+    time_ns_t time_ns{0};
+    T value{};
+  };
+
+  /// [setup]
+  explicit LatestRegister(std::size_t readers)
+      : size_(readers + 2), slots_(std::make_unique<Slot[]>(readers + 2)) {}
+
+  /// Types up to this many bytes are copied from front_ first.
+  static constexpr std::size_t kSmall = 112;  // with version and time two cache lines
+  static constexpr bool kHasFront = sizeof(T) <= kSmall;
+
+  /// Publishes a value, in at most `readers` + 2 looks for a free slot. [rt] One thread at a time.
+  /// False, and nothing written, only when more readers than declared keep slots.
+  bool write(const T& value, time_ns_t time_ns) noexcept {
+    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written here only
+    for (std::size_t i = next(newest); i != newest; i = next(i)) {
+      Slot& slot = slots_[i];
+      // acquire: what its readers copied, they have copied
+      if (slot.released.load(std::memory_order_acquire) != slot.taken) continue;
+      slot.released.store(0, std::memory_order_relaxed);  // relaxed: published with the word
+      slot.entry.value = value;
+      slot.entry.time_ns = time_ns;
+      slot.entry.sequence = ++sequence_;
+      if constexpr (kHasFront) front_.store(value, time_ns, sequence_);
+      // release: publishes the slot; the count that comes back is the writer's own business
+      const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_release);
+      slots_[newest].taken = before & kCountMask;
+      return true;
+    }
+    return false;
+  }
+
+  /// The newest entry as a port sees it; `fallback` when there is none. [rt] wait-free.
+  Sample<T> sample(const T& fallback, ReaderState& reader) noexcept {
+    if constexpr (kHasFront) {
+      Sample<T> sample{.value = fallback};
+      sample.status = read(sample.value, sample.time_ns, reader);
+      return sample;
+    } else {  // one copy
+      const Entry& entry = newest(reader.held);
+      if (entry.sequence == 0) return {.value = fallback};
+      return {.value = entry.value, .status = reader.look(entry.sequence), .time_ns = entry.time_ns};
+    }
+  }
+  /// The same into a place of the caller's, untouched when there is none. [rt] wait-free.
+  DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    std::uint64_t sequence = 0;
+    if constexpr (kHasFront) {
+      if (!front_.load(value, time_ns, sequence)) [[unlikely]]
+        sequence = read_contended(value, time_ns, reader);
+    } else {
+      sequence = read_slot(value, time_ns, reader);
+    }
+    return sequence == 0 ? DataStatus::none : reader.look(sequence);
+  }
+  /// Gives back what the reader keeps. [rt] wait-free.
+  void let_go(std::uint32_t& held) noexcept {
+    if (held == 0) return;
+    slots_[held - 1].released.fetch_add(1, std::memory_order_release);  // release: the copy is done
+    held = 0;
+  }
+
+ private:
+  static constexpr unsigned kCountBits = 48;
+  static constexpr std::uint64_t kCountMask = (std::uint64_t{1} << kCountBits) - 1;
+  static constexpr std::size_t kCacheLine = 64;
+  static constexpr int kCopies = 8;  // tries: together about as long as one take of a contended slot
+  struct Nothing {};
+
+  struct alignas(kCacheLine) Slot {
+    std::atomic<std::uint64_t> released{0};
+    std::uint64_t taken{0};
+    Entry entry;
+  };
+
+  static std::size_t index_of(std::uint64_t word) noexcept { return word >> kCountBits; }
+  std::size_t next(std::size_t i) const noexcept { return i + 1 == size_ ? 0 : i + 1; }
+
+  /// The newest slot, untouched until the reader's next call.
+  const Entry& newest(std::uint32_t& held) noexcept {
+    // relaxed: a slot that is kept was acquired when it was taken, and is not filled anew while kept
+    if (held != index_of(word_.load(std::memory_order_relaxed)) + 1) take_newest(held);
+    return slots_[held - 1].entry;
+  }
+  /// Returns the sequence found.
+  std::uint64_t read_slot(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    const Entry& entry = newest(reader.held);
+    if (entry.sequence == 0) return 0;
+    value = entry.value;
+    time_ns = entry.time_ns;
+    return entry.sequence;
+  }
+  /// After a first copy of front_ that failed. Out of line: the common way stays short.
+  [[gnu::noinline]] std::uint64_t read_contended(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    const std::uint64_t whole = front_.sequence();  // others may have seen it: no older one may be given
+    std::uint64_t sequence = 0;
+    for (int i = 1; i < kCopies; ++i) {
+      if (front_.load(value, time_ns, sequence)) return sequence;
+    }
+    if (newest(reader.held).sequence < whole && front_.load(value, time_ns, sequence)) return sequence;
+    return read_slot(value, time_ns, reader);
+  }
+
+  void take_newest(std::uint32_t& held) noexcept {
+    let_go(held);
+    // acquire: pairs with the exchange, through the additions of other readers (they continue its release)
+    held = static_cast<std::uint32_t>(index_of(word_.fetch_add(1, std::memory_order_acquire))) + 1;
+  }
+
+  [[no_unique_address]] std::conditional_t<kHasFront, SequenceCell<T>, Nothing> front_;
+  alignas(kCacheLine) std::atomic<std::uint64_t> word_{0};
+  alignas(kCacheLine) std::uint64_t sequence_{0};  // of the writer
+  std::size_t size_;
+  std::unique_ptr<Slot[]> slots_;
+};
+
+}  // namespace mauve

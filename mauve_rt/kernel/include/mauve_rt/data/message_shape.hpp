@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What a C++ struct says of the message it stands for, to be held against the message's own definition.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/data/cdr.hpp"
+
+namespace mauve {
+
+/// How many elements a field has: one; always `size`; at most `size`.
+enum class FieldArity : std::uint8_t { one, fixed, bounded };
+
+/// One field of a struct, in the words of .msg files.
+struct FieldShape {
+  std::string name{};
+  std::string type{};           // of an element: float64, string, geometry_msgs/msg/Point
+  std::size_t text_capacity{};  // of a string: its most characters; 0: any number
+  FieldArity arity{FieldArity::one};
+  std::size_t size{};                // of an array
+  std::vector<FieldShape> fields{};  // of a message within the message
+};
+
+/// A message as its C++ struct has it.
+struct MessageShape {
+  std::string type;   // geometry_msgs/msg/Point
+  std::size_t bytes;  // of the struct
+  std::vector<FieldShape> fields;
+};
+
+template <Described T>
+std::vector<FieldShape> field_shapes();
+
+namespace detail {
+
+/// The word of .msg files for a number's type.
+template <Primitive T>
+std::string primitive_name() {
+  if constexpr (std::is_same_v<T, bool>) return "bool";
+  const std::string bits = std::to_string(8 * sizeof(T));
+  if constexpr (std::is_floating_point_v<T>) return "float" + bits;
+  return (std::is_signed_v<T> ? "int" : "uint") + bits;
+}
+
+template <typename T>
+struct ShapeOf;  // of a member's type; the field's name is added by who knows it
+
+template <Primitive T>
+struct ShapeOf<T> {
+  static FieldShape get() { return {.type = primitive_name<T>()}; }
+};
+template <>
+struct ShapeOf<std::string> {
+  static FieldShape get() { return {.type = "string"}; }
+};
+template <std::size_t N>
+struct ShapeOf<BoundedString<N>> {
+  static FieldShape get() { return {.type = "string", .text_capacity = N}; }
+};
+template <Described T>
+struct ShapeOf<T> {
+  static FieldShape get() { return {.type = std::string(TypeTraits<T>::name), .fields = field_shapes<T>()}; }
+};
+template <typename T, std::size_t N>
+struct ShapeOf<std::array<T, N>> {
+  static FieldShape get() {
+    FieldShape shape = ShapeOf<T>::get();
+    shape.arity = FieldArity::fixed;
+    shape.size = N;
+    return shape;
+  }
+};
+template <typename T, std::size_t N>
+struct ShapeOf<BoundedVector<T, N>> {
+  static FieldShape get() {
+    FieldShape shape = ShapeOf<T>::get();
+    shape.arity = FieldArity::bounded;
+    shape.size = N;
+    return shape;
+  }
+};
+
+template <typename Class, typename Member>
+FieldShape shape_of(Member Class::* /*member*/) {
+  return ShapeOf<Member>::get();
+}
+
+/// The next name of "x, y, z", taken off its front.
+inline std::string next_name(std::string_view& names) {
+  const std::size_t comma = names.find(',');
+  std::string_view name = names.substr(0, comma);
+  names.remove_prefix(comma == std::string_view::npos ? names.size() : comma + 1);
+  const std::size_t begin = name.find_first_not_of(' ');
+  return begin == std::string_view::npos
+             ? std::string()
+             : std::string(name.substr(begin, name.find_last_not_of(' ') + 1 - begin));
+}
+
+}  // namespace detail
+
+/// The fields of a struct in their order on the wire. [non-rt]
+template <Described T>
+std::vector<FieldShape> field_shapes() {
+  std::vector<FieldShape> shapes;
+  [[maybe_unused]] std::string_view names = TypeTraits<T>::field_names;
+  const auto add = [&](auto member) {
+    shapes.push_back(detail::shape_of(member));
+    shapes.back().name = detail::next_name(names);
+  };
+  std::apply([&](auto... member) { (add(member), ...); }, TypeTraits<T>::fields());
+  return shapes;
+}
+
+/// [non-rt]
+template <Described T>
+MessageShape message_shape() {
+  return {.type = std::string(TypeTraits<T>::name), .bytes = sizeof(T), .fields = field_shapes<T>()};
+}
+
+/// Of those of the types that are messages; references are looked through. [non-rt]
+template <typename... Ts>
+std::vector<MessageShape> message_shapes() {
+  std::vector<MessageShape> shapes;
+  [[maybe_unused]] const auto add = [&]<typename T>(std::type_identity<T> /*tag*/) {
+    if constexpr (Described<T>) shapes.push_back(message_shape<T>());
+  };
+  (add(std::type_identity<std::remove_cvref_t<Ts>>{}), ...);
+  return shapes;
+}
+
+}  // namespace mauve

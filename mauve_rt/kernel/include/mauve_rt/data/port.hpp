@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Ports: a shell's way to the services of resources.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "mauve_rt/data/latest_register.hpp"
+#include "mauve_rt/data/port_base.hpp"
+
+namespace mauve {
+
+/// Reads from a resource. Unconnected (which is for optional ones), it yields its default with status none.
+template <Described T>
+class ReadPort final : public PortBase {
+ public:
+  explicit ReadPort(std::string name) : PortBase(std::move(name), PortKind::read, type_name<T>()) {}
+  ReadPort(std::string name, const T& initial)
+      : PortBase(std::move(name), PortKind::read, type_name<T>()), default_(initial) {}
+
+  /// Lets it go unconnected. [setup]
+  ReadPort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
+
+  /// Value, status and writer's time. [rt]
+  /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
+  Sample<T> read() noexcept { return is_previewed() ? read_ahead() : read_now(); }
+  /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
+  DataStatus read(T& value, time_ns_t* time_ns = nullptr) noexcept {
+    if (is_previewed()) [[unlikely]]
+      return read_ahead(value, time_ns);
+    time_ns_t time = reader_.time_ns;
+    status_ = find(value, time);
+    reader_.time_ns = time;
+    if (time_ns != nullptr) *time_ns = time;
+    return status_;
+  }
+
+  /// What the last read found, without reading; none before the first one. [rt]
+  DataStatus status() const noexcept { return is_previewed() ? stand_in<ReadPort>().status_ : status_; }
+  /// How old what the last read found is by the component's clock; 0 when there was nothing. [rt]
+  time_ns_t age_ns() const noexcept {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<ReadPort>().age_ns();
+    return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns;
+  }
+
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
+  bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
+    auto value = std::make_unique<T>(default_);
+    status = read(*value, &time_ns);
+    CdrWriter(message).put(*value);
+    return true;
+  }
+
+ protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const ReadService<T>*>(&service) != nullptr;
+  }
+  void attach(ServiceBase* service) noexcept override {
+    if (service_ != nullptr) service_->let_go(reader_);
+    service_ = static_cast<ReadService<T>*>(service);  // fits() was asked
+    latest_ = service_ != nullptr ? service_->latest() : nullptr;
+    reader_ = {};
+    status_ = DataStatus::none;
+  }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<ReadPort>(name(), default_);
+  }
+
+ private:
+  Sample<T> read_now() noexcept {
+    Sample<T> sample = find();
+    status_ = sample.status;
+    reader_.time_ns = sample.time_ns;
+    return sample;
+  }
+  // Out of line: the reads of a running component are to cost what they cost without previews.
+  [[gnu::noinline, gnu::cold]] Sample<T> read_ahead() noexcept {
+    auto& other = stand_in<ReadPort>();
+    Sample<T> sample = other.read();
+    other.keep_nothing();
+    return sample;
+  }
+  [[gnu::noinline, gnu::cold]] DataStatus read_ahead(T& value, time_ns_t* time_ns) noexcept {
+    auto& other = stand_in<ReadPort>();
+    const DataStatus status = other.read(value, time_ns);
+    other.keep_nothing();
+    return status;
+  }
+  /// Gives back what the service keeps for a reader: a stand-in is one more than it may be made for.
+  void keep_nothing() noexcept {
+    if (service_ == nullptr) return;
+    const ReaderState known = reader_;
+    service_->let_go(reader_);
+    reader_.seen = known.seen;
+    reader_.time_ns = known.time_ns;
+  }
+  Sample<T> find() noexcept {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      if (latest_ != nullptr) return latest_->sample(default_, reader_);
+    }
+    if (service_ == nullptr || is_closed()) return {.value = default_};
+    return service_->sample(default_, reader_);
+  }
+  DataStatus find(T& value, time_ns_t& time_ns) noexcept {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      if (latest_ != nullptr) return latest_->read(value, time_ns, reader_);
+    }
+    return service_ != nullptr && !is_closed() ? service_->read(value, time_ns, reader_) : DataStatus::none;
+  }
+
+  ReadService<T>* service_{nullptr};
+  LatestRegister<T>* latest_{nullptr};
+  ReaderState reader_;
+  DataStatus status_{DataStatus::none};
+  T default_{};  // kept here, as zero_: large types do not belong on a stack
+};
+
+/// Writes to a resource, stamped with the component's logical clock. Unconnected (optional), it does nothing.
+template <Described T>
+class WritePort final : public PortBase {
+ public:
+  explicit WritePort(std::string name, OutputOptions output = {})
+      : PortBase(std::move(name), PortKind::write, type_name<T>()), output_(output) {}
+
+  /// Lets it go unconnected. [setup]
+  WritePort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
+
+  /// False when the resource had no room. [rt]
+  bool write(const T& value) noexcept {
+    if (service_ == nullptr || is_closed() || is_previewed()) return true;
+    const bool taken = service_->write(value, stamp_ns());
+    // Closed in between: the zeros stay last, whoever wrote first.
+    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    return taken;
+  }
+  void write_zero() noexcept override {
+    if (service_ != nullptr) service_->write(zero_, stamp_ns());
+  }
+  TryWrite try_write_zero() noexcept override {
+    return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
+  }
+  OutputOptions output() const noexcept override { return output_; }
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
+
+  bool write_serialized(std::span<const std::byte> message) override {
+    auto value = std::make_unique<T>();
+    return CdrReader(message).get(*value) && write(*value);
+  }
+
+ protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
+  }
+  void attach(ServiceBase* service) noexcept override { service_ = static_cast<WriteService<T>*>(service); }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<WritePort>(name(), output_);
+  }
+
+ private:
+  WriteService<T>* service_{nullptr};
+  OutputOptions output_;
+  T zero_{};  // kept here: large types do not belong on a small stack
+};
+
+template <typename Signature>
+class CallPort;
+
+/// Calls a service of a resource; the type is the name the service declares. Always required.
+template <typename R, typename... Args>
+class CallPort<R(Args...)> final : public PortBase {
+ public:
+  CallPort(std::string name, std::string type) : PortBase(std::move(name), PortKind::call, std::move(type)) {}
+
+  std::vector<MessageShape> messages() const override { return message_shapes<Args...>(); }
+  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected, which only a port that
+  /// belongs to no component can be.
+  R operator()(Args... args) {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<CallPort>()(std::forward<Args>(args)...);
+    if (service_ == nullptr) throw std::logic_error("call port '" + name() + "' is not connected");
+    const ServiceSpan span(trace_id());
+    return service_->call(std::forward<Args>(args)...);
+  }
+
+ protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const CallService<R(Args...)>*>(&service) != nullptr;
+  }
+  void attach(ServiceBase* service) noexcept override {
+    service_ = static_cast<CallService<R(Args...)>*>(service);
+  }
+  std::unique_ptr<PortBase> make_stand_in() const override {
+    return std::make_unique<CallPort>(name(), type());
+  }
+
+ private:
+  CallService<R(Args...)>* service_{nullptr};
+};
+
+/// Raises an event of a resource. Unconnected (optional), it does nothing.
+class EventPort final : public PortBase {
+ public:
+  explicit EventPort(std::string name) : PortBase(std::move(name), PortKind::event, "") {}
+  /// Lets it go unconnected. [setup]
+  EventPort& optional() noexcept {
+    make_optional();
+    return *this;
+  }
+  /// [rt]
+  void raise() noexcept {
+    if (service_ != nullptr && !is_closed() && !is_previewed()) service_->raise(stamp_ns());
+  }
+
+ protected:
+  bool fits(const ServiceBase& service) const noexcept override {
+    return dynamic_cast<const EventService*>(&service) != nullptr;
+  }
+  void attach(ServiceBase* service) noexcept override { service_ = static_cast<EventService*>(service); }
+  std::unique_ptr<PortBase> make_stand_in() const override { return std::make_unique<EventPort>(name()); }
+
+ private:
+  EventService* service_{nullptr};
+};
+
+}  // namespace mauve

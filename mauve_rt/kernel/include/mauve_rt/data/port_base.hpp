@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What all ports are, whatever they carry: a name, a kind, a type, and one connection that can be exchanged.
+#pragma once
+
+#include <pthread.h>
+
+#include <atomic>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/context.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/data/service.hpp"
+
+namespace mauve {
+
+/// What the kernel does to an output while its component is not running.
+enum class OutputPolicy : std::uint8_t {
+  hold,      // leave the last value
+  set_zero,  // write the type's default value
+};
+
+struct OutputOptions {
+  OutputPolicy on_commit{OutputPolicy::hold};
+  OutputPolicy on_stop{OutputPolicy::set_zero};
+};
+
+/// All that a port needs to be connected, made beforehand; default: no connection.
+struct PortConnection {
+  ServiceBase* service{nullptr};
+  std::string resource;
+  std::uint32_t trace_id{0};  // of "resource.service", for calls
+};
+
+/// Where a port leads to, by name; both empty: nowhere.
+struct ConnectedTo {
+  std::string resource;
+  std::string service;
+};
+
+/// A port seen without its type. Its connection changes only while the component is parked or held.
+/// A port does not know when its service ends: disconnect it before the resource goes.
+///
+/// | member      | written by                     | read by                   | order                                |
+/// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
+/// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
+/// | context_    | [setup]                        | component                 | -                                    |
+/// | optional_   | [setup]                        | any                       | -                                    |
+/// | closed_     | the watchdog; who removes it   | component                 | release/acquire: its zeros stay last |
+/// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
+/// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
+/// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
+/// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
+class PortBase {
+ public:
+  PortBase(std::string name, PortKind kind, std::string type)
+      : name_(std::move(name)), kind_(kind), type_(std::move(type)) {}
+  virtual ~PortBase() = default;
+  PortBase(const PortBase&) = delete;
+  PortBase& operator=(const PortBase&) = delete;
+
+  const std::string& name() const noexcept { return name_; }
+  PortKind kind() const noexcept { return kind_; }
+  const std::string& type() const noexcept { return type_; }
+  /// As ServiceBase::representation(). [rt]
+  virtual std::string_view representation() const noexcept { return "C++"; }
+  /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
+  virtual std::vector<MessageShape> messages() const { return {}; }
+  /// Whether its component is configured only with it connected: call ports always, others unless optional. [rt]
+  bool is_required() const noexcept { return kind_ == PortKind::call || !optional_; }
+  /// Lets it go unconnected; a call port stays required. [setup]
+  void make_optional() noexcept { optional_ = true; }
+  bool is_connected() const noexcept { return connection().service != nullptr; }
+  /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
+  ServiceBase* service() const noexcept { return connection().service; }
+  const std::string& resource_name() const noexcept { return connection().resource; }
+  /// Where it leads to, also while that is being changed. [non-rt]
+  ConnectedTo connected_to() const;
+
+  /// Checks that a service fits, without regard to how many ports it has. [non-rt]
+  /// Throws Error (type_mismatch): kind, type, or the C++ type behind an equal name.
+  void check(const ServiceBase& service) const;
+  /// Checks a service and makes the connection to it, to be swapped in. [non-rt] Throws as check().
+  PortConnection prepare(ServiceBase& service, const std::string& resource_name) const;
+  /// Exchanges the connection for one made by this port's prepare(), or for none. [rt]
+  /// The component is parked or held. What was read is forgotten; the caller frees what it gets.
+  void swap(PortConnection& connection) noexcept;
+
+  /// check, prepare and swap. [non-rt] The component is parked.
+  /// Throws Error: type_mismatch, invalid_argument (the service takes no more ports).
+  void connect(ServiceBase& service, const std::string& resource_name);
+  /// [non-rt] The component is parked.
+  void disconnect() noexcept;
+  void set_context(const Context* context) noexcept { context_ = context; }
+
+  /// Until end_preview() the calling thread has a port of its own in place of this one, connected as told; all others
+  /// have the present one. So the parts that a transaction puts in are configured with the wiring that it makes. What
+  /// that thread writes or raises goes nowhere: until the commit nothing is changed. [non-rt]
+  void preview(const PortConnection& connection);
+  void end_preview() noexcept;
+
+  /// Writes the type's default value; a port that is no write port does nothing. [rt]
+  virtual void write_zero() noexcept {}
+  /// The same without waiting for a lock. [rt]
+  virtual TryWrite try_write_zero() noexcept { return TryWrite::done; }
+  virtual OutputOptions output() const noexcept { return {OutputPolicy::hold, OutputPolicy::hold}; }
+  /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
+  void close() noexcept { closed_.store(kClosed, std::memory_order_release); }
+  void reopen() noexcept {
+    is_safe_ = false;
+    closed_.store(kOpen, std::memory_order_release);
+  }
+  /// Of a closed port: writes what `on_stop` says, once; waits for a lock only where the service cannot do without, and
+  /// the caller allows it. [rt] Whether it is written.
+  bool make_safe(bool may_wait) noexcept;
+  /// Its component is removed while a state of it still uses the port: gives up its place at the service, and swallows
+  /// writes for good. The connection stays until disconnect(). [rt]
+  void leave_behind() noexcept;
+
+  /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
+  virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
+                               time_ns_t& /*time*/) {
+    return false;
+  }
+  /// A write of a serialized message; false when malformed or no write port. [non-rt]
+  virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
+
+ protected:
+  /// Whether a service of equal kind and type name is of the C++ type this port needs.
+  virtual bool fits(const ServiceBase& service) const noexcept = 0;
+  /// Lets go of the old service and takes the new one, which fits, or none. [rt]
+  virtual void attach(ServiceBase* service) noexcept = 0;
+  /// Another port of this type, for a preview; not connected.
+  virtual std::unique_ptr<PortBase> make_stand_in() const = 0;
+  bool is_previewed() const noexcept {
+    // Relaxed: only the thread that stored its own id here finds it, and that one has made the stand-in itself.
+    const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
+    return previewer != kNobody && pthread_equal(previewer, pthread_self()) != 0;
+  }
+  /// The port that the previewing thread has in place of this one.
+  template <typename Port>
+  Port& stand_in() const noexcept {
+    return static_cast<Port&>(*stand_in_);
+  }
+  std::uint32_t trace_id() const noexcept { return connection_.trace_id; }
+  /// Component's logical clock, or the real one outside of any. [rt]
+  time_ns_t stamp_ns() const noexcept {
+    return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
+  }
+  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire) != kOpen; }
+  /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
+  bool keeps_zero() const noexcept { return closed_.load(std::memory_order_acquire) == kClosed; }
+
+ private:
+  static constexpr pthread_t kNobody{};  // as glibc never calls a thread
+
+  const PortConnection& connection() const noexcept {
+    return is_previewed() ? stand_in_->connection_ : connection_;
+  }
+
+  std::string name_;
+  PortKind kind_;
+  std::string type_;
+  mutable PiMutex shown_mutex_;  // a commit may swap while an ordinary thread describes the architecture
+  PortConnection connection_;
+  const Context* context_{nullptr};
+  bool optional_{false};
+  static constexpr std::uint8_t kOpen = 0, kClosed = 1, kLeft = 2;
+  std::atomic<std::uint8_t> closed_{kOpen};
+  bool is_safe_{false};
+  bool is_counted_{true};  // among the ports of its service
+  std::unique_ptr<PortBase> stand_in_;
+  std::atomic<pthread_t> previewer_{kNobody};
+};
+
+}  // namespace mauve

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Resources: data plus the services to reach it.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/data/service.hpp"
+
+namespace mauve {
+
+class ClientBase;
+
+/// Tells one waiting thread that some published resource was written.
+///
+/// | member   | written by                         | order                                                                    |
+/// | -------- | ---------------------------------- | ------------------------------------------------------------------------ |
+/// | word_    | writers                            | seq_cst with waiting_: the writer sees the waiter or the waiter the word |
+/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when nobody woke it, which costs one wake   |
+class Notifier {
+ public:
+  /// Wakes the waiter if one sleeps. [rt]
+  void notify() noexcept;
+  /// Sleeps until notified after `seen` was returned, or until the instant; returns the word to pass next.
+  /// [non-rt]
+  std::uint32_t wait(std::uint32_t seen, time_ns_t until_ns) noexcept;
+  /// [rt]
+  std::uint32_t word() const noexcept { return word_.load(std::memory_order_seq_cst); }
+
+ private:
+  std::atomic<std::uint32_t> word_{0};
+  std::atomic<bool> waiting_{false};
+};
+
+/// Someone told of every write to a resource, e.g. a task that waits for one.
+class EventListener {
+ public:
+  EventListener() = default;
+  virtual ~EventListener() = default;
+  EventListener(const EventListener&) = delete;
+  EventListener& operator=(const EventListener&) = delete;
+
+  /// Called on the writer's thread with the writer's time, the data in place, under the listeners' lock.
+  /// [rt] Short; writes to and listens to no resource.
+  virtual void on_event(time_ns_t time_ns) noexcept = 0;
+};
+
+/// The listeners of one resource; a write without any costs one load.
+///
+/// | member     | written by       | read by | under                                                       |
+/// | ---------- | ---------------- | ------- | ----------------------------------------------------------- |
+/// | listeners_ | ordinary threads | writers | mutex_                                                      |
+/// | count_     | ordinary threads | writers | relaxed: only says whether to look, under the lock, at all  |
+class EventListeners {
+ public:
+  static constexpr std::size_t kCapacity = 8;
+
+  /// Adds one registration; who is added twice is called twice. [non-rt]
+  /// Throws Error (out_of_range) naming the resource when there are kCapacity.
+  void add(EventListener& listener, const std::string& resource);
+  /// Takes one registration away, if there is one; no call to it is under way afterwards. [non-rt]
+  void remove(EventListener& listener) noexcept;
+  /// Gives the registration of one to another: no write goes by in between. [non-rt]
+  void replace(EventListener& listener, EventListener& by) noexcept;
+  /// Calls all. [rt]
+  void call(time_ns_t time_ns) noexcept {
+    if (count_.load(std::memory_order_relaxed) != 0) call_all(time_ns);
+  }
+
+ private:
+  void call_all(time_ns_t time_ns) noexcept;
+
+  PiMutex mutex_;
+  std::array<EventListener*, kCapacity> listeners_{};
+  std::atomic<std::size_t> count_{0};
+};
+
+/// How a resource is bound to a topic.
+enum class TopicBinding : std::uint8_t { none, publish, subscribe };
+
+/// Derive from this to offer services of your own; a service is a member registered by offer().
+class Resource : public Configurable {
+ public:
+  /// `kind` and `type` as the architecture file names them.
+  Resource(std::string kind, std::string type) : kind_(std::move(kind)), type_(std::move(type)) {}
+
+  const std::string& kind() const noexcept { return kind_; }
+  const std::string& type() const noexcept { return type_; }
+  const std::vector<ServiceBase*>& services() const noexcept { return services_; }
+  /// The service of that name, or nullptr.
+  ServiceBase* find_service(std::string_view name) const noexcept;
+  const std::string& name() const noexcept { return name_; }
+  /// Given by the architecture, once. [setup]
+  virtual void set_name(const std::string& name) { name_ = name; }
+  std::string description() const override { return "resource " + name_; }
+
+  /// Whom to tell of writes and calls, for those who carry them outside. [setup]
+  void set_notifier(Notifier* notifier) noexcept { notifier_ = notifier; }
+  /// Whom else to tell of every write that succeeded, until unlisten(), while writers run. [non-rt]
+  /// Throws Error (out_of_range) when there are too many.
+  void listen(EventListener& listener) { listeners_.add(listener, name_); }
+  /// After this the listener is called no more and may end. [non-rt]
+  void unlisten(EventListener& listener) noexcept { listeners_.remove(listener); }
+  /// From now on the other is called in place of a listener. [non-rt]
+  void relisten(EventListener& listener, EventListener& by) noexcept { listeners_.replace(listener, by); }
+  /// Counts who calls write_sample(), e.g. an incoming topic, as one port of each service that writes.
+  /// [setup] Throws Error (invalid_argument) when one takes no more.
+  void bind_input();
+
+  // The serialized face, for topics and for languages other than C++. Ordinary threads.
+
+  /// Whether the three below do anything.
+  virtual bool is_serializable() const noexcept { return false; }
+  /// The next sample not seen yet (`seen` is kept by the caller); a ring's element is removed. [non-rt]
+  virtual bool next_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
+                           std::uint64_t& /*seen*/) {
+    return false;
+  }
+  /// The next sample not handed out by this call yet, of a published one. [non-rt], one thread
+  bool next_published(std::vector<std::byte>& message, time_ns_t& time_ns) {
+    return notifier_ != nullptr && next_sample(message, time_ns, handed_out_);
+  }
+  /// Looks at the newest sample without removing it; false when there is none. [non-rt]
+  virtual bool peek_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
+                           std::uint64_t& /*sequence*/) {
+    return false;
+  }
+  /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
+  /// [non-rt]
+  virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
+  /// Why write_sample() has just refused this message, in words. [non-rt]
+  virtual std::string why_refused(std::span<const std::byte> message) const;
+
+  /// What it is seen from those who carry its calls; nullptr: no client. [rt]
+  virtual ClientBase* client() noexcept { return nullptr; }
+
+ protected:
+  void offer(ServiceBase& service) {
+    service.resource_ = this;
+    services_.push_back(&service);
+  }
+  /// Tells who carries samples and calls out of the architecture. [rt]
+  void notify() noexcept {
+    if (notifier_ != nullptr) notifier_->notify();
+  }
+  /// To be called by services after a write that succeeded, no lock held. [rt]
+  void written(time_ns_t time_ns) noexcept {
+    notify();
+    listeners_.call(time_ns);
+  }
+
+ private:
+  std::string kind_;
+  std::string type_;
+  std::string name_;
+  std::vector<ServiceBase*> services_;
+  Notifier* notifier_{nullptr};
+  std::uint64_t handed_out_{0};  // as `seen`, of next_published()
+  EventListeners listeners_;
+};
+
+/// A resource that holds one newest value: its serialized face is one look at it.
+class NewestResource : public Resource {
+ public:
+  using Resource::Resource;
+  bool is_serializable() const noexcept override { return true; }
+  bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    return serialize(message, time_ns, seen) == DataStatus::new_data;
+  }
+  bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    sequence = 0;
+    return serialize(message, time_ns, sequence) != DataStatus::none;
+  }
+
+ private:
+  /// The value as a message; `seen` as ReaderState::seen. [non-rt]
+  virtual DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) = 0;
+};
+
+}  // namespace mauve

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Services: what resources offer and ports connect to.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/data/message_shape.hpp"
+
+namespace mauve {
+
+enum class CallOutcome : std::uint8_t;  // call_type.hpp
+
+enum class PortKind : std::uint8_t { read = 1, write = 2, call = 3, event = 4 };
+
+/// "read", "write", "call" or "event". [rt]
+std::string_view to_string(PortKind kind) noexcept;
+
+/// What a read found, seen from the port that reads: nothing yet, what it had read before, or something
+/// newer.
+enum class DataStatus : std::uint8_t { none = 0, old_data = 1, new_data = 2 };
+
+/// What came of a write that waits for no lock.
+enum class TryWrite : std::uint8_t {
+  done,
+  busy,       // somebody holds the lock
+  must_wait,  // the service cannot do without waiting
+};
+
+/// A value with its status and its writer's time.
+template <typename T>
+struct Sample {
+  T value{};
+  DataStatus status{DataStatus::none};
+  time_ns_t time_ns{0};
+
+  bool is_new() const noexcept { return status == DataStatus::new_data; }
+  /// Age against a later instant; 0 when nothing was written yet. [rt]
+  time_ns_t age_ns(time_ns_t now_ns) const noexcept {
+    return status == DataStatus::none ? 0 : now_ns - time_ns;
+  }
+};
+
+/// The identity of a type: MAUVE_TYPE's name.
+template <Described T>
+std::string type_name() {
+  return std::string(TypeTraits<T>::name);
+}
+
+/// What a read port remembers between its reads; a new connection starts with a fresh one.
+struct ReaderState {
+  std::uint64_t seen{0};  // sequence number of the last sample read; 0: none yet
+  std::uint32_t held{0};  // what the service keeps for the reader from read to read; 0: nothing
+  time_ns_t time_ns{0};   // writer's time of the last sample read; set by the port
+
+  /// Whether the sample of this number is another one than the last; remembers it. [rt]
+  DataStatus look(std::uint64_t sequence) noexcept {
+    const bool is_new = seen != sequence;
+    seen = sequence;
+    return is_new ? DataStatus::new_data : DataStatus::old_data;
+  }
+};
+
+class Resource;
+template <typename T>
+class LatestRegister;
+
+/// A service seen without its type; ports connect on equal kind, type and C++ type.
+///
+/// | member    | written by                             | read by         | order                          |
+/// | --------- | -------------------------------------- | --------------- | ------------------------------ |
+/// | resource_ | Resource::offer()                      | any             | - [setup]                      |
+/// | ports_    | connecting threads, commits            | ordinary thread | relaxed: they are serialized   |
+class ServiceBase {
+ public:
+  ServiceBase(std::string name, PortKind kind, std::string type)
+      : name_(std::move(name)), kind_(kind), type_(std::move(type)) {}
+  virtual ~ServiceBase() = default;
+  ServiceBase(const ServiceBase&) = delete;
+  ServiceBase& operator=(const ServiceBase&) = delete;
+
+  const std::string& name() const noexcept { return name_; }
+  PortKind kind() const noexcept { return kind_; }
+  const std::string& type() const noexcept { return type_; }
+  /// How it holds values of the type: "C++", or what another language does. [rt]
+  virtual std::string_view representation() const noexcept { return "C++"; }
+  /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
+  virtual std::vector<MessageShape> messages() const { return {}; }
+  /// The resource that offers it, or nullptr. [rt]
+  Resource* resource() const noexcept { return resource_; }
+
+  /// Whether the next does anything: a call whose type is a ROS service's. [rt]
+  virtual bool is_call_serializable() const noexcept { return false; }
+  /// A call by serialized messages; the reply is written when it was answered. [non-rt]
+  virtual CallOutcome call_serialized(std::span<const std::byte> request, std::vector<std::byte>& reply);
+
+  /// How many ports may be connected at once; 0: any number. [rt]
+  virtual std::uint32_t max_ports() const noexcept { return 0; }
+  /// How many are connected. [rt]
+  std::uint32_t ports() const noexcept { return ports_.load(std::memory_order_relaxed); }
+  /// Refuses more ports than max_ports(). [non-rt] Throws Error (invalid_argument).
+  void check_ports(std::uint32_t wanted) const;
+  /// A port came or went; kept by PortBase and Resource. [rt]
+  void add_port() noexcept { ports_.fetch_add(1, std::memory_order_relaxed); }
+  void remove_port() noexcept { ports_.fetch_sub(1, std::memory_order_relaxed); }
+
+ private:
+  friend class Resource;
+
+  std::string name_;
+  PortKind kind_;
+  std::string type_;
+  Resource* resource_{nullptr};
+  std::atomic<std::uint32_t> ports_{0};
+};
+
+template <Described T>
+class ReadService : public ServiceBase {
+ public:
+  explicit ReadService(std::string name) : ServiceBase(std::move(name), PortKind::read, type_name<T>()) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
+  /// Copies what is there; leaves value and time alone when there is nothing. [rt]
+  virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept = 0;
+  /// The same by value, `fallback` when there is nothing; override it where that saves a copy. [rt]
+  virtual Sample<T> sample(const T& fallback, ReaderState& reader) noexcept {
+    Sample<T> found{.value = fallback};
+    found.status = read(found.value, found.time_ns, reader);
+    return found;
+  }
+  /// The register a port may read by itself, at a third of a call's price; nullptr: there is none. [rt]
+  virtual LatestRegister<T>* latest() noexcept { return nullptr; }
+  /// Gives back what is held for a reader that goes; the state is fresh afterwards. [rt]
+  virtual void let_go(ReaderState& reader) noexcept { reader = {}; }
+};
+
+template <Described T>
+class WriteService : public ServiceBase {
+ public:
+  explicit WriteService(std::string name) : ServiceBase(std::move(name), PortKind::write, type_name<T>()) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
+  /// Takes a copy; false when there was no room. [rt]
+  virtual bool write(const T& value, time_ns_t time_ns) noexcept = 0;
+  /// The same without waiting for a lock; for the outputs of a component that hangs. [rt]
+  virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept {
+    return TryWrite::must_wait;
+  }
+};
+
+template <typename Signature>
+class CallService;
+
+/// A call of the resource's own; its type is a name given by who declares it, e.g.
+/// "mauve_examples/MapVisitor".
+template <typename R, typename... Args>
+class CallService<R(Args...)> : public ServiceBase {
+ public:
+  CallService(std::string name, std::string type)
+      : ServiceBase(std::move(name), PortKind::call, std::move(type)) {}
+  std::vector<MessageShape> messages() const override { return message_shapes<Args...>(); }
+  /// [rt] as far as the resource says so.
+  virtual R call(Args... args) = 0;
+};
+
+class EventService : public ServiceBase {
+ public:
+  explicit EventService(std::string name) : ServiceBase(std::move(name), PortKind::event, "") {}
+  /// Says that something happened at that time. [rt]
+  virtual void raise(time_ns_t time_ns) noexcept = 0;
+};
+
+}  // namespace mauve

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// SharedData: the newest value, guarded by a priority-inheritance mutex.
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/resource.hpp"
+
+namespace mauve {
+
+/// One value; services `read` and `write`, any number of each.
+///
+/// | member                      | written by     | under  | hot |
+/// |-----------------------------|----------------|--------|-----|
+/// | value_, time_ns_, sequence_ | write service  | mutex_ | yes |
+template <Described T>
+class SharedData final : public NewestResource {
+ public:
+  SharedData() : NewestResource("shared_data", type_name<T>()) {
+    offer(read);
+    offer(write);
+  }
+
+  void set_name(const std::string& name) override {
+    Resource::set_name(name);
+    mutex_.set_trace_id(TraceNames::intern(name));
+  }
+  bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
+    auto value = std::make_unique<T>();
+    return CdrReader(message).get(*value) && write.write(*value, time_ns);
+  }
+
+ private:
+  class Read final : public ReadService<T> {
+   public:
+    explicit Read(SharedData& owner) : ReadService<T>("read"), owner_(owner) {}
+    DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      if (owner_.sequence_ == 0) return DataStatus::none;
+      value = owner_.value_;
+      time_ns = owner_.time_ns_;
+      return reader.look(owner_.sequence_);
+    }
+    Sample<T> sample(const T& fallback, ReaderState& reader) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      if (owner_.sequence_ == 0) return {.value = fallback};
+      return {.value = owner_.value_, .status = reader.look(owner_.sequence_), .time_ns = owner_.time_ns_};
+    }
+
+   private:
+    SharedData& owner_;
+  };
+  class Write final : public WriteService<T> {
+   public:
+    explicit Write(SharedData& owner) : WriteService<T>("write"), owner_(owner) {}
+    bool write(const T& value, time_ns_t time_ns) noexcept override {
+      {
+        const std::lock_guard lock(owner_.mutex_);
+        owner_.put(value, time_ns);
+      }
+      owner_.written(time_ns);
+      return true;
+    }
+    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+      {
+        const std::unique_lock lock(owner_.mutex_, std::try_to_lock);
+        if (!lock.owns_lock()) return TryWrite::busy;
+        owner_.put(value, time_ns);
+      }
+      owner_.written(time_ns);
+      return TryWrite::done;
+    }
+
+   private:
+    SharedData& owner_;
+  };
+
+  DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    auto value = std::make_unique<T>();
+    ReaderState reader{.seen = seen};
+    const DataStatus status = read.read(*value, time_ns, reader);
+    seen = reader.seen;
+    CdrWriter(message).put(*value);
+    return status;
+  }
+
+  void put(const T& value, time_ns_t time_ns) noexcept {
+    value_ = value;
+    time_ns_ = time_ns;
+    ++sequence_;
+  }
+
+  PiMutex mutex_;
+  T value_{};
+  time_ns_t time_ns_{0};
+  std::uint64_t sequence_{0};
+
+ public:
+  Read read{*this};
+  Write write{*this};
+};
+
+}  // namespace mauve

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Deployer: maps components to threads, starts them on one epoch, and changes them while they run.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+
+#include "mauve_rt/deploy/host.hpp"
+
+namespace mauve {
+
+struct DeployerOptions {
+  bool require_realtime{false};  // refuse to deploy without every right
+  bool trace{true};
+};
+
+/// The host of threads: one for each component. Ordinary threads.
+///
+/// | member     | written by           | read by                | under            |
+/// | ---------- | -------------------- | ---------------------- | ---------------- |
+/// | conductor_ | deploy(), shutdown() | changes, at the commit | conductor_mutex_ |
+/// | the rest   | deploy(), shutdown() | the same               | life_mutex_      |
+class Deployer final : public Host {
+ public:
+  explicit Deployer(Architecture& architecture, DeployerOptions options = {});
+  /// Shuts down, and waits for a change that is being prepared.
+  ~Deployer() override;
+
+  /// Asks for the real-time rights; deploy() does it if it was not done. [setup]
+  void prepare_process() override;
+  /// Creates the threads, meets them at a barrier, publishes epoch = now + 20 ms,
+  /// starts all. [setup] Throws Error as Host::deploy(); no thread is left then.
+  void deploy() override;
+  /// Also ends the threads: those that execute a state for half a second more are left behind. [non-rt]
+  void shutdown() noexcept override;
+
+  const RealtimeStatus& realtime_status() const noexcept override { return process_.status(); }
+  const Clock& clock() const noexcept override { return MonotonicClock::instance(); }
+  bool is_simulated() const noexcept override { return false; }
+
+  void attach(Task& task) override;
+  bool detach(Task& task) noexcept override;
+  std::shared_ptr<Conductor> conductor() noexcept override;
+  /// What watches the components' executions while it is deployed; nullptr otherwise. [setup]
+  const Watchdog* watchdog() const noexcept { return watchdog_.get(); }
+
+ private:
+  class Barrier;
+
+  void create_threads();
+
+  DeployerOptions options_;
+  RealtimeProcess process_;
+  std::mutex life_mutex_;
+  std::mutex conductor_mutex_;
+  std::shared_ptr<Conductor> conductor_;
+  std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
+  std::shared_ptr<Watchdog> watchdog_;
+};
+
+}  // namespace mauve

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Host: what runs an architecture, on threads or in virtual time, and the way to command and change it there.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/realtime.hpp"
+#include "mauve_rt/change/transaction_commit.hpp"
+
+namespace mauve {
+
+class Conductor;
+
+/// Runs one architecture, which has at most one host at a time. Ordinary threads.
+///
+/// | member    | written by           | read by | under                                                  |
+/// | --------- | -------------------- | ------- | ------------------------------------------------------ |
+/// | deployed_ | deploy(), shutdown() | anyone  | seq_cst: a commit that shutdown() does not see, sees it |
+/// | in_use_   | changes              | the end | -                                                      |
+///
+/// start(), stop(), shutdown() and what only looks take no part in changes: a long preparation keeps nobody from them.
+class Host {
+ public:
+  explicit Host(Architecture& architecture) : architecture_(architecture) {}
+  virtual ~Host() = default;
+  Host(const Host&) = delete;
+  Host& operator=(const Host&) = delete;
+
+  Architecture& architecture() const noexcept { return architecture_; }
+
+  /// Asks for what the host needs of the process; deploy() does it if it was not done. [setup]
+  virtual void prepare_process() = 0;
+  /// Gives all components one epoch and starts them; waits for a change under way. [setup]
+  /// Throws Error: not_configured; already_running (deployed, or another host runs the architecture); realtime_denied.
+  virtual void deploy() = 0;
+  /// Stops every component (outputs written) and lets the architecture go. Waits for nobody's preparation: a commit
+  /// under way is called off, and a change that comes to its commit later finds the host shut down. [non-rt]
+  virtual void shutdown() noexcept = 0;
+
+  void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
+  void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
+  time_ns_t get_time(const std::string& component) const;
+
+  /// Carries out a transaction, deployed or not; one at a time. [non-rt]
+  /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
+  TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
+  /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
+  std::unique_ptr<TransactionCommit> make(Transaction transaction, const TransactionOptions& options = {});
+  /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
+  StepReport replace_core(const std::string& component, const std::string& core,
+                          const CommitTimeouts& timeouts = {});
+  StepReport set_property(const std::string& component, const std::string& name, const PropertyValue& value,
+                          const CommitTimeouts& timeouts = {});
+
+  bool is_deployed() const noexcept { return deployed_.load(std::memory_order_seq_cst); }
+  /// The instant that all grids are counted from; 0 before deployment.
+  time_ns_t epoch_ns() const noexcept { return architecture_.deployment_epoch_ns(); }
+  /// Now, as the components see it.
+  time_ns_t now_ns() const noexcept { return clock().now_ns(); }
+  virtual const RealtimeStatus& realtime_status() const noexcept = 0;
+  ArchitectureDescription describe() const { return architecture_.describe(); }
+
+  /// Empties every ring. [non-rt], one thread at a time.
+  TraceDrain drain_trace();
+  /// Names by the numbers that trace records carry; those of removed components stay. [non-rt]
+  std::vector<std::string> trace_components() const { return architecture_.trace_components(); }
+  /// Words by the numbers that trace records carry. [non-rt]
+  static std::vector<std::string> trace_names() { return TraceNames::all(); }
+  /// Waits until a component changed its state or core after `seen`; returns the word to pass next. [non-rt]
+  std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
+
+  virtual const Clock& clock() const noexcept = 0;
+  /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
+  virtual bool is_simulated() const noexcept = 0;
+
+  // ---- for transactions
+
+  /// Gives a parked task what it runs on. [non-rt] Throws Error.
+  virtual void attach(Task& task) = 0;
+  /// The reverse; false when its thread would not end in time. [non-rt]
+  virtual bool detach(Task& task) noexcept = 0;
+  /// Who conducts commits of running components; nullptr: nobody, or nobody any more. [non-rt]
+  virtual std::shared_ptr<Conductor> conductor() noexcept = 0;
+  /// Held while a change uses the host. [non-rt], the architecture's change lock held.
+  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
+
+ protected:
+  /// Throws Error: not_configured; already_running when it is deployed. [setup]
+  void require_deployable() const;
+  void require_deployed() const;
+  /// All grids count from the instant, and every component that is stopped starts on it. [setup]
+  void start_all(time_ns_t epoch_ns);
+  /// Stops all, the last one first; who does not come to rest soon keeps none of the others running. [non-rt]
+  void stop_all(time_ns_t until_ns) noexcept;
+  /// From here on nobody starts anything, and no change of a running architecture is made.
+  void set_deployed(bool deployed) noexcept { deployed_.store(deployed, std::memory_order_seq_cst); }
+  /// Waits for a change that uses the host; after shutdown(), at the host's end. [non-rt]
+  void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
+
+ private:
+  void require_own() const;
+
+  Architecture& architecture_;
+  std::atomic<bool> deployed_{false};
+  std::mutex in_use_;
+};
+
+}  // namespace mauve

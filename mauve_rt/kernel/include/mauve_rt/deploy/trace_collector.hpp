@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Empties the rings of an architecture's trace often, for somebody who takes what came less often.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "mauve_rt/architecture/architecture.hpp"
+
+namespace mauve {
+
+/// A thread of its own: SCHED_FIFO 1, after all components, where the system grants that, so that neither a busy
+/// machine nor a disk nor an interpreter keeps it from its work for as long as a ring has room.
+///
+/// | member     | written by            | under                               |
+/// | ---------- | --------------------- | ----------------------------------- |
+/// | collected_ | the thread, take()    | mutex_                              |
+/// | ending_    | the destructor        | mutex_                              |
+/// | the rest   | the constructor       | -                                   |
+class TraceCollector {
+ public:
+  /// When so many records wait to be taken the rings are left alone, which count what they lose: 64 MiB.
+  static constexpr std::size_t kMostRecords = (64UL << 20U) / sizeof(TraceRecord);
+
+  /// Starts the thread. [non-rt]
+  TraceCollector(Architecture& architecture, time_ns_t period_ns);
+  /// Ends the thread; what was not taken is gone. [non-rt]
+  ~TraceCollector();
+  TraceCollector(const TraceCollector&) = delete;
+  TraceCollector& operator=(const TraceCollector&) = delete;
+
+  /// Everything up to now. [non-rt]
+  TraceDrain take();
+
+ private:
+  void run();
+  void collect();
+
+  Architecture& architecture_;
+  time_ns_t period_ns_;
+  std::mutex mutex_;
+  std::condition_variable end_;
+  bool ending_{false};
+  std::vector<TraceRecord> collected_;
+  std::thread thread_;  // last: it uses all others
+};
+
+}  // namespace mauve

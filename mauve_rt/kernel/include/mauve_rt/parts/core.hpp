@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Core: a component's data and algorithms, replaceable while the component runs.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/context.hpp"
+#include "mauve_rt/parts/shell.hpp"
+
+namespace mauve {
+
+/// A core seen without its shell's type.
+class CoreBase : public Configurable {
+ public:
+  /// Binds the core to a shell; false when the shell is not of the type the core was written for. [setup]
+  virtual bool bind_shell(Shell& shell) noexcept = 0;
+  /// Whether bind_shell would succeed; changes nothing. [non-rt]
+  virtual bool accepts(const Shell& /*shell*/) const noexcept { return false; }
+
+  /// Checks that the old core's state can be carried over; nothing is changed yet. [rt]
+  /// Runs on the component's thread, inside its wait; while that is stopped on the requester's, who waits for its end
+  /// however long it lasts, and so does a start of this component; nobody else does. Returning false or throwing refuses the replacement.
+  virtual bool adopt(const CoreBase& /*old*/) { return true; }
+  /// Moves the old core's state over; cannot fail. [rt]
+  virtual void take(CoreBase& /*old*/) noexcept {}
+  /// The time adopt and take need together, held against them: an adopt that takes longer refuses the change, after a
+  /// longer take the component is FAULTED. A commit with less left before a release waits for the one after.
+  /// 0: none declared.
+  virtual time_ns_t budget_ns() const noexcept { return 0; }
+  /// What is reckoned with where none is declared.
+  virtual time_ns_t reckoned_budget_ns() const noexcept { return us_to_ns(200); }
+
+  virtual void set_context(const Context* context) noexcept { context_ = context; }
+  void set_implementation(std::string name) { implementation_ = std::move(name); }
+  /// package/Class
+  const std::string& implementation() const noexcept { return implementation_; }
+  std::string description() const override { return "core " + implementation_; }
+
+ protected:
+  /// The component's logical clock: the nominal instant it acts at. [rt]
+  time_ns_t clock_ns() const noexcept {
+    return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
+  }
+  /// The component's period g. [rt]
+  time_ns_t period_ns() const noexcept {
+    return context_ != nullptr ? context_->period_ns.load(std::memory_order_relaxed) : 0;
+  }
+
+ private:
+  const Context* context_{nullptr};
+  std::string implementation_;
+};
+
+/// Derive from this with the shell the core was written for (Listing 2 of the paper).
+template <typename ShellType>
+class Core : public CoreBase {
+ public:
+  using shell_type = ShellType;
+
+  bool bind_shell(Shell& shell) noexcept override {
+    shell_ = dynamic_cast<ShellType*>(&shell);
+    return shell_ != nullptr;
+  }
+  bool accepts(const Shell& shell) const noexcept override {
+    return dynamic_cast<const ShellType*>(&shell) != nullptr;
+  }
+
+ protected:
+  ShellType& shell() const noexcept { return *shell_; }
+
+ private:
+  ShellType* shell_{nullptr};
+};
+
+/// A core whose methods are found by name, e.g. one written in Python. It serves any fsm whose method names
+/// it has.
+class DynamicCore : public CoreBase {
+ public:
+  /// The number of a method, or -1 when the core has none of that name. [non-rt]
+  virtual int find_method(std::string_view name) const = 0;
+  /// Runs an action; may throw.
+  virtual void run(int method) = 0;
+  /// Evaluates a guard; may throw.
+  virtual bool test(int method) = 0;
+};
+
+}  // namespace mauve

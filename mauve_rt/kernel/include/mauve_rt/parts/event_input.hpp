@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// EventInput: where an event wait learns that its port's resource was written.
+#pragma once
+
+#include <atomic>
+#include <optional>
+
+#include "mauve_rt/data/port.hpp"
+#include "mauve_rt/data/resource.hpp"
+
+namespace mauve {
+
+class Task;
+
+/// Keeps the time of the first event not consumed yet, and wakes the task.
+///
+/// | member    | written by                        | read by | order                                          |
+/// | --------- | --------------------------------- | ------- | ---------------------------------------------- |
+/// | time_     | writers, if empty; task empties   | task    | acq_rel: what was written before is visible    |
+/// | task_     | ordinary threads, the same again  | writers | relaxed: listening publishes it first          |
+/// | resource_ | ordinary threads, one at a time   | -       | -                                              |
+class EventInput final : public EventListener {
+ public:
+  explicit EventInput(PortBase& port) : port_(&port) {}
+  ~EventInput() override;
+
+  void on_event(time_ns_t time_ns) noexcept override;
+  /// The time of the first event since the last call. [rt], the task's thread
+  std::optional<time_ns_t> consume() noexcept;
+
+  const PortBase& port() const noexcept { return *port_; }
+  /// The task that it wakes; before it listens, and no other later. [non-rt]
+  void set_task(Task& task) noexcept { task_.store(&task, std::memory_order_relaxed); }
+  /// Listens to the resource that the port is connected to now, and to no other. [non-rt]
+  void listen();
+  /// Listens to nothing from now on. [non-rt]
+  void stop_listening() noexcept;
+  /// The same for a resource where a stand-in listens so far. [non-rt]
+  void listen_for(EventListener& stand_in, Resource& resource) noexcept;
+
+ private:
+  static constexpr time_ns_t kNone = INT64_MIN;
+
+  PortBase* port_;
+  std::atomic<Task*> task_{nullptr};
+  Resource* resource_{nullptr};
+  std::atomic<time_ns_t> time_{kNone};
+};
+
+}  // namespace mauve

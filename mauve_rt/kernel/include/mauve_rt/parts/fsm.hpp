@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Clock-based state machines: execution states that run a core's methods, wait states that advance the clock.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/statistics.hpp"
+#include "mauve_rt/parts/core.hpp"
+#include "mauve_rt/parts/event_input.hpp"
+
+namespace mauve {
+
+/// A core as one fsm sees it: resolved before the core is put in, so that putting it in is a pointer swap.
+struct CoreBinding {
+  void* object{nullptr};          // of the fsm's core type, when it is a C++ core
+  DynamicCore* dynamic{nullptr};  // otherwise
+  std::vector<int> method_slots;  // of dynamic, by method number
+  const CoreBase* core{nullptr};  // the same, given by the component
+
+  /// Whether the fsm can run the core. [rt]
+  bool is_bound() const noexcept { return object != nullptr || dynamic != nullptr; }
+  /// Whether the core is configured too: a component may start with it. [non-rt]
+  bool is_ready() const noexcept { return is_bound() && core != nullptr && core->is_configured(); }
+};
+
+/// A method of the core, by name and by pointer, whichever the core at hand needs.
+class Method {
+ public:
+  template <typename C, typename R>
+  static Method action(std::string name, int number, R (C::*method)()) {
+    return Method(std::move(name), number, method, [](const Storage& storage, void* object) -> bool {
+      (static_cast<C*>(object)->*std::bit_cast<R (C::*)()>(storage))();
+      return true;
+    });
+  }
+  template <typename C, typename Pointer>
+  static Method guard(std::string name, int number, Pointer method) {
+    return Method(std::move(name), number, method, [](const Storage& storage, void* object) -> bool {
+      return (static_cast<C*>(object)->*std::bit_cast<Pointer>(storage))();
+    });
+  }
+
+  const std::string& name() const noexcept { return name_; }
+  /// Runs the action on whichever core is bound. [rt] as far as the core is.
+  void run(const CoreBinding& core) const {
+    if (core.dynamic != nullptr) {
+      core.dynamic->run(core.method_slots[number_]);
+    } else {
+      call_(storage_, core.object);
+    }
+  }
+  /// Evaluates the guard. [rt] as far as the core is.
+  bool test(const CoreBinding& core) const {
+    return core.dynamic != nullptr ? core.dynamic->test(core.method_slots[number_])
+                                   : call_(storage_, core.object);
+  }
+
+ private:
+  using Storage = std::array<std::byte, 2 * sizeof(void*)>;
+  using Call = bool (*)(const Storage&, void*);
+
+  template <typename Pointer>
+  Method(std::string name, int number, Pointer method, Call call)
+      : name_(std::move(name)),
+        number_(static_cast<std::size_t>(number)),
+        storage_(std::bit_cast<Storage>(method)),
+        call_(call) {}
+
+  std::string name_;
+  std::size_t number_;
+  Storage storage_;
+  Call call_;
+};
+
+struct State;
+
+/// How long an execution state of a machine took.
+struct StateTime {
+  std::string state;
+  ExecutionTime time{};
+};
+using StateTimes = std::deque<StateTime>;  // elements stay where they are
+
+struct Transition {
+  std::size_t guard;  // index of the fsm's methods
+  State* to;
+};
+
+/// A node of the machine. Filled by Fsm during configure, constant afterwards but for what it counts.
+struct State {
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  std::string name;
+  std::size_t index{0};  // in the order of declaration
+  bool is_wait{false};
+  time_ns_t duration_ns{0};              // of a wait; of an event wait its timeout; kForever: it has none
+  std::unique_ptr<EventInput> event;     // of an event wait
+  time_ns_t min_interarrival_ns{0};      // of an event wait: the least time from one release to the next
+  std::size_t action{kNone};             // of an execution state
+  time_ns_t max_execution_ns{0};         // declared bound of an execution state; 0: none
+  time_ns_t simulated_execution_ns{-1};  // what it takes in virtual time; < 0: as long as its bound allows
+  std::vector<Transition> transitions;   // the first whose guard holds is taken; of a wait, when it has ended
+  State* next{nullptr};                  // otherwise this one
+  std::uint32_t trace_id{0};
+  ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
+
+  /// How much of virtual time it takes. [rt]
+  time_ns_t simulated_ns() const noexcept {
+    return simulated_execution_ns < 0 ? max_execution_ns : simulated_execution_ns;
+  }
+};
+
+/// An fsm seen without its types.
+class FsmBase : public Configurable {
+ public:
+  /// Binds to a shell; false when it is not of the fsm's type. [setup]
+  virtual bool bind_shell(Shell& shell) noexcept = 0;
+  /// Resolves a core against this machine. [non-rt] Throws Error (type_mismatch) when it does not suit.
+  virtual CoreBinding bind_core(CoreBase& core) const = 0;
+
+  const State& initial() const noexcept { return *initial_; }
+  const std::vector<std::unique_ptr<State>>& states() const noexcept { return states_; }
+  const std::vector<Method>& methods() const noexcept { return methods_; }
+  /// The execution states' times; who holds them may read them when the machine is gone. [non-rt]
+  std::shared_ptr<const StateTimes> times() const noexcept { return times_; }
+  /// g: the greatest common divisor of the lengths of all cycles; 0 when sporadic. Valid once configured. [rt]
+  time_ns_t period_ns() const noexcept { return period_ns_; }
+  /// Whether it waits for events: phase and missed releases do not apply to it then. Valid once configured. [rt]
+  bool is_sporadic() const noexcept { return sporadic_; }
+  /// The smallest max_execution of all states; 0: none declares one. Valid once configured. [rt]
+  time_ns_t smallest_bound_ns() const noexcept { return smallest_bound_ns_; }
+
+  void set_implementation(std::string name) { implementation_ = std::move(name); }
+  const std::string& implementation() const noexcept { return implementation_; }
+  std::string description() const override { return "fsm " + implementation_; }
+
+ protected:
+  /// Declare states and transitions here; shell properties are set by then. [setup]
+  virtual void define() = 0;
+
+  /// A state that advances the clock by > 0 ns and sleeps until then. kForever: until the component is stopped; such a
+  /// state leads nowhere, and needs no next(). [setup]
+  State& wait(std::string name, time_ns_t duration_ns);
+  /// Waits for a write to the resource that a read port is connected to. The clock goes on to the event's time, but
+  /// by min_interarrival at least; or by the timeout when no event comes (kForever: an event alone ends it). Both > 0 ns.
+  /// [setup]
+  State& wait_event(std::string name, PortBase& port, time_ns_t timeout_ns, time_ns_t min_interarrival_ns);
+  void set_initial(State& state) noexcept { initial_ = &state; }
+  /// Where a state goes when no transition's guard holds. Every state needs one.
+  void next(State& from, State& to) noexcept { from.next = &to; }
+  State& add_state(std::string name);
+  State& add_execution(std::string name);
+  std::size_t add_method(Method method);
+  /// Makes g a divisor of this too, for machines that declare a period of their own. In define(). [setup]
+  void declare_divisor(time_ns_t divisor_ns) noexcept { divisor_ns_ = divisor_ns; }
+  int method_count() const noexcept { return static_cast<int>(methods_.size()); }
+  CoreBinding bind_dynamic(DynamicCore& core) const;
+
+  bool configure_hook() override;
+  void cleanup_hook() override;
+
+ private:
+  std::vector<std::unique_ptr<State>> states_;
+  std::vector<Method> methods_;
+  std::shared_ptr<StateTimes> times_{std::make_shared<StateTimes>()};
+  State* initial_{nullptr};
+  time_ns_t period_ns_{0};
+  bool sporadic_{false};
+  time_ns_t smallest_bound_ns_{0};
+  time_ns_t divisor_ns_{0};  // 0: none
+  std::string implementation_;
+};
+
+/// Derive from this with the shell and core types, and declare the machine in define().
+template <typename ShellType, typename CoreType>
+class Fsm : public FsmBase {
+ public:
+  using shell_type = ShellType;
+  using core_type = CoreType;
+
+  bool bind_shell(Shell& shell) noexcept override {
+    shell_ = dynamic_cast<ShellType*>(&shell);
+    return shell_ != nullptr;
+  }
+  CoreBinding bind_core(CoreBase& core) const override {
+    if (auto* typed = dynamic_cast<CoreType*>(&core))
+      return {.object = typed, .dynamic = nullptr, .method_slots = {}};
+    if (auto* dynamic = dynamic_cast<DynamicCore*>(&core)) return bind_dynamic(*dynamic);
+    return {};
+  }
+
+ protected:
+  ShellType& shell() const noexcept { return *shell_; }
+
+  /// A state that runs a method of the core; the method's name serves cores that are not C++.
+  State& execution(std::string name, std::string method_name, void (CoreType::*method)(),
+                   time_ns_t max_execution_ns = 0) {
+    State& state = add_execution(std::move(name));
+    state.action = add_method(Method::action(std::move(method_name), method_count(), method));
+    state.max_execution_ns = max_execution_ns;
+    return state;
+  }
+  /// Goes to `to` when the guard holds after the state, of a wait state when the wait has ended; guards are asked on the
+  /// component's thread, in the order of declaration.
+  void transition(State& from, std::string guard_name, bool (CoreType::*guard)(), State& to) {
+    from.transitions.push_back(
+        {add_method(Method::guard<CoreType>(std::move(guard_name), method_count(), guard)), &to});
+  }
+  void transition(State& from, std::string guard_name, bool (CoreType::*guard)() const, State& to) {
+    from.transitions.push_back(
+        {add_method(Method::guard<CoreType>(std::move(guard_name), method_count(), guard)), &to});
+  }
+
+ private:
+  ShellType* shell_{nullptr};
+};
+
+/// The greatest common divisor of the cycle lengths of what is reachable from a state.
+/// One depth-first search gives the strongly connected components (Tarjan 1972) and the potentials; every
+/// edge inside a component then contributes |potential(u) + length(u) - potential(v)|. Throws Error:
+/// loop_without_wait naming the loop.
+time_ns_t cycle_gcd_ns(const State& initial);
+
+}  // namespace mauve

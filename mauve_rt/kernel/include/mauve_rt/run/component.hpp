@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Component: a shell, a core and an fsm, run by a task; each can be replaced while it runs.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/architecture/change_lock.hpp"
+#include "mauve_rt/run/task.hpp"
+
+namespace mauve {
+
+/// In place of a figure that was not measured; as mauve_msgs/msg/StepReport.NOT_MEASURED.
+inline constexpr std::int64_t kNotMeasured = -INT64_MAX;
+
+/// What one step of a reconfiguration cost; fields as mauve_msgs/msg/StepReport.
+struct StepReport {
+  std::string step;
+  std::string component;
+  std::string from_core;
+  std::string to_core;
+  time_ns_t prepare_ns{0};
+  time_ns_t blackout_ns{0};
+  std::int64_t missed_releases{0};
+  time_ns_t phase_nominal_ns{0};
+  time_ns_t phase_actual_ns{kNotMeasured};
+  std::string remark{};   // why releases were missed; empty when none was
+  time_ns_t shift_ns{0};  // by which a new epoch made its instants later
+};
+
+struct CommitTimeouts {
+  time_ns_t commit_ns{s_to_ns(1)};  // for the component to reach a wait
+  time_ns_t phase_ns{s_to_ns(1)};   // for the release that follows, to measure its phase; 0: do not wait
+};
+
+/// The parts of a component; in a change a null pointer says that the part stays.
+struct Parts {
+  std::unique_ptr<Shell> shell{};
+  std::unique_ptr<CoreBase> core{};
+  std::unique_ptr<FsmBase> fsm{};
+};
+
+class Architecture;
+class Component;
+
+/// New parts for a component: made ready while the old ones run, put in by a commit, the old ones retired after.
+class PartsChange final : public CommitAction {
+ public:
+  /// A new shell takes the property values of the old one where name, type and range fit. With a new shell and no new
+  /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
+  /// `make_fsm` makes another instance of a new fsm.
+  PartsChange(Component& component, Parts fresh, std::function<std::unique_ptr<FsmBase>()> make_fsm = {});
+  ~PartsChange() override;
+
+  /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]
+  Shell& shell() noexcept;
+  /// The fsm that will be in force. [non-rt], before the commit
+  const FsmBase& fsm() const noexcept;
+  /// Binds and configures the new parts. [non-rt] Throws Error; nothing but the new parts is touched.
+  void prepare();
+  /// Whether the component starts anew in its initial state: a new shell or fsm. [rt]
+  bool restarts() const noexcept { return restarts_; }
+  /// Cleans up what is out: the old parts once they were taken, else the new ones. [non-rt]
+  void retire() noexcept;
+  /// The new core takes nothing over from the old one: that has failed. [setup]
+  void start_afresh() noexcept { afresh_ = true; }
+  /// The new core is put in as it is, neither bound nor configured: Listing 3 of the paper. [setup]
+  void leave_unready() noexcept { unready_ = true; }
+  /// And it is the fallback. [setup]
+  void be_fallback() noexcept { afresh_ = is_fallback_ = true; }
+
+  /// The core that is not in force now. [setup]
+  CoreBase* core() noexcept { return parts_.core.get(); }
+  /// Gives away the core that is not in force now. [non-rt]
+  std::unique_ptr<CoreBase> give_back_core() noexcept { return std::move(parts_.core); }
+  bool was_taken() const noexcept { return taken_; }
+
+  bool adopt() override;
+  void take() noexcept override;
+  time_ns_t budget_ns() const noexcept override;
+  time_ns_t declared_ns() const noexcept override;
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  void prepare_parts();
+
+  Component& component_;
+  Parts parts_;  // the new ones; after take the old ones
+  std::function<std::unique_ptr<FsmBase>()> make_fsm_;
+  CoreBinding binding_;
+  time_ns_t period_ns_{0};
+  bool restarts_;
+  const CoreBase* kept_core_{nullptr};  // the one that the binding was made for, when it stays
+  std::uint32_t core_name_{0};
+  bool afresh_{false};
+  bool unready_{false};
+  bool is_fallback_{false};
+  bool taken_{false};
+  std::uint32_t trace_id_;
+  std::string what_{};  // the part being prepared
+};
+
+/// Sets a property in a commit. The value is swapped with the old one, so that nothing is freed there.
+class PropertyChange final : public CommitAction {
+ public:
+  /// `value` as PropertyBase::checked returned it.
+  PropertyChange(PropertyBase& property, PropertyValue value);
+  void take() noexcept override { property_.swap(value_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  PropertyBase& property_;
+  PropertyValue value_;
+  std::uint32_t trace_id_;
+};
+
+/// What a component looks like, for those who must not touch its parts.
+struct ShownPort {
+  std::string name;
+  PortKind kind;
+  std::string type;
+  std::string resource;  // empty: not connected
+  std::string service;
+  bool operator==(const ShownPort&) const = default;
+};
+struct ShownProperty {
+  std::string name;
+  PropertyValue value;
+  PropertyOptions options;
+  bool operator==(const ShownProperty&) const = default;
+};
+struct ShownParts {
+  std::string shell;
+  std::string core;
+  std::string fsm;
+  std::vector<ShownPort> ports;
+  std::vector<ShownProperty> properties;
+  bool operator==(const ShownParts&) const = default;
+};
+
+/// One component of an architecture. Its functions are for ordinary threads; its parts run on its task. What changes it
+/// is made by its architecture, one change at a time, as a transaction where parts, properties or wiring change.
+///
+/// | member           | written by                                | read by             | under            |
+/// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
+/// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
+/// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
+/// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
+/// | the rest         | [setup]                                   | anyone              | -                |
+class Component final : public Configurable {
+ public:
+  using FsmFactory = std::function<std::unique_ptr<FsmBase>()>;
+
+  Component(std::string name, std::uint16_t number, ChangeSignal& changes);
+  ~Component() override;
+
+  /// The architecture that lists it and hears of its changes; nullptr: none. [non-rt], by the architecture
+  void set_architecture(Architecture* architecture) noexcept;
+
+  /// Both under the architecture's change lock. [non-rt] Throw Error (already_running) unless it is parked.
+  void configure() override;
+  void cleanup() override;
+
+  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone. [setup]
+  void set_parts(Parts parts, FsmFactory make_fsm = {});
+  void set_settings(const TaskSettings& settings);
+  /// The core that takes over after a fault, without a word from anybody. [setup]
+  void set_fallback(std::unique_ptr<CoreBase> core);
+
+  const std::string& name() const noexcept { return name_; }
+  Shell& shell() noexcept { return *parts_.shell; }
+  CoreBase& core() noexcept { return *parts_.core; }
+  const FsmBase& fsm() const noexcept { return *parts_.fsm; }
+  Task& task() noexcept { return task_; }
+  const Task& task() const noexcept { return task_; }
+  /// The shell as the type it has. Throws std::bad_cast.
+  template <typename ShellType>
+  ShellType& shell_as() {
+    return dynamic_cast<ShellType&>(*parts_.shell);
+  }
+  template <typename CoreType>
+  CoreType& core_as() {
+    return dynamic_cast<CoreType&>(*parts_.core);
+  }
+  std::string description() const override { return "component " + name_; }
+
+  /// Names, wiring and property values now; unlike the parts themselves safe while they are being replaced. [non-rt]
+  ShownParts shown() const;
+  /// How long the execution states took since the fsm was configured. [non-rt]
+  std::shared_ptr<const StateTimes> state_times() const;
+  /// To be called by who changed something, after the fact. [non-rt]
+  void show();
+  /// The core that runs now, package/Class. [non-rt]
+  std::string core_implementation() const { return shown().core; }
+  /// The fallback's name; empty when none was declared. [non-rt]
+  const std::string& fallback_implementation() const noexcept { return fallback_name_; }
+
+  /// As an alternative: whatever core there is.
+  static constexpr const char* any_core = "*";
+
+  /// Cores it takes beside the one it was declared with, and whether it may be changed at all. [setup]
+  void allow(std::vector<std::string> alternatives, bool reconfigurable);
+  const std::vector<std::string>& alternatives() const noexcept { return alternatives_; }
+  bool is_reconfigurable() const noexcept { return reconfigurable_; }
+  /// Throws Error: not_reconfigurable, undeclared_core.
+  void check_allowed(const std::string& core_implementation) const;
+  /// Throws Error: not_reconfigurable.
+  void check_reconfigurable() const;
+  /// Throws Error: unknown_property.
+  PropertyBase& require_property(const std::string& name) const;
+  /// Throws Error (structural_property) when the component is configured and a part that reads the property only then
+  /// is not among those `replaced`; a value that it has already may always be set. [non-rt]
+  void check_structural(const PropertyBase& property, const PropertyValue& value,
+                        ReadBy replaced = ReadBy::none) const;
+  /// Throws Error: unknown_port.
+  PortBase& require_port(const std::string& name) const;
+  /// Whether an fsm of the present kind can be made once more. [non-rt]
+  const FsmFactory& fsm_factory() const noexcept { return make_fsm_; }
+
+  /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
+  /// Throws Error: unknown_property, type_mismatch, out_of_range; once configured structural_property,
+  /// not_reconfigurable; timeout.
+  StepReport set_property(const std::string& name, const PropertyValue& value,
+                          const CommitTimeouts& timeouts = {});
+
+  /// Throws Error (already_running) unless it is parked; `what` was to be done. [non-rt]
+  void require_parked(const std::string& what) const;
+
+  // Listing 3 of the paper: replacing the core of a stopped component; the new one waits for configure_core(). Throw
+  // Error (already_running) otherwise. [non-rt]
+
+  void cleanup_core();
+  template <typename CoreType, typename... Args>
+  CoreType& replace_core(Args&&... args) {
+    auto core = std::make_unique<CoreType>(std::forward<Args>(args)...);
+    CoreType& replaced = *core;
+    replace_core(std::move(core));
+    return replaced;
+  }
+  void replace_core(std::unique_ptr<CoreBase> core);
+  void configure_core();
+  /// Throws Error (not_configured) when it could not start for want of a core that is bound and configured. [non-rt]
+  void require_ready_core() const;
+
+  /// Replaces the core in flight: prepare, commit inside a wait, retire the old one. [non-rt]
+  /// The component may also be stopped. Throws Error: prepare_failed, adopt_refused, timeout, faulted, not_configured,
+  /// not_reconfigurable; the old core then goes on as if nothing had been asked.
+  /// `committed` is called once the new core is in, before the release that follows is waited for.
+  StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {},
+                       const std::function<void()>& committed = {});
+
+  /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
+  /// `out`: the core that was replaced, which may be the fallback itself.
+  void renew_fallback(std::unique_ptr<CoreBase> out);
+
+  /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
+  void update_listening() { update_listening(*parts_.fsm); }
+  /// Its event waits hear of nothing any more, for a component that is removed while a state of it hangs. [non-rt]
+  void stop_listening() noexcept;
+  /// Whether one of its ports leads to the resource. [non-rt]
+  bool uses(const Resource& resource) const;
+
+  /// Cleans up and configures anew a parked component, whatever its state; STOPPED then. [non-rt]
+  /// Throws Error: already_running; what configure throws: it is UNCONFIGURED then.
+  void configure_anew();
+
+ private:
+  friend class PartsChange;
+
+  bool configure_hook() override;
+  void check_cleanup() const override;
+  void cleanup_hook() override;
+  std::unique_lock<ChangeLock> join_change() const;
+  Architecture& require_listed() const;
+  void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
+  CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
+  void bind_fsm(FsmBase& fsm, Shell& shell) const;
+  /// Refuses a shell whose messages do not fit on the task's stack. Throws Error (out_of_range).
+  void check_stack(const Shell& shell) const;
+  time_ns_t settled_period_ns(const FsmBase& fsm) const;
+  void update_listening(const FsmBase& fsm);
+  void prepare_fallback();
+  void check_fallback(const Shell& shell, const FsmBase& fsm) const;
+
+  std::string name_;
+  std::atomic<Architecture*> architecture_{nullptr};
+  Task task_;
+  Parts parts_;
+  FsmFactory make_fsm_;
+  CoreBinding binding_;
+  std::string declared_core_;
+  std::vector<std::string> alternatives_;
+  bool reconfigurable_{true};
+  CoreBase* spare_{nullptr};                 // the fallback while one is ready or in force
+  std::unique_ptr<CoreBase> fallback_core_;  // until it is put in
+  std::string fallback_name_;
+  std::unique_ptr<PartsChange> fallback_;
+
+  mutable std::mutex shown_mutex_;
+  ShownParts shown_;
+  std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
+  std::shared_ptr<const StateTimes> shown_times_;
+};
+
+/// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]
+StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns);
+
+}  // namespace mauve

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Who ends an execution: the thread that runs it, or who condemns it. One atomic word decides.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/time.hpp"
+
+namespace mauve {
+
+/// The watched executions of one component, one after another; each has a number of its own and a bound.
+///
+/// Its thread begins an execution and ends it; whoever finds it over its bound condemns exactly that one. Both change
+/// the word by compare-and-exchange: who comes first has decided, and the other one finds so. A condemned execution's
+/// thread waits, on coming back, until the condemnation is complete; who removes its component meanwhile abandons it.
+///
+/// | from             | to               | by                                                                      |
+/// | ---------------- | ---------------- | ----------------------------------------------------------------------- |
+/// | idle             | running, + 1     | the thread                                                              |
+/// | running          | idle             | the thread: it ended                                                    |
+/// | running          | condemned        | the watchdog, or the conductor of a commit                              |
+/// | condemned        | sentenced        | the same, when FAULTED is told, the thread demoted, the outputs written |
+/// | sentenced        | idle             | the thread: it came back                                                |
+/// | sentenced        | claimed          | who is about to remove the component                                    |
+/// | claimed          | sentenced        | the same, when the removal was refused                                  |
+/// | claimed          | abandoned        | the same, when it was made                                              |
+///
+/// | member    | order                                                                                               |
+/// | --------- | --------------------------------------------------------------------------------------------------- |
+/// | word_     | begin: seq_cst, so that whoever looks sees the execution or the thread sees when the watchdog looks  |
+/// |           | (Watchdog::wake_before_); else acq_rel: who changes it sees what the one before did                  |
+/// | began_ns_ | release: who sees the new one, sees the end of the execution before, and then condemns nothing       |
+/// | limit_ns_ | likewise                                                                                             |
+class ExecutionWord {
+ public:
+  /// An execution as somebody saw it.
+  struct Look {
+    std::uint32_t word;
+    time_ns_t began_ns;
+    time_ns_t limit_ns;
+
+    bool is_over(time_ns_t now_ns) const noexcept { return now_ns - began_ns > limit_ns; }
+    time_ns_t end_ns() const noexcept { return ExecutionWord::end_ns(began_ns, limit_ns); }
+  };
+  /// The last instant at which it is not over its bound. [rt]
+  static constexpr time_ns_t end_ns(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+    return limit_ns < kForever - began_ns ? began_ns + limit_ns : kForever;
+  }
+
+  // ---- the component's thread
+
+  /// [rt]
+  void begin(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+    began_ns_.store(began_ns, std::memory_order_release);
+    limit_ns_.store(limit_ns, std::memory_order_release);
+    const std::uint32_t before =
+        word_.load(std::memory_order_relaxed);  // relaxed: idle, nobody else writes it
+    word_.store(((before & ~kPhase) + kNext) | kRunning, std::memory_order_seq_cst);
+  }
+  /// False when it was condemned before it ended; true also when none was under way. [rt]
+  bool end() noexcept {
+    std::uint32_t word = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
+    if ((word & kPhase) == kIdle) return true;
+    return (word & kPhase) == kRunning &&
+           word_.compare_exchange_strong(word, (word & ~kPhase) | kIdle, std::memory_order_acq_rel);
+  }
+  /// After a condemned one: waits until the condemnation is complete; false when the component was removed meanwhile,
+  /// and the thread is to end without another trace. [rt]
+  bool come_back() noexcept {
+    for (;;) {
+      std::uint32_t word = word_.load(std::memory_order_acquire);
+      const std::uint32_t phase = word & kPhase;
+      if (phase == kAbandoned) return false;
+      if (phase == kIdle) return true;
+      if (phase != kSentenced) {
+        futex_wait_until(word_, word, kForever);
+      } else if (word_.compare_exchange_strong(word, (word & ~kPhase) | kIdle, std::memory_order_acq_rel)) {
+        return true;
+      }
+    }
+  }
+
+  // ---- who condemns
+
+  /// The execution under way, or nothing. [rt]
+  std::optional<Look> look() const noexcept {
+    const std::uint32_t word = word_.load(std::memory_order_seq_cst);
+    if ((word & kPhase) != kRunning) return std::nullopt;
+    return Look{word, began_ns_.load(std::memory_order_acquire), limit_ns_.load(std::memory_order_acquire)};
+  }
+  /// False when it has ended, or another one was first. [rt]
+  bool condemn(const Look& execution) noexcept {
+    std::uint32_t word = execution.word;
+    return word_.compare_exchange_strong(word, (word & ~kPhase) | kCondemned, std::memory_order_acq_rel);
+  }
+  /// The condemnation is complete. [rt]
+  void sentence() noexcept { exchange_phase(kCondemned, kSentenced); }
+
+  // ---- who removes the component
+
+  /// From now on the thread does not come back; false when it has, or was not condemned. [rt]
+  bool claim() noexcept {
+    for (;;) {
+      std::uint32_t word = word_.load(std::memory_order_acquire);
+      if ((word & kPhase) == kCondemned) {
+        futex_wait_until(word_, word, kForever);
+      } else if ((word & kPhase) != kSentenced) {
+        return false;
+      } else if (word_.compare_exchange_strong(word, (word & ~kPhase) | kClaimed,
+                                               std::memory_order_acq_rel)) {
+        return true;
+      }
+    }
+  }
+  /// [rt]
+  void give_up_claim() noexcept { exchange_phase(kClaimed, kSentenced); }
+  void abandon() noexcept { exchange_phase(kClaimed, kAbandoned); }
+  /// Whether its thread still runs a condemned execution. [rt]
+  bool is_condemned() const noexcept { return phase() >= kCondemned; }
+  bool is_abandoned() const noexcept { return phase() == kAbandoned; }
+
+ private:
+  static constexpr std::uint32_t kIdle = 0, kRunning = 1, kCondemned = 2, kSentenced = 3, kClaimed = 4,
+                                 kAbandoned = 5, kPhase = 7;
+  static constexpr std::uint32_t kNext = 8;  // the number above the phase
+
+  std::uint32_t phase() const noexcept { return word_.load(std::memory_order_acquire) & kPhase; }
+  void exchange_phase(std::uint32_t from, std::uint32_t to) noexcept {
+    std::uint32_t word = (word_.load(std::memory_order_acquire) & ~kPhase) | from;
+    if (!word_.compare_exchange_strong(word, (word & ~kPhase) | to, std::memory_order_acq_rel)) return;
+    futex_wake_all(word_);
+  }
+
+  std::atomic<std::uint32_t> word_{kIdle};
+  std::atomic<time_ns_t> began_ns_{0};
+  std::atomic<time_ns_t> limit_ns_{0};
+};
+
+}  // namespace mauve

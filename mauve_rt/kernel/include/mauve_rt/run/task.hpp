@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Task: runs one component's state machine on its grid, on a real-time thread of its own or in simulated time.
+#pragma once
+
+#include <pthread.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/context.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/present_state.hpp"
+#include "mauve_rt/base/statistics.hpp"
+#include "mauve_rt/base/thread_counters.hpp"
+#include "mauve_rt/deploy/due_queue.hpp"
+#include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/run/commit.hpp"
+#include "mauve_rt/run/execution_word.hpp"
+#include "mauve_rt/run/watchdog.hpp"
+
+namespace mauve {
+
+enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, held, stopping, faulted };
+
+/// "UNCONFIGURED", "STOPPED", ... [rt]
+std::string_view to_string(ComponentState state) noexcept;
+/// HELD is RUNNING to who looks at an architecture: it is for a moment only. [rt]
+constexpr ComponentState settled(ComponentState state) noexcept {
+  return state == ComponentState::held ? ComponentState::running : state;
+}
+
+/// What to do when an instant has passed before its wait is entered.
+enum class OverrunPolicy : std::uint8_t {
+  skip,      // go on at the next instant of the grid
+  catch_up,  // go on at once, owing at most max_backlog instants
+  fault,
+};
+
+struct TaskSettings {
+  int priority{50};         // SCHED_FIFO, 1 to 98; 99 is kept for the conductor of transactions
+  std::vector<int> cpus{};  // empty: any
+  time_ns_t offset_ns{0};   // instants are epoch + offset + k * period
+  time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
+  OverrunPolicy overrun{OverrunPolicy::skip};
+  std::int64_t max_backlog{10};
+  std::size_t stack_bytes{std::size_t{512} * 1024};  // prefaulted whole: it is held in memory
+  std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
+  time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
+};
+
+/// What the kernel gave the thread, read back from it.
+struct ThreadFacts {
+  std::string policy;
+  int priority{0};
+  std::vector<int> cpus;
+  std::size_t guard_bytes{0};  // below its stack
+};
+
+struct Fault {
+  std::string what;
+  std::string where;  // state
+  time_ns_t when_ns{0};
+};
+
+/// A fault as it is kept, so that a watchdog can note one without allocating.
+struct FaultNote {
+  std::shared_ptr<const std::string> what{};  // nullptr: an execution over its bound
+  time_ns_t bound_ns{0};
+  std::uint32_t where{0};  // the state's name in the trace
+  time_ns_t when_ns{0};
+};
+
+/// Shared by all tasks of a deployment: bumped on every change of a component's state.
+/// A component not listed yet has nobody to tell.
+struct ChangeSignal {
+  std::atomic<std::uint32_t> word{0};
+  std::atomic<ChangeSignal*> listener{nullptr};  // release/acquire: it is there before it is told of anything
+
+  /// Who else is told from now on; nullptr: nobody. [non-rt]
+  void set_listener(ChangeSignal* other) noexcept { listener.store(other, std::memory_order_release); }
+  void bump() noexcept;  // [rt]
+};
+
+/// Runs one component.
+///
+/// The machine goes from wait to wait: resume() ends a wait, runs the execution states after it and enters the next.
+/// A thread sleeps in between; in simulated time whoever simulates calls resume().
+///
+/// | member                 | written by                            | read by      | order                              |
+/// | ---------------------- | ------------------------------------- | ------------ | ---------------------------------- |
+/// | control_ (futex)       | commanders set bits, machine clears   | machine      | acq_rel: a bit hands over its data |
+/// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
+/// | place_                 | who conducts a commit                 | machine,     | its own: lent.hpp; who retracts    |
+/// |                        |                                       | stop, events | waits for all who use it           |
+/// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
+/// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
+/// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
+/// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
+/// | current_               | machine                               | anyone       | relaxed: a lone fact               |
+/// | present_               | machine                               | anyone       | its own: present_state.hpp         |
+/// | execution_             | machine, who condemns, who removes    | all of these | its own: execution_word.hpp        |
+/// | wait_bound_ns_         | commanders, machine parked; commits   | watchdog     | relaxed: a hint when to look       |
+/// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
+/// | demoted_               | who condemns, machine                 | machine      | execution_                         |
+/// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
+/// | shell_, fsm_, core_    | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
+/// | reference_ns_,         | the same                              | anyone       | relaxed: lone numbers              |
+/// | period_ns_             |                                       |              |                                    |
+/// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
+/// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
+/// |                        |                                       | condemns     |                                    |
+/// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
+/// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
+/// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
+/// | boundary_ns_ ...       | machine                               | machine      | its own                            |
+/// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
+/// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
+/// | command_mutex_         | ordinary threads: start, commits      | -            | -                                  |
+/// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
+class Task {
+ public:
+  Task(std::string name, std::uint16_t number, ChangeSignal& changes);
+  ~Task();
+  Task(const Task&) = delete;
+  Task& operator=(const Task&) = delete;
+
+  /// What the machine will run. Parked, or in a commit. [rt]
+  void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept;
+  void set_settings(const TaskSettings& settings) { settings_ = settings; }
+  const TaskSettings& settings() const noexcept { return settings_; }
+  Context& context() noexcept { return context_; }
+  /// What puts a fallback core in after a fault; nullptr: a fault is the end. [non-rt]
+  void set_fallback(CommitAction* fallback) noexcept { fallback_.store(fallback, std::memory_order_release); }
+  void set_fallen_back(bool fallen_back) noexcept {
+    fallen_back_.store(fallen_back, std::memory_order_release);
+  }
+  /// Whether the core that runs is the fallback. [rt]
+  bool has_fallen_back() const noexcept { return fallen_back_.load(std::memory_order_acquire); }
+
+  /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
+  /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
+  /// when told so; and Error (timeout) while an earlier thread of the task has not ended.
+  void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
+                     std::shared_ptr<Watchdog> watchdog = {});
+  /// Tells the thread to end, then joins it; false when it was still in user code at the instant, or when a commit held
+  /// the task until then, in the adopt of a parked component's new core. An abandoned one is not waited for. [non-rt]
+  bool end_thread(time_ns_t until_ns) noexcept;
+  bool has_thread() const noexcept { return has_thread_.load(std::memory_order_acquire); }
+  /// Nobody will join its thread, which may come to its end long after: the task stays for ever. [non-rt]
+  void detach_thread() noexcept;
+  /// Whether its last thread has come to its end. [non-rt]
+  bool has_ended() const noexcept { return !has_thread() || ended_.load(std::memory_order_acquire) != 0; }
+
+  /// In place of a thread: every command is taken up at once, on the calling thread. [setup]
+  void simulate(const Clock& clock, bool trace);
+  void end_simulation() noexcept;
+  bool is_simulated() const noexcept { return simulated_; }
+  /// For the simulation's queue alone.
+  QueuePlace& queue_place() noexcept { return queue_place_; }
+  const Clock& clock() const noexcept { return *clock_; }
+
+  /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt]
+  void resume() noexcept;
+  /// The instant that the wait under way ends at; kForever while parked. [rt], the machine's thread or a simulation.
+  time_ns_t due_ns() const noexcept;
+
+  /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
+  time_ns_t join(time_ns_t epoch_ns) noexcept;
+  /// The grid now; another commit may change it any moment. [rt]
+  Grid grid() const noexcept {
+    return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
+            .period_ns = period_ns_.load(std::memory_order_relaxed)};
+  }
+
+  /// Enters the initial state at exactly this instant; for deployment. Does not wait for the thread. [non-rt]
+  void start_at(time_ns_t instant_ns);
+  /// Returns once the thread has taken up a start. [non-rt]
+  void wait_started() noexcept;
+  /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
+  /// is still to come is the start itself; without one it is the deployment's first instant. [non-rt]
+  /// Throws Error: already_running, faulted, not_configured.
+  void start(std::optional<time_ns_t> clock_ns = std::nullopt);
+  /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
+  /// A commit that the component takes part in is called off, unless its change is being made; waits for nobody else.
+  /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
+  /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
+  void stop(time_ns_t timeout_ns = s_to_ns(1));
+  /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
+  time_ns_t get_time() const noexcept { return context_.instant_ns.load(std::memory_order_relaxed); }
+
+  // ---- the task's side of a commit (commit.hpp)
+
+  /// Asks the machine to come to the commit's gate in its next wait. [rt]
+  void post(Participant& place) noexcept;
+  /// After this nobody refers to the participant any more, but the machine for its next release; false when somebody
+  /// did still at the instant. [rt]
+  bool retract(time_ns_t until_ns) noexcept;
+  /// Calls off the commit that the component takes part in, if any, unless its change is being made; any thread. [rt]
+  void withdraw_commit() noexcept;
+  /// Whether an event came that the wait under way waits for. [rt], the machine's thread
+  bool has_event() const noexcept {
+    return !event_settled_ && (control_.load(std::memory_order_acquire) & kEvent) != 0;
+  }
+  /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
+  void leave_behind(std::shared_ptr<void> used);
+  /// Writes the outputs that say so: on_commit, or on_stop. [rt]
+  void write_outputs(bool commit) noexcept;
+  /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
+  void hold_parked(Participant& place) const noexcept;
+  /// Carries on after a commit, when parked or simulated. [non-rt], command mutex held.
+  void finish_parked(Participant& place, bool committed) noexcept;
+  /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
+  /// came first. May be called again. [non-rt]
+  static bool wait_release(const Participant& place, time_ns_t until_ns) noexcept;
+  /// After this the machine does not refer to the participant any more. [non-rt]
+  void forget_release(Participant& place) noexcept;
+  ChangeSignal& changes() noexcept { return changes_; }
+  std::mutex& command_mutex() noexcept { return command_mutex_; }
+  [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
+                                        const std::string& remedy) const;
+
+  /// Tells the machine that an event it may wait for has come. [rt]
+  void signal_event() noexcept;
+
+  // ---- a wait within a state, for what another thread does
+
+  /// The task whose thread this is, or nullptr. [rt]
+  static Task* of_this_thread() noexcept;
+  /// The same, or the task whose states the calling thread runs now in a simulation. [rt]
+  static const Task* executing_here() noexcept;
+  /// By who runs a simulated task, around it; nullptr: none. [rt]
+  static void set_simulated_here(const Task* task) noexcept;
+  /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
+  /// the task's thread. Who sets the word calls signal_awaited() then.
+  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept;
+  void signal_awaited() noexcept;
+  /// Whether the state under way is the last before a park. [rt]
+  bool is_to_stop() const noexcept {
+    return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  }
+
+  // ---- watched executions (rule 11, execution_word.hpp)
+
+  /// What begins now is to last no longer than this. [rt], the machine's thread.
+  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+    execution_.begin(began_ns, limit_ns);
+    if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
+  }
+  /// It has ended; false when it was condemned before: the thread goes to park_condemned() then. [rt], the same.
+  bool end_execution() noexcept { return execution_.end(); }
+  /// Condemns the watched execution under way, whatever its bound - a state that declares one, or what the thread does and
+  /// waits for at a commit's gate: tells FAULTED, takes the thread's priority away, then
+  /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
+  bool condemn(std::string what, time_ns_t now_ns);
+  /// The same where it is over its bound. [rt]
+  bool condemn_if_over(time_ns_t now_ns) noexcept;
+  /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
+  /// thread wakes the watchdog itself. [rt]
+  time_ns_t earliest_excess_ns() const noexcept;
+  /// Outputs that had to be left because of a lock: takes the right to write them; writes those that can be, all of them
+  /// or not. [rt] as far as the resources are. By the watchdog's writer.
+  bool take_outputs_left() noexcept;
+  bool write_outputs_left() noexcept;
+
+  /// A condemned execution's thread is not to come back from now on; false when it has. [rt], who removes the component.
+  bool claim() noexcept { return execution_.claim(); }
+  /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
+  void give_up_claim() noexcept { execution_.give_up_claim(); }
+  void abandon() noexcept;
+  bool is_abandoned() const noexcept { return execution_.is_abandoned(); }
+  /// Whether its thread still executes what it was condemned for. [rt]
+  bool is_left_behind() const noexcept { return execution_.is_condemned(); }
+  /// What a person can do about a component whose thread does not come back. [rt]
+  static constexpr const char* kLeftBehindRemedy =
+      "its thread still executes: remove the component and add it anew, in one transaction";
+  /// What a person can do about a FAULTED component. [rt]
+  static constexpr const char* kRepairRemedy =
+      "repair it first (a step configure, or replace_core), or remove it";
+
+  ComponentState state() const noexcept {
+    return static_cast<ComponentState>(state_.load(std::memory_order_acquire));
+  }
+  /// For configure and cleanup of the component. [non-rt]
+  void set_state(ComponentState state) noexcept;
+  /// Exchanges what is known of the last fault, for one to be forgotten or remembered. [rt], the machine parked.
+  void swap_fault(FaultNote& note) noexcept;
+  /// Forgets a fault, for configure; the machine must be parked. [non-rt]
+  void clear_fault() noexcept;
+  /// Tells who waits for changes that there was one. [rt]
+  void signal_change() noexcept { changes_.bump(); }
+  /// Whether the machine is out of user code for good, until the next start. [non-rt]
+  bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
+  /// The state being executed or waited in; empty before the start. [non-rt]
+  std::string current_state() const;
+  /// How long that lasts, also while it does, against the declared bound and what counts as hung. [non-rt]
+  StateAge state_age() const;
+  /// The last fault, also of a core that a fallback has replaced; empty when there was none. [non-rt]
+  Fault fault() const;
+  const ThreadFacts& facts() const noexcept { return facts_; }
+  const TaskStatistics& statistics() const noexcept { return statistics_; }
+  /// What the thread allocated, and its page faults, since its last start.
+  const ThreadCounters& counters() const noexcept { return counters_; }
+  /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
+  TraceRing* ring() noexcept { return ring_.get(); }
+  /// Appends the ring's records and tells its counts; leaves all alone when nothing is traced. [non-rt]
+  void drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped);
+  /// Gives the ring away, when the component is removed before the ring is drained; parked, no thread. [non-rt]
+  std::unique_ptr<TraceRing> release_ring();
+  const std::string& name() const noexcept { return name_; }
+  std::uint16_t number() const noexcept { return number_; }
+
+ private:
+  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16,
+                                 kAwaited = 32;                        // of control_
+  enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
+
+  // commands
+  void post_start(time_ns_t instant_ns) noexcept;
+  void order_stop();
+  time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
+  time_ns_t restart_instant(const Participant& place) const noexcept;
+  void require_startable() const;
+  bool is_called_from_own_state() const noexcept;
+  void begin_trace(bool trace);
+
+  // the thread
+  static void* thread_entry(void* self) noexcept;
+  void thread_main() noexcept;
+  bool must_act(std::uint32_t control) noexcept;
+  void read_back_thread();
+
+  // the machine
+  void take_up_start() noexcept;
+  void start_machine(time_ns_t instant_ns) noexcept;
+  void warm_up() noexcept;
+  void run_to_next_wait();
+  const State* execute(const State& state);
+  void step();
+  const State* successor(const State& state) const;
+  const State* leave_wait();
+  static void check_locks(int held_before);
+  void enter_wait(const State& state);
+  void tell_wait() noexcept;
+  void settle_event() noexcept;
+  void handle_overrun(const State& state, time_ns_t now_ns);
+  void release(time_ns_t actual_ns) noexcept;
+  time_ns_t leaves_gate_at(const Participant& place) const noexcept;
+  bool may_commit_now() noexcept;
+  void pass_commit() noexcept;
+  void come_to_commit();
+  void visit(Participant& place) noexcept;
+  void go_on_unchanged(Participant& place) noexcept;
+  std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
+  void exchange_state(ComponentState from, ComponentState to) noexcept;
+  void continue_after(Participant& place) noexcept;
+  time_ns_t resynchronise(time_ns_t epoch_ns) noexcept;
+  void trace_deployment() noexcept;
+  void refuse_commit() noexcept;
+  void park_stopped() noexcept;
+  void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
+  void park_condemned() noexcept;
+  void end_in_fault() noexcept;
+  void park(ComponentState state) noexcept;
+  void carry_out_sentence(FaultNote note) noexcept;
+  void take_back_outputs() noexcept;
+  void regain_priority() noexcept;
+  void fall_back(CommitAction& fallback) noexcept;
+  void publish_state(ComponentState state) noexcept;
+
+  void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
+             std::int64_t c = 0) noexcept {
+    if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
+  }
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
+                std::int64_t c = 0) noexcept {
+    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
+  }
+  time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
+  void set_clock_ns(time_ns_t instant) noexcept {
+    context_.clock_ns.store(instant, std::memory_order_relaxed);
+  }
+
+  std::string name_;
+  std::uint16_t number_;
+  ChangeSignal& changes_;
+  const Clock* clock_;
+  TaskSettings settings_;
+  Context context_;
+  TaskStatistics statistics_;
+  ThreadCounters counters_;
+  std::mutex ring_mutex_;
+  std::unique_ptr<TraceRing> ring_;
+
+  Shell* shell_{nullptr};
+  const FsmBase* fsm_{nullptr};
+  CoreBinding* core_{nullptr};
+  std::atomic<time_ns_t> reference_ns_{0};
+  std::atomic<time_ns_t> period_ns_{0};
+
+  std::mutex command_mutex_;
+  PiMutex order_mutex_;
+  pthread_t thread_{};
+  pthread_barrier_t* barrier_{nullptr};
+  std::atomic<bool> has_thread_{false};
+  bool simulated_{false};
+  ThreadFacts facts_;
+  mutable PiMutex fault_mutex_;
+  FaultNote fault_;
+  std::vector<std::shared_ptr<void>> left_behind_;
+  std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
+  const std::atomic<int>* locks_held_{nullptr};
+  bool demoted_{false};
+
+  alignas(64) std::atomic<std::uint32_t> control_{0};
+  std::atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
+  std::atomic<std::uint32_t> parked_{1};
+  std::atomic<std::uint32_t> ready_{0};
+  std::atomic<std::uint32_t> ended_{0};
+  std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
+  Lent<Participant> place_;
+  time_ns_t start_at_ns_{0};
+  std::atomic<std::uint32_t> current_{0};  // the state's name in the trace; 0: none yet
+  ExecutionWord execution_;
+  std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
+  static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
+  std::atomic<std::uint32_t> outputs_{kAllWritten};
+  std::atomic<Participant*> awaiting_release_{nullptr};
+  std::atomic<CommitAction*> fallback_{nullptr};
+  std::atomic<bool> fallen_back_{false};
+  PresentState present_;
+
+  // the machine's own
+  const State* waiting_{
+      nullptr};  // the state it waits in; the initial one before its first release; nullptr: parked
+  const State* next_{nullptr};  // where a start goes on; nullptr: the wait's guards tell when it has ended
+  QueuePlace queue_place_{};    // of a simulated one
+  time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
+  bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
+  time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
+  int deferrals_{0};            // releases a commit was put off for want of time
+  time_ns_t grid_place_ns_{
+      0};                  // where the instant pending belongs: the waits since the initial state, modulo g
+  bool in_resume_{false};  // its code is on some stack: what it calls must not resume it
+  bool is_cold_{false};    // started, and not woken ahead of its first release yet
+  bool left_gate_{false};  // it came to the gate in this wait, and left for its instant
+  bool is_abandoned_{false};  // what it did or waited for at the gate lasted too long
+  time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
+};
+
+}  // namespace mauve

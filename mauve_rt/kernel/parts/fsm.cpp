@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/parts/fsm.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "mauve_rt/base/error.hpp"
+
+#include "base/names.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr const char* kDeclareRemedy = "declare it in define()";
+
+bool is_endless(const State& state) noexcept {
+  return state.is_wait && state.event == nullptr && state.duration_ns == kForever;
+}
+
+std::vector<const State*> successors(const State& state) {
+  std::vector<const State*> all;
+  if (is_endless(state)) return all;  // nothing comes after it
+  all.reserve(state.transitions.size() + 1);
+  for (const Transition& transition : state.transitions) all.push_back(transition.to);
+  all.push_back(state.next);
+  return all;
+}
+
+/// Refuses a loop of execution states: it would never let time pass.
+class LoopFinder {
+ public:
+  void search(const State& state) {
+    visited_[&state] = true;
+    path_.push_back(&state);
+    for (const State* next : successors(state)) {
+      if (next->is_wait) continue;
+      const auto on_path = std::find(path_.begin(), path_.end(), next);
+      if (on_path != path_.end()) refuse(on_path, *next);
+      if (!visited_[next]) search(*next);
+    }
+    path_.pop_back();
+  }
+  bool visited(const State& state) { return visited_[&state]; }
+
+ private:
+  void refuse(std::vector<const State*>::iterator from, const State& closing) const {
+    std::string loop;
+    for (auto state = from; state != path_.end(); ++state) loop += (*state)->name + " -> ";
+    throw Error(ErrorCode::loop_without_wait, "the states form a loop without a wait: " + loop + closing.name,
+                {.expected = "a wait state in every loop", .remedy = "put a wait state between two of them"});
+  }
+
+  std::map<const State*, bool> visited_;
+  std::vector<const State*> path_;
+};
+
+/// Tarjan's strongly connected components with potentials along the tree edges.
+class CycleLengths {
+ public:
+  time_ns_t gcd_from(const State& initial) {
+    visit(initial, 0);
+    time_ns_t gcd = 0;
+    for (const auto& [state, node] : nodes_) {
+      for (const State* next : successors(*state)) {
+        const Node& to = nodes_.at(next);
+        if (to.component != node.component) continue;
+        gcd = std::gcd(gcd, node.potential_ns + length_of(*state) - to.potential_ns);
+      }
+    }
+    return gcd;
+  }
+
+ private:
+  /// An event wait has none that a period could be made of.
+  static time_ns_t length_of(const State& state) noexcept {
+    return state.event != nullptr ? 0 : state.duration_ns;
+  }
+
+  struct Node {
+    time_ns_t potential_ns;
+    int index;
+    int low;
+    int component{-1};
+  };
+
+  void visit(const State& state, time_ns_t potential_ns) {
+    const int index = static_cast<int>(nodes_.size());
+    nodes_[&state] = {potential_ns, index, index, -1};
+    stack_.push_back(&state);
+    for (const State* next : successors(state)) {
+      const auto known = nodes_.find(next);
+      if (known == nodes_.end()) {
+        visit(*next, potential_ns + length_of(state));
+        nodes_[&state].low = std::min(nodes_[&state].low, nodes_[next].low);
+      } else if (known->second.component < 0) {
+        nodes_[&state].low = std::min(nodes_[&state].low, known->second.index);
+      }
+    }
+    if (nodes_[&state].low != index) return;
+    const State* member = nullptr;
+    do {
+      member = stack_.back();
+      stack_.pop_back();
+      nodes_[member].component = index;
+    } while (member != &state);
+  }
+
+  std::map<const State*, Node> nodes_;
+  std::vector<const State*> stack_;
+};
+
+/// All waits together bound the length of every path, so that sums of them do not overflow.
+void check_lengths(const std::vector<const State*>& reachable) {
+  time_ns_t all = 0;
+  const State* longest = nullptr;
+  for (const State* state : reachable) {
+    if (!state->is_wait || state->duration_ns == kForever) continue;
+    all = later_by(all, state->duration_ns);
+    if (longest == nullptr || longest->duration_ns < state->duration_ns) longest = state;
+  }
+  if (all <= kLongest) return;
+  throw Error(ErrorCode::bad_fsm, "the waits are too long",
+              {.element = "state " + longest->name,
+               .expected = "at most " + std::to_string(kLongest) + " ns, all waits together",
+               .found = std::to_string(longest->duration_ns) + " ns in this one",
+               .remedy = "wait for kForever where only a stop is to end the wait"});
+}
+
+}  // namespace
+
+time_ns_t cycle_gcd_ns(const State& initial) {
+  LoopFinder loops;
+  std::vector<const State*> reachable{&initial};
+  for (std::size_t i = 0; i < reachable.size(); ++i) {
+    for (const State* next : successors(*reachable[i])) {
+      if (std::find(reachable.begin(), reachable.end(), next) == reachable.end()) reachable.push_back(next);
+    }
+  }
+  for (const State* state : reachable) {
+    if (!state->is_wait && !loops.visited(*state)) loops.search(*state);
+  }
+  check_lengths(reachable);
+  return CycleLengths().gcd_from(initial);
+}
+
+State& FsmBase::add_state(std::string name) {
+  check_name("state", name);
+  for (const auto& state : states_) {
+    if (state->name == name) {
+      throw Error(ErrorCode::duplicate_name, "the state is declared twice", {.element = "state " + name});
+    }
+  }
+  states_.push_back(std::make_unique<State>());
+  states_.back()->trace_id = TraceNames::intern(name);
+  states_.back()->name = std::move(name);
+  states_.back()->index = states_.size() - 1;
+  return *states_.back();
+}
+
+State& FsmBase::add_execution(std::string name) {
+  State& state = add_state(std::move(name));
+  state.execution_time = &times_->emplace_back(state.name).time;
+  return state;
+}
+
+State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
+  if (duration_ns <= 0) {
+    throw Error(
+        ErrorCode::bad_fsm, "a wait has no length",
+        {.element = "state " + name, .expected = "a duration > 0 ns", .found = std::to_string(duration_ns)});
+  }
+  State& state = add_state(std::move(name));
+  state.is_wait = true;
+  state.duration_ns = duration_ns;
+  return state;
+}
+
+State& FsmBase::wait_event(std::string name, PortBase& port, time_ns_t timeout_ns,
+                           time_ns_t min_interarrival_ns) {
+  if (port.kind() != PortKind::read) {
+    throw Error(ErrorCode::bad_fsm, "an event wait needs a port that reads",
+                {.element = "state " + name,
+                 .expected = "a read port",
+                 .found = "the " + std::string(to_string(port.kind())) + " port " + port.name()});
+  }
+  if (min_interarrival_ns <= 0 || timeout_ns < min_interarrival_ns) {
+    throw Error(ErrorCode::bad_fsm, "an event wait's times do not fit",
+                {.element = "state " + name,
+                 .expected = "0 < min_interarrival_ns <= timeout_ns",
+                 .found = "min_interarrival_ns " + std::to_string(min_interarrival_ns) + ", timeout_ns " +
+                          std::to_string(timeout_ns)});
+  }
+  State& state = wait(std::move(name), timeout_ns);
+  state.event = std::make_unique<EventInput>(port);
+  state.min_interarrival_ns = min_interarrival_ns;
+  return state;
+}
+
+std::size_t FsmBase::add_method(Method method) {
+  methods_.push_back(std::move(method));
+  return methods_.size() - 1;
+}
+
+CoreBinding FsmBase::bind_dynamic(DynamicCore& core) const {
+  CoreBinding binding{.object = nullptr, .dynamic = &core, .method_slots = {}};
+  for (const Method& method : methods_) {
+    const int slot = core.find_method(method.name());
+    if (slot < 0) {
+      throw Error(ErrorCode::type_mismatch, "the core lacks a method that the fsm calls",
+                  {.element = core.description(),
+                   .expected = "a method '" + method.name() + "' for " + description(),
+                   .remedy = "add the method to the core"});
+    }
+    binding.method_slots.push_back(slot);
+  }
+  return binding;
+}
+
+bool FsmBase::configure_hook() {
+  cleanup_hook();
+  define();
+  if (initial_ == nullptr) {
+    throw Error(ErrorCode::bad_fsm, "the machine has no initial state",
+                {.element = description(), .expected = "set_initial(state)", .remedy = kDeclareRemedy});
+  }
+  for (const auto& state : states_) {
+    if (is_endless(*state) && !state->transitions.empty()) {
+      throw Error(ErrorCode::bad_fsm, "a guard would never be asked",
+                  {.element = "state " + state->name,
+                   .expected = "no transition from a wait that only a stop ends",
+                   .found = "a transition to " + state->transitions.front().to->name,
+                   .remedy = "give the wait a length, or leave the transition out"});
+    }
+    if (state->next == nullptr && !is_endless(*state)) {
+      throw Error(
+          ErrorCode::bad_fsm, "the state leads nowhere when no guard holds",
+          {.element = "state " + state->name, .expected = "next(state, ...)", .remedy = kDeclareRemedy});
+    }
+  }
+  sporadic_ =
+      std::any_of(states_.begin(), states_.end(), [](const auto& state) { return state->event != nullptr; });
+  for (const auto& state : states_) {
+    const time_ns_t bound = state->max_execution_ns;
+    if (bound != 0 && (smallest_bound_ns_ == 0 || bound < smallest_bound_ns_)) smallest_bound_ns_ = bound;
+  }
+  const time_ns_t cycles_ns = cycle_gcd_ns(*initial_);  // also refuses loops without a wait
+  period_ns_ = sporadic_ ? 0 : std::gcd(cycles_ns, divisor_ns_);
+  return true;
+}
+
+void FsmBase::cleanup_hook() {
+  states_.clear();
+  methods_.clear();
+  times_ = std::make_shared<StateTimes>();
+  initial_ = nullptr;
+  period_ns_ = divisor_ns_ = smallest_bound_ns_ = 0;
+  sporadic_ = false;
+}
+
+}  // namespace mauve

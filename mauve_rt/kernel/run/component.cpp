@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/run/component.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/change/transaction_commit.hpp"
+
+#include "base/prefault.hpp"
+#include "parts/lookup.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr time_ns_t kShortestUndeclaredPeriod = us_to_ns(100);
+
+}  // namespace
+
+Component::Component(std::string name, std::uint16_t number, ChangeSignal& changes)
+    : name_(std::move(name)), task_(name_, number, changes) {}
+
+Component::~Component() {
+  task_.end_thread(kForever);  // before what it runs is taken away
+  Configurable::cleanup();
+}
+
+void Component::set_architecture(Architecture* architecture) noexcept {
+  architecture_.store(architecture, std::memory_order_release);
+  task_.changes().set_listener(architecture != nullptr ? &architecture->changes() : nullptr);
+}
+
+std::unique_lock<ChangeLock> Component::join_change() const {
+  Architecture* architecture = architecture_.load(std::memory_order_acquire);
+  return architecture != nullptr ? architecture->change_lock().join() : std::unique_lock<ChangeLock>();
+}
+
+Architecture& Component::require_listed() const {
+  if (Architecture* architecture = architecture_.load(std::memory_order_acquire)) return *architecture;
+  throw Error(ErrorCode::unknown_component, "the component was removed", {.component = name_});
+}
+
+void Component::configure() {
+  const auto change = join_change();
+  Configurable::configure();
+}
+
+void Component::cleanup() {
+  const auto change = join_change();
+  Configurable::cleanup();
+}
+
+void Component::set_parts(Parts parts, FsmFactory make_fsm) {
+  parts_ = std::move(parts);
+  make_fsm_ = std::move(make_fsm);
+  parts_.shell->set_context(&task_.context());
+  declared_core_ = parts_.core->implementation();
+  core_name_.store(TraceNames::intern(declared_core_), std::memory_order_relaxed);
+  show();
+}
+
+void Component::set_fallback(std::unique_ptr<CoreBase> core) {
+  fallback_name_ = core->implementation();
+  fallback_core_ = std::move(core);
+}
+
+ShownParts Component::shown() const {
+  const std::lock_guard lock(shown_mutex_);
+  ShownParts shown = shown_;
+  shown.core = TraceNames::word(core_name_.load(std::memory_order_relaxed));
+  return shown;
+}
+
+std::shared_ptr<const StateTimes> Component::state_times() const {
+  const std::lock_guard lock(shown_mutex_);
+  return shown_times_;
+}
+
+void Component::show() {
+  ShownParts now{.shell = parts_.shell->implementation(),
+                 .core = {},  // by name only: a fallback may take its place at any moment
+                 .fsm = parts_.fsm->implementation(),
+                 .ports = {},
+                 .properties = {}};
+  for (const auto& port : parts_.shell->ports()) {
+    const ServiceBase* service = port->service();
+    now.ports.push_back({port->name(), port->kind(), port->type(), port->resource_name(),
+                         service == nullptr ? "" : service->name()});
+  }
+  for (const auto& property : parts_.shell->properties())
+    now.properties.push_back({property->name(), property->boxed(), property->options()});
+  const std::lock_guard lock(shown_mutex_);
+  shown_ = std::move(now);
+  shown_times_ = parts_.fsm->times();
+}
+
+void Component::set_settings(const TaskSettings& settings) {
+  constexpr int kHighest = 98;
+  if (settings.priority < 1 || settings.priority > kHighest) {
+    throw Error(ErrorCode::out_of_range, "the priority is out of range",
+                {.component = name_,
+                 .element = "priority",
+                 .expected = "1 to 98 (99 is kept for the conductor of transactions)",
+                 .found = std::to_string(settings.priority),
+                 .remedy = "choose another priority"});
+  }
+  if (settings.period_ns < 0 || settings.max_backlog < 1 || settings.stack_bytes < std::size_t{64} * 1024) {
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_, .expected = "period_ns >= 0, max_backlog >= 1, stack_bytes >= 65536"});
+  }
+  if (settings.offset_ns < 0 || settings.offset_ns > kLongest) {
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "offset_ns",
+                 .expected = "0 to " + std::to_string(kLongest),
+                 .found = std::to_string(settings.offset_ns),
+                 .remedy = "give the time from the epoch to the first instant"});
+  }
+  for (const int cpu : settings.cpus) {
+    if (cpu >= 0 && cpu < CPU_SETSIZE) continue;
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "cpus",
+                 .expected = "0 to " + std::to_string(CPU_SETSIZE - 1),
+                 .found = std::to_string(cpu),
+                 .remedy = "name CPUs of this machine, or none to allow every one"});
+  }
+  if (settings.hung_after_ns < 0) {
+    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+                {.component = name_,
+                 .element = "hung_after_ns",
+                 .expected = ">= 0 (0: 10 periods, 1 s at least)",
+                 .found = std::to_string(settings.hung_after_ns)});
+  }
+  task_.set_settings(settings);
+}
+
+void Component::allow(std::vector<std::string> alternatives, bool reconfigurable) {
+  alternatives_ = std::move(alternatives);
+  reconfigurable_ = reconfigurable;
+}
+
+void Component::check_reconfigurable() const {
+  if (reconfigurable_) return;
+  throw Error(ErrorCode::not_reconfigurable, "the component is protected (reconfigurable: false)",
+              {.component = name_, .remedy = "allow it in the architecture file"});
+}
+
+void Component::check_allowed(const std::string& core_implementation) const {
+  check_reconfigurable();
+  const auto is_it = [&core_implementation](const std::string& name) {
+    return name == core_implementation || name == any_core;
+  };
+  if (is_it(declared_core_) || std::any_of(alternatives_.begin(), alternatives_.end(), is_it)) return;
+  std::vector<std::string> allowed{declared_core_};
+  allowed.insert(allowed.end(), alternatives_.begin(), alternatives_.end());
+  throw Error(ErrorCode::undeclared_core, "the core is not one that the component declares",
+              {.component = name_,
+               .element = "core",
+               .expected = "one of " + join(allowed),
+               .found = core_implementation,
+               .remedy = "name it among the component's alternatives"});
+}
+
+PropertyBase& Component::require_property(const std::string& name) const {
+  return find_property(*parts_.shell, name, name_);
+}
+
+PortBase& Component::require_port(const std::string& name) const {
+  return find_port(*parts_.shell, name, name_);
+}
+
+void Component::check_structural(const PropertyBase& property, const PropertyValue& value,
+                                 ReadBy replaced) const {
+  const ReadBy kept = without(property.options().structural, replaced);
+  if (kept == ReadBy::none || !is_configured()) return;
+  for (const ShownProperty& present : shown().properties) {
+    if (present.name == property.name() && present.value == value) return;
+  }
+  std::string parts;
+  for (const std::string& part : names_of(kept)) parts += (parts.empty() ? "the " : " and the ") + part;
+  throw Error(ErrorCode::structural_property, "it is structural, read only when the component is configured",
+              {.component = name_,
+               .element = "property " + property.name(),
+               .expected = "a replacement of " + parts + " in the same transaction",
+               .found = "none",
+               .remedy = "replace " + parts +
+                         " beside it, by the same kind if it is to stay, or stop the component, clean it up, "
+                         "set it and configure it"});
+}
+
+StepReport Component::set_property(const std::string& name, const PropertyValue& value,
+                                   const CommitTimeouts& timeouts) {
+  return require_listed().commit_one(std::move(Transaction().set_property(name_, name, value)), timeouts);
+}
+
+void Component::require_parked(const std::string& what) const {
+  if (task_.is_parked()) return;
+  throw Error(ErrorCode::already_running, what + " needs a stopped component",
+              {.component = name_,
+               .expected = "STOPPED",
+               .found = std::string(to_string(task_.state())),
+               .remedy = "stop it first, or replace the core in flight"});
+}
+
+void Component::cleanup_core() {
+  const auto change = join_change();
+  require_parked("cleanup_core");
+  binding_ = {};
+  parts_.core->cleanup();
+}
+
+void Component::replace_core(std::unique_ptr<CoreBase> core) {
+  require_listed().commit_one(std::move(Transaction().place_core(name_, std::move(core))));
+}
+
+void Component::configure_core() {
+  const auto change = join_change();
+  require_parked("configure_core");
+  bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+  if (task_.has_thread()) prefault_allocated();
+}
+
+void Component::bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding) {
+  if (!core.bind_shell(shell)) {
+    throw Error(
+        ErrorCode::type_mismatch, "the core was written for another shell",
+        {.component = name_, .element = core.description(), .expected = "a core for " + shell.description()});
+  }
+  core.set_context(&task_.context());
+  CoreBinding bound = require_binding(core, fsm);
+  core.configure();
+  binding = std::move(bound);
+}
+
+CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const {
+  CoreBinding binding = fsm.bind_core(core);
+  binding.core = &core;
+  if (binding.is_bound()) return binding;
+  throw Error(
+      ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
+      {.component = name_, .element = core.description(), .expected = "a core for " + fsm.description()});
+}
+
+void Component::require_ready_core() const {
+  if (!is_configured() || binding_.is_ready()) return;
+  throw Error(ErrorCode::not_configured, "the core is not configured",
+              {.component = name_,
+               .element = parts_.core->description(),
+               .expected = "a core that configure_core() has bound and configured",
+               .found = "one that it has not",
+               .remedy = "call configure_core() first"});
+}
+
+StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts,
+                                const std::function<void()>& committed) {
+  const auto made =
+      require_listed().make_one(std::move(Transaction().replace_core(name_, std::move(core))), timeouts);
+  if (committed) committed();
+  return made->report(timeouts.phase_ns).steps.front();
+}
+
+namespace {
+
+/// The instants of the grid before the change that lie between the pending one and the release that follows.
+std::int64_t missed_releases(const Participant& place, time_ns_t release_ns) noexcept {
+  if (place.period_ns == 0 || release_ns <= place.pending_ns) return 0;
+  return (release_ns - place.pending_ns + place.period_ns - 1) / place.period_ns;
+}
+
+std::string why_missed(const Participant& place) {
+  const auto in_us = [](time_ns_t duration_ns) { return std::to_string(duration_ns / us_to_ns(1)) + " us"; };
+  if (place.start_clock_ns) return "it starts on the clock that was asked for";
+  const bool was_to_go_on = place.grid.first_not_before(place.pending_ns) == place.pending_ns;
+  if (place.afterwards != Afterwards::restart || was_to_go_on) return "it was held past its pending instant";
+  return "the pending instant, of a period of " + in_us(place.period_ns) +
+         ", is none of the new one's: it starts at the first of " + in_us(place.grid.period_ns) + " after it";
+}
+
+}  // namespace
+
+StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
+  StepReport report;
+  report.component = place.task->name();
+  report.blackout_ns = place.armed_ns - place.parked_ns;
+  if (!place.is_followed_by_release()) return report;
+  const bool released = place.task->wait_release(place, later_by(monotonic_now_ns(), phase_timeout_ns));
+  const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;
+  report.phase_nominal_ns = place.grid.phase_error(nominal_ns - place.grid_place_ns);
+  if (released)
+    report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
+  report.missed_releases = place.lost + missed_releases(place, nominal_ns - place.shift_ns);
+  if (report.missed_releases != 0) report.remark = why_missed(place);
+  return report;
+}
+
+time_ns_t Component::settled_period_ns(const FsmBase& fsm) const {
+  const time_ns_t declared = task_.settings().period_ns;
+  const time_ns_t found = fsm.period_ns();
+  if (fsm.is_sporadic()) {
+    if (declared == 0) return 0;
+    throw Error(ErrorCode::bad_period, "an fsm that waits for events has no period",
+                {.component = name_,
+                 .element = "period_ns",
+                 .expected = "none",
+                 .found = std::to_string(declared),
+                 .remedy = "declare none"});
+  }
+  if (declared != 0 && found % declared != 0) {
+    throw Error(ErrorCode::bad_period, "the fsm has a cycle that is no multiple of the declared period",
+                {.component = name_,
+                 .element = "period_ns",
+                 .expected = "a divisor of " + std::to_string(found) + " ns",
+                 .found = std::to_string(declared),
+                 .remedy = "declare a divisor, or change the waits"});
+  }
+  if (declared == 0 && found != 0 && found < kShortestUndeclaredPeriod) {
+    throw Error(ErrorCode::bad_period, "the fsm's cycles have a very short common period",
+                {.component = name_,
+                 .element = "period",
+                 .expected = "at least 100 us",
+                 .found = std::to_string(found) + " ns",
+                 .remedy = "declare period_ns if it is meant, or make the waits multiples of a longer one"});
+  }
+  return declared != 0 ? declared : found;
+}
+
+void Component::bind_fsm(FsmBase& fsm, Shell& shell) const {
+  if (!fsm.bind_shell(shell)) {
+    throw Error(
+        ErrorCode::type_mismatch, "the fsm was written for another shell",
+        {.component = name_, .element = fsm.description(), .expected = "an fsm for " + shell.description()});
+  }
+}
+
+void Component::check_stack(const Shell& shell) const {
+  const LargestMessage largest = largest_message(shell);
+  const std::size_t needed = stack_bytes_for(largest);
+  if (needed <= task_.settings().stack_bytes) return;
+  throw Error(ErrorCode::out_of_range, "a port's messages do not fit on the component's stack",
+              {.component = name_,
+               .element = "port " + largest.port,
+               .expected = "stack_bytes of at least " + std::to_string(needed) + " for " +
+                           std::to_string(largest.bytes) + " bytes of " + largest.type,
+               .found = "stack_bytes of " + std::to_string(task_.settings().stack_bytes),
+               .remedy = "raise the component's stack_bytes, or make the message smaller"});
+}
+
+bool Component::configure_hook() {
+  require_parked("configure");
+  for (const auto& port : parts_.shell->ports()) {
+    if (port->is_required() && !port->is_connected()) throw_not_connected(*port, name_);
+  }
+  check_stack(*parts_.shell);
+  bind_fsm(*parts_.fsm, *parts_.shell);
+  time_ns_t period_ns = 0;
+  try {
+    parts_.shell->configure();
+    parts_.fsm->configure();
+    period_ns = settled_period_ns(*parts_.fsm);
+    bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+    prepare_fallback();
+  } catch (const Error& failure) {
+    cleanup_hook();
+    if (!failure.detail().component.empty()) throw;
+    ErrorDetail detail = failure.detail();
+    detail.component = name_;
+    throw Error(failure.code(), failure.statement(), detail);
+  } catch (...) {
+    cleanup_hook();
+    throw;
+  }
+  for (const auto& port : parts_.shell->ports()) port->reopen();
+  task_.clear_fault();
+  task_.set_machine(*parts_.shell, *parts_.fsm, &binding_, period_ns);
+  update_listening(*parts_.fsm);
+  show();
+  if (task_.has_thread()) prefault_allocated();
+  task_.set_state(ComponentState::stopped);
+  return true;
+}
+
+/// The fallback is ready with the component: at the time of a fault nothing is left to be built.
+void Component::prepare_fallback() {
+  if (fallback_core_ == nullptr) return;
+  fallback_ =
+      std::make_unique<PartsChange>(*this, Parts{.shell = {}, .core = std::move(fallback_core_), .fsm = {}});
+  fallback_->be_fallback();
+  spare_ = fallback_->core();
+  fallback_->prepare();
+  task_.set_fallback(fallback_.get());
+}
+
+void Component::check_fallback(const Shell& shell, const FsmBase& fsm) const {
+  if (spare_ == nullptr) return;
+  if (spare_->accepts(shell) && fsm.bind_core(*spare_).is_bound()) return;
+  throw Error(ErrorCode::type_mismatch, "the fallback core would not suit the new parts",
+              {.component = name_,
+               .element = "fallback " + fallback_name_,
+               .expected = "a core for " + shell.description() + " and " + fsm.description(),
+               .remedy = "remove the component and add one with another fallback, in one transaction"});
+}
+
+void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
+  task_.set_fallback(nullptr);
+  spare_ = nullptr;
+  if (fallback_ != nullptr && !fallback_->was_taken()) out = fallback_->give_back_core();
+  fallback_.reset();
+  if (out == nullptr || fallback_name_.empty() || out->implementation() != fallback_name_) return;
+  out->cleanup();
+  fallback_core_ = std::move(out);
+  prepare_fallback();
+  if (task_.has_thread()) prefault_allocated();
+}
+
+void Component::update_listening(const FsmBase& fsm) {
+  for (const auto& state : fsm.states()) {
+    if (state->event == nullptr) continue;
+    state->event->set_task(task_);
+    state->event->listen();
+  }
+}
+
+void Component::stop_listening() noexcept {
+  for (const auto& state : parts_.fsm->states()) {
+    if (state->event != nullptr) state->event->stop_listening();
+  }
+}
+
+bool Component::uses(const Resource& resource) const {
+  const auto& ports = parts_.shell->ports();
+  return std::any_of(ports.begin(), ports.end(), [&resource](const auto& port) {
+    return port->is_connected() && port->service()->resource() == &resource;
+  });
+}
+
+void Component::configure_anew() {
+  require_parked("configure");
+  cleanup();
+  configure();
+}
+
+void Component::check_cleanup() const { require_parked("cleanup"); }
+
+void Component::cleanup_hook() {
+  task_.set_fallback(nullptr);
+  spare_ = nullptr;
+  if (fallback_ != nullptr) {
+    // After a fault the declared core is the one that is out: it gets another chance.
+    fallback_core_ = fallback_->give_back_core();
+    if (fallback_->was_taken()) std::swap(fallback_core_, parts_.core);
+    core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
+    fallback_.reset();
+    fallback_core_->cleanup();
+  }
+  binding_ = {};
+  parts_.core->cleanup();
+  parts_.fsm->cleanup();
+  parts_.shell->cleanup();
+  task_.set_state(ComponentState::unconfigured);
+}
+
+}  // namespace mauve

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Who conducts commits, and the ordinary thread's side of one.
+#include <algorithm>
+#include <mutex>
+#include <stdexcept>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/run/commit.hpp"
+#include "mauve_rt/run/task.hpp"
+
+#include "base/thread_attributes.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr int kConductorPriority = 99;
+constexpr std::size_t kConductorStackBytes = std::size_t{128} * 1024;
+
+void check_state(const Task& task) {
+  switch (task.state()) {
+    case ComponentState::stopping:
+      task.throw_state_running("the component is STOPPING", 0, "try again when it has stopped");
+    case ComponentState::faulted:
+      throw Error(ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
+                  {.component = task.name(),
+                   .remedy = task.is_parked() ? Task::kRepairRemedy : Task::kLeftBehindRemedy});
+    default:
+      return;
+  }
+}
+
+/// Keeps condemned threads from coming back while their components are being removed; once they are, for ever.
+class Claims {
+ public:
+  explicit Claims(Commit& commit) noexcept : commit_(commit) {
+    for (Participant& place : commit_.participants()) {
+      place.left_behind = place.afterwards == Afterwards::stop && place.task->claim();
+    }
+  }
+  ~Claims() {
+    for (const Participant& place : commit_.participants()) {
+      if (!place.left_behind) continue;
+      if (commit_.committed()) {
+        place.task->abandon();
+      } else {
+        place.task->give_up_claim();
+      }
+    }
+  }
+  Claims(const Claims&) = delete;
+  Claims& operator=(const Claims&) = delete;
+
+ private:
+  Commit& commit_;
+};
+
+}  // namespace
+
+Conductor::Conductor() {
+  ThreadAttributes attributes(kConductorStackBytes, kConductorPriority);
+  const int result = start_thread(thread_, attributes, &Conductor::entry, this);
+  if (result != 0) throw Error(ErrorCode::internal, "the system refuses the conductor's thread");
+  pthread_setname_np(thread_, "conductor");
+}
+
+Conductor::~Conductor() {
+  order_.store(kEnd, std::memory_order_release);
+  futex_wake_all(order_);
+  pthread_join(thread_, nullptr);
+}
+
+void* Conductor::entry(void* self) noexcept {
+  static_cast<Conductor*>(self)->run();
+  return nullptr;
+}
+
+void Conductor::run() noexcept {
+  for (;;) {
+    const std::uint32_t order = order_.load(std::memory_order_acquire);
+    if (order == kEnd) return;
+    if (order == kNone) {
+      futex_wait_until(order_, kNone, kForever);
+      continue;
+    }
+    order_.store(kNone, std::memory_order_relaxed);  // relaxed: the next order comes only after finished_
+    mauve::conduct(*commit_, timeout_ns_);
+    finished_.store(1, std::memory_order_release);
+    futex_wake_all(finished_);
+  }
+}
+
+void Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
+  commit_ = &commit;
+  timeout_ns_ = timeout_ns;
+  finished_.store(0, std::memory_order_relaxed);  // relaxed: the order publishes it
+  under_way_.lend(commit);
+  order_.store(kConduct, std::memory_order_release);
+  futex_wake_all(order_);
+  while (finished_.load(std::memory_order_acquire) == 0) futex_wait_until(finished_, 0, kForever);
+  under_way_.recall(kForever);
+}
+
+void Conductor::make_alone(Commit& commit) noexcept {
+  under_way_.lend(commit);
+  commit.make_alone();
+  under_way_.recall(kForever);
+}
+
+void Conductor::withdraw() noexcept {
+  under_way_.use([](Commit& commit) {
+    commit.hurry();
+    commit.call_off(Commit::Off::shut_down);
+  });
+}
+
+void conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
+  constexpr time_ns_t kLook = ms_to_ns(20);  // only while an adopt or take lasts
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  for (Participant* place : commit.in_order()) {
+    if (place->in_flight) place->task->post(*place);
+  }
+  if (!commit.wait_settled(until)) commit.call_off(Commit::Off::timed_out);
+  for (Participant& place : commit.participants()) {
+    while (place.in_flight && !place.task->retract(monotonic_now_ns() + kLook)) {
+      if (monotonic_now_ns() < commit.patience_ends_ns(until)) continue;
+      if (commit.abandon() && commit.maker() == &place)
+        break;  // its place is empty; it comes back from there or not
+    }
+  }
+}
+
+namespace {
+
+/// Whose adopt or take it was that did not end, and on whose thread. That component is given up; those that waited for
+/// its take are as well, as nobody knows what they are made of now.
+[[noreturn]] void give_up(Commit& commit) {
+  Task& stuck = *commit.maker()->task;
+  const CommitAction* action = commit.under_way();
+  const std::string whose = action->task != nullptr ? action->task->name() : stuck.name();
+  const std::string call = commit.is_taking() ? "take" : "adopt";
+  const std::string what =
+      call + " of " + whose + "'s new part does not end, on the thread of " + stuck.name();
+  for (Participant& place : commit.participants()) {
+    if (place.task == &stuck || (commit.is_taking() && place.in_flight)) {
+      place.task->condemn(what, place.task->clock().now_ns());
+    }
+  }
+  throw Error(
+      ErrorCode::faulted, what,
+      {.component = stuck.name(),
+       .found = std::string(to_string(stuck.state())),
+       .remedy = "remove the component, and add it anew; " +
+                 std::string(commit.is_taking() ? "what is changed is not known" : "nothing was changed")});
+}
+
+/// Who was never at the gate, or is still in a long state; nullptr: all came, but never together.
+const Participant* one_still_running(Commit& commit, time_ns_t timeout_ns) {
+  for (const Participant& place : commit.participants()) {
+    if (place.in_flight && !place.came.load(std::memory_order_relaxed)) return &place;
+  }
+  for (const Participant& place : commit.participants()) {
+    if (!place.in_flight || place.arrived.load(std::memory_order_relaxed)) continue;
+    const StateAge age = place.task->state_age();
+    if (!age.is_wait && age.age_ns > timeout_ns / 2) return &place;
+  }
+  return nullptr;
+}
+
+[[noreturn]] void throw_timeout(Commit& commit, time_ns_t timeout_ns) {
+  if (const Participant* running = one_still_running(commit, timeout_ns)) {
+    running->task->throw_state_running("the component did not reach a wait in time; nothing was changed",
+                                       timeout_ns, "try again, or allow a longer commit timeout");
+  }
+  for (const Participant& place : commit.participants()) {
+    if (!place.in_flight || commit.declared_ns() == 0 || place.passed.load(std::memory_order_relaxed) == 0)
+      continue;
+    throw Error(
+        ErrorCode::timeout, "the declared budget fits in no wait of the component; nothing was changed",
+        {.component = place.task->name(),
+         .element = "budget_ns",
+         .expected = "less than what is left of a wait",
+         .found = std::to_string(commit.declared_ns() / 1000) + " us for adopt and take of all new cores",
+         .remedy = "declare a shorter budget, or allow releases to be missed (max_missed)"});
+  }
+  throw Error(ErrorCode::timeout, "the components were never in their waits together; nothing was changed",
+              {.remedy = "allow a longer commit timeout, or some releases to be missed (max_missed)"});
+}
+
+[[noreturn]] void throw_withdrawn(const Task* by) {
+  ErrorDetail detail{.element = "state", .remedy = "look at the architecture again, then decide again"};
+  if (by != nullptr) {
+    detail.component = by->name();
+    detail.found = std::string(to_string(by->state()));
+  }
+  throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
+              detail);
+}
+
+/// How long an adopt took, in place of what it would have thrown.
+[[noreturn]] void throw_late_adopt(const CommitAction& action) {
+  const bool is_declared = action.declared_ns() != 0;
+  throw std::runtime_error("it took " + std::to_string(action.adopt_ns / 1000) + " us, and its " +
+                           (is_declared ? "declared budget is " : "budget is reckoned at ") +
+                           std::to_string(action.budget_ns() / 1000) + " us");
+}
+
+/// Throws what a commit that was called off, or whose adopt was late, is to answer.
+void throw_if_off(Commit& commit, time_ns_t timeout_ns) {
+  switch (commit.off()) {
+    case Commit::Off::withdrawn:
+      throw_withdrawn(commit.off_by());
+    case Commit::Off::shut_down:
+      throw Error(ErrorCode::wrong_revision, "the architecture is being shut down; nothing was changed",
+                  {.remedy = "deploy it again first"});
+    case Commit::Off::timed_out:
+    case Commit::Off::overran:
+      // A look at the states, which is no component's, was merely the last thing done before it was called off.
+      if (commit.refused_by() != nullptr && commit.refused_by()->task != nullptr)
+        throw_late_adopt(*commit.refused_by());
+      throw_timeout(commit, timeout_ns);
+    case Commit::Off::not_yet:
+      if (commit.adopt_was_late()) throw_late_adopt(*commit.refused_by());
+  }
+}
+
+}  // namespace
+
+bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
+  // Whoever commands two tasks takes them in the order of their numbers, so that no two wait for each other.
+  commit.order_participants();
+  std::vector<Task*> tasks;
+  for (const Participant& place : commit.participants()) tasks.push_back(place.task);
+  std::sort(tasks.begin(), tasks.end(),
+            [](const Task* a, const Task* b) { return a->number() < b->number(); });
+  std::vector<std::unique_lock<std::mutex>> locks;
+  locks.reserve(tasks.size());
+  for (Task* task : tasks) locks.emplace_back(task->command_mutex());
+
+  const Claims claims(commit);
+  std::uint32_t running = 0;
+  for (Participant& place : commit.participants()) {
+    if (place.afterwards != Afterwards::stop && !place.repairs) check_state(*place.task);
+    place.in_flight = !place.left_behind && !place.task->is_parked();
+    if (place.in_flight && !place.task->is_simulated()) ++running;
+  }
+  commit.expect(running);
+  if (running == 0) {
+    for (Participant& place : commit.participants()) place.task->hold_parked(place);
+    if (conductor != nullptr) {
+      conductor->make_alone(commit);
+    } else {
+      commit.make_alone();
+    }
+  } else if (conductor != nullptr) {
+    conductor->conduct(commit, timeout_ns);
+  } else {
+    commit.call_off(Commit::Off::shut_down);  // a task left behind by a host that is no more
+  }
+  if (commit.is_abandoned()) give_up(commit);
+  for (Participant& place : commit.participants()) {
+    if (!place.in_flight || place.task->is_simulated()) place.task->finish_parked(place, commit.committed());
+  }
+  throw_if_off(commit, timeout_ns);
+  if (commit.refusal()) std::rethrow_exception(commit.refusal());
+  return commit.committed();
+}
+
+}  // namespace mauve

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The commands of a task, given by ordinary threads. What its own thread does is in task_thread.cpp.
+#include "mauve_rt/run/task.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <thread>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// An instant that a thread can still be woken for in time.
+constexpr time_ns_t kStartMargin = us_to_ns(200);
+/// For a lock that a commit may hold for long.
+constexpr std::chrono::microseconds kBetweenTries{500};
+/// What lasts for so many periods, and so long, is told as hung where no other figure was set.
+constexpr std::int64_t kHungPeriods = 10;
+constexpr time_ns_t kHungAtLeast = s_to_ns(1);
+
+/// Room for what a component with this period writes while nobody drains: at most 3 MiB.
+std::size_t ring_capacity(time_ns_t period_ns) {
+  constexpr time_ns_t kUndrained = ms_to_ns(100);
+  constexpr time_ns_t kRecordsPerRelease = 16;
+  constexpr time_ns_t kMost = 65'536;
+  if (period_ns <= 0) return TraceRing::kDefaultCapacity;
+  const time_ns_t wanted = kUndrained / period_ns * kRecordsPerRelease;
+  return std::max(TraceRing::kDefaultCapacity, static_cast<std::size_t>(std::min(wanted, kMost)));
+}
+
+std::string over_bound(time_ns_t bound_ns) {
+  return "the state ran longer than its declared " + std::to_string(bound_ns / us_to_ns(1)) + " us";
+}
+
+}  // namespace
+
+std::string_view to_string(ComponentState state) noexcept {
+  switch (state) {
+    case ComponentState::unconfigured:
+      return "UNCONFIGURED";
+    case ComponentState::stopped:
+      return "STOPPED";
+    case ComponentState::running:
+      return "RUNNING";
+    case ComponentState::held:
+      return "HELD";
+    case ComponentState::stopping:
+      return "STOPPING";
+    case ComponentState::faulted:
+      return "FAULTED";
+  }
+  return "UNCONFIGURED";
+}
+
+void ChangeSignal::bump() noexcept {
+  word.fetch_add(1, std::memory_order_release);  // release: who sees the bump sees the change
+  futex_wake_all(word);
+  if (ChangeSignal* other = listener.load(std::memory_order_acquire)) other->bump();
+}
+
+Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
+    : name_(std::move(name)), number_(number), changes_(changes), clock_(&MonotonicClock::instance()) {}
+
+Task::~Task() { end_thread(kForever); }
+
+void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
+  shell_ = &shell;
+  fsm_ = &fsm;
+  core_ = core;
+  period_ns_.store(period_ns, std::memory_order_relaxed);
+  context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
+  // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
+  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
+}
+
+time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
+  const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
+  reference_ns_.store(first_ns, std::memory_order_relaxed);
+  return first_ns;
+}
+
+void Task::set_state(ComponentState state) noexcept { publish_state(state); }
+
+void Task::swap_fault(FaultNote& note) noexcept {
+  const std::lock_guard lock(fault_mutex_);
+  std::swap(fault_, note);
+}
+
+void Task::clear_fault() noexcept {
+  FaultNote none;
+  swap_fault(none);
+  fallen_back_.store(false, std::memory_order_release);
+}
+
+Fault Task::fault() const {
+  FaultNote note;
+  {
+    const std::lock_guard lock(fault_mutex_);
+    note = fault_;
+  }
+  if (note.when_ns == 0) return {};
+  Fault fault{.what = note.what != nullptr ? *note.what : over_bound(note.bound_ns),
+              .where = TraceNames::word(note.where),
+              .when_ns = note.when_ns};
+  if (outputs_.load(std::memory_order_acquire) != kAllWritten)
+    fault.what += "; an output is not written yet, for its resource is locked";
+  return fault;
+}
+
+std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
+
+StateAge Task::state_age() const {
+  time_ns_t hung_after_ns = settings_.hung_after_ns;
+  if (hung_after_ns == 0) {
+    const time_ns_t period = context_.period_ns.load(std::memory_order_relaxed);
+    hung_after_ns = std::max(kHungAtLeast, kHungPeriods * std::min(period, kForever / kHungPeriods));
+  }
+  const std::optional<PresentState::Fact> fact = present_.look();
+  if (!fact) return {.state = current_state(), .hung_after_ns = hung_after_ns};  // it changes this moment
+  return {.state = TraceNames::word(fact->name),
+          .age_ns = fact->since_ns == 0 ? 0 : std::max<time_ns_t>(0, clock_->now_ns() - fact->since_ns),
+          .bound_ns = fact->bound_ns,
+          .hung_after_ns = hung_after_ns,
+          .is_wait = fact->is_wait};
+}
+
+void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped) {
+  const std::lock_guard lock(ring_mutex_);
+  if (ring_ == nullptr) return;
+  ring_->drain(into);
+  written = ring_->offered();
+  dropped = ring_->dropped();
+}
+
+std::unique_ptr<TraceRing> Task::release_ring() {
+  const std::lock_guard lock(ring_mutex_);
+  return std::move(ring_);
+}
+
+void Task::begin_trace(bool trace) {
+  const std::lock_guard lock(ring_mutex_);
+  if (!trace) {
+    ring_.reset();
+  } else if (ring_ == nullptr) {
+    const std::size_t wanted = settings_.trace_records;
+    ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid().period_ns));
+  }
+  if (ring_ != nullptr) ring_->set_clock(simulated_ ? clock_ : nullptr);
+}
+
+void Task::simulate(const Clock& clock, bool trace) {
+  simulated_ = true;
+  clock_ = &clock;
+  begin_trace(trace);
+}
+
+void Task::end_simulation() noexcept {
+  if (!simulated_) return;
+  clock_->leave(*this);
+  simulated_ = false;
+  clock_ = &MonotonicClock::instance();
+  if (ring_ != nullptr) ring_->set_clock(nullptr);
+}
+
+bool Task::end_thread(time_ns_t until_ns) noexcept {
+  std::unique_lock lock(command_mutex_, std::defer_lock);
+  // Tried again and again: ThreadSanitizer does not know the timed lock of the monotonic clock.
+  while (!lock.try_lock()) {
+    if (monotonic_now_ns() >= until_ns) return false;
+    std::this_thread::sleep_for(kBetweenTries);
+  }
+  if (!has_thread_) return true;
+  control_.fetch_or(kStop | kExit, std::memory_order_acq_rel);
+  futex_wake_all(control_);
+  if (is_abandoned()) until_ns = 0;
+  while (ended_.load(std::memory_order_acquire) == 0) {
+    if (!futex_wait_until(ended_, 0, until_ns) && ended_.load(std::memory_order_acquire) == 0) return false;
+  }
+  if (outputs_.load(std::memory_order_acquire) == kWriting) return false;
+  pthread_join(thread_, nullptr);
+  if (watchdog_ != nullptr) watchdog_->forget(*this);
+  watchdog_.reset();
+  has_thread_.store(false, std::memory_order_release);
+  control_.store(0, std::memory_order_relaxed);  // relaxed: no thread is left to race with
+  return true;
+}
+
+void Task::detach_thread() noexcept {
+  if (has_thread_) pthread_detach(thread_);
+}
+
+void Task::start_at(time_ns_t instant_ns) {
+  const std::lock_guard lock(command_mutex_);
+  post_start(instant_ns);
+}
+
+void Task::post_start(time_ns_t instant_ns) noexcept {
+  start_at_ns_ = instant_ns;
+  started_.store(0, std::memory_order_relaxed);  // relaxed: kStart publishes it
+  {
+    const std::lock_guard lock(order_mutex_);
+    // A stop bit that came too late for the last run must not end this one: store, not or.
+    control_.store(kStart, std::memory_order_release);
+  }
+  if (simulated_) return resume();
+  futex_wake_all(control_);
+}
+
+void Task::start(std::optional<time_ns_t> clock_ns) {
+  if (is_called_from_own_state()) require_startable();  // refused without the lock, as in stop()
+  const std::lock_guard lock(command_mutex_);
+  require_startable();
+  post_start(next_instant(clock_ns));
+  wait_started();
+}
+
+void Task::require_startable() const {
+  switch (state()) {
+    case ComponentState::stopped:
+      break;
+    case ComponentState::unconfigured:
+      throw Error(ErrorCode::not_configured, "the component is not configured",
+                  {.component = name_, .remedy = "configure it first"});
+    case ComponentState::faulted:
+      throw Error(ErrorCode::faulted, "the component is FAULTED: " + fault().what,
+                  {.component = name_, .remedy = is_parked() ? kRepairRemedy : kLeftBehindRemedy});
+    default:
+      throw Error(ErrorCode::already_running, "the component is running already",
+                  {.component = name_, .expected = "STOPPED", .found = std::string(to_string(state()))});
+  }
+  if (!core_->is_ready()) {
+    throw Error(ErrorCode::not_configured, "the core is not configured",
+                {.component = name_,
+                 .element = core_->core != nullptr ? core_->core->description() : "core",
+                 .expected = "a core that configure_core() has bound and configured",
+                 .remedy = "call configure_core() first"});
+  }
+  if (!has_thread_ && !simulated_) {
+    throw Error(ErrorCode::not_configured, "the component has no thread",
+                {.component = name_, .remedy = "deploy the architecture first"});
+  }
+}
+
+time_ns_t Task::next_instant(std::optional<time_ns_t> reference_ns) const noexcept {
+  const Grid own = grid();
+  const Grid wanted{.reference_ns = reference_ns.value_or(own.reference_ns), .period_ns = own.period_ns};
+  const time_ns_t earliest = clock_->now_ns() + kStartMargin + 1;
+  return wanted.first_not_before(std::max(earliest, wanted.reference_ns));
+}
+
+void Task::wait_started() noexcept {
+  // The thread itself says RUNNING; until then another command would find STOPPED. By a word of its own: a stop may
+  // have come since, and the state be STOPPED again.
+  while (started_.load(std::memory_order_acquire) == 0) futex_wait_until(started_, 0, kForever);
+}
+
+void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
+                               const std::string& remedy) const {
+  throw Error(ErrorCode::timeout, what,
+              {.component = name_,
+               .element = "state " + current_state(),
+               .expected = "the end of the state within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
+               .found = "still running",
+               .remedy = remedy});
+}
+
+/// The state and the bit go together: a stop that is late must not end the run that follows.
+void Task::order_stop() {
+  const std::lock_guard lock(order_mutex_);
+  auto seen = state_.load(std::memory_order_acquire);
+  while (settled(static_cast<ComponentState>(seen)) == ComponentState::running) {
+    // acq_rel: a fault in between wins
+    if (state_.compare_exchange_weak(seen, static_cast<std::uint32_t>(ComponentState::stopping),
+                                     std::memory_order_acq_rel)) {
+      seen = static_cast<std::uint32_t>(ComponentState::stopping);
+    }
+  }
+  if (static_cast<ComponentState>(seen) != ComponentState::stopping) {
+    throw Error(ErrorCode::not_running, "the component is not running",
+                {.component = name_,
+                 .expected = "RUNNING",
+                 .found = std::string(to_string(static_cast<ComponentState>(seen)))});
+  }
+  control_.fetch_or(kStop, std::memory_order_seq_cst);  // seq_cst: before the look for a commit
+}
+
+bool Task::is_called_from_own_state() const noexcept {
+  return of_this_thread() == this || (simulated_ && in_resume_);
+}
+
+void Task::stop(time_ns_t timeout_ns) {
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  order_stop();
+  changes_.bump();
+  if (is_called_from_own_state())
+    return;  // it takes effect when the state ends, for which nobody can wait here
+  withdraw_commit();
+  if (simulated_) resume();
+  futex_wake_all(control_);
+  // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
+  const auto is_going = [](std::uint32_t found) {
+    const auto state = static_cast<ComponentState>(found);
+    return state != ComponentState::stopped && state != ComponentState::faulted;
+  };
+  for (auto seen = state_.load(std::memory_order_acquire); is_going(seen);
+       seen = state_.load(std::memory_order_acquire)) {
+    if (futex_wait_until(state_, seen, until)) continue;
+    if (!is_going(state_.load(std::memory_order_acquire))) break;
+    throw_state_running("the stop stays pending", timeout_ns, "it takes effect when the state ends");
+  }
+  if (state() == ComponentState::faulted) {
+    throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault().what,
+                {.component = name_});
+  }
+}
+
+}  // namespace mauve

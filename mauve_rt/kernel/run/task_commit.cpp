@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A task's part in commits (commit.hpp).
+#include <pthread.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/run/task.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr int kTries = 3;
+constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without a change, the others missing
+
+}  // namespace
+
+void Task::post(Participant& place) noexcept {
+  place_.lend(place);
+  control_.fetch_or(kCommit, std::memory_order_seq_cst);
+  futex_wake_all(control_);
+  if (ended_.load(std::memory_order_seq_cst) != 0) withdraw_commit();  // nobody is left to refuse it
+}
+
+bool Task::retract(time_ns_t until_ns) noexcept {
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+  return place_.recall(until_ns);
+}
+
+void Task::withdraw_commit() noexcept {
+  place_.use([this](Participant& place) { place.commit->call_off(Commit::Off::withdrawn, this); });
+}
+
+/// With less time left than the change may take it is better made after the release that is due. A budget that is only
+/// reckoned puts it off some times, not for ever.
+time_ns_t Task::leaves_gate_at(const Participant& place) const noexcept {
+  const time_ns_t due = due_ns();
+  if (due == kForever) return kForever;
+  const Commit& commit = *place.commit;
+  const time_ns_t needed = deferrals_ < kTries ? commit.budget_ns() : commit.declared_ns();
+  return due + commit.may_miss(place) * grid().period_ns - needed;
+}
+
+bool Task::may_commit_now() noexcept {
+  if (left_gate_) return false;
+  const time_ns_t now = clock_->now_ns();
+  bool may = false;
+  place_.use([&](Participant& place) { may = now < std::min(due_ns(), leaves_gate_at(place)); });
+  return may;
+}
+
+/// A release while a commit is posted, in whose wait the budget did not fit.
+void Task::pass_commit() noexcept {
+  ++deferrals_;
+  place_.use([this](Participant& place) {
+    place.passed.store(static_cast<std::uint32_t>(deferrals_), std::memory_order_relaxed);
+    place.commit->note_came(place);
+  });
+}
+
+/// Throws when adopt and take of the new core took longer than it declared: the change is in, and its first fault.
+void Task::come_to_commit() {
+  place_.use([this](Participant& place) { visit(place); });
+  const time_ns_t took = std::exchange(overlong_ns_, 0);
+  if (took == 0 || waiting_ == nullptr) return;
+  throw std::runtime_error("adopt and take took " + std::to_string(took / 1000) +
+                           " us, longer than the new core declares (budget_ns)");
+}
+
+/// Not by a plain store: a watchdog's FAULTED, or a STOPPING, of this moment has to stay.
+void Task::exchange_state(ComponentState from, ComponentState to) noexcept {
+  auto expected = static_cast<std::uint32_t>(from);
+  state_.compare_exchange_strong(expected, static_cast<std::uint32_t>(to), std::memory_order_acq_rel);
+}
+
+void Task::visit(Participant& place) noexcept {
+  Commit& commit = *place.commit;
+  const time_ns_t due = due_ns();
+  place.parked_ns = clock_->now_ns();
+  place.pending_ns = due;
+  place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
+  place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid().period_ns;
+  place.arrived.store(true, std::memory_order_relaxed);
+  exchange_state(ComponentState::running, ComponentState::held);
+  begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
+  const Commit::Answer answer = commit.meet(place);
+  if (answer == Commit::Answer::abandoned || !end_execution()) {
+    is_abandoned_ = true;
+    return;
+  }
+  exchange_state(ComponentState::held, ComponentState::running);
+  if (answer == Commit::Answer::left) {
+    left_gate_ = true;
+    place.arrived.store(false, std::memory_order_relaxed);
+    return go_on_unchanged(place);
+  }
+  deferrals_ = 0;
+  left_gate_ = false;
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+  if (answer == Commit::Answer::off) return go_on_unchanged(place);
+  overlong_ns_ = place.overlong_ns;
+  continue_after(place);
+  commit.gone_on(answer == Commit::Answer::made_it);
+}
+
+/// Instants that passed at the gate, or in adopt and take, are skipped whatever the overrun policy; returns how many.
+/// One that it was not to miss, and that has passed by less than a period, is released late as after any wait.
+std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
+  const time_ns_t period = grid().period_ns;
+  const time_ns_t late = now_ns - clock_ns();
+  if (!event_settled_ || period == 0 || late <= 0 || place.parked_ns > clock_ns()) return 0;
+  if (late < period && place.holds_until_ns == place.pending_ns) return 0;
+  const std::int64_t lost = (late + period - 1) / period;
+  set_clock_ns(clock_ns() + lost * period);
+  return lost;
+}
+
+void Task::go_on_unchanged(Participant& place) noexcept {
+  boundary_ns_ = clock_->now_ns();
+  const std::int64_t lost = skip_lost(place, boundary_ns_);
+  if (lost == 0) return;
+  place.lost += lost;
+  const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
+  trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
+  trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), kInVain, lost);
+}
+
+/// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
+time_ns_t Task::restart_instant(const Participant& place) const noexcept {
+  if (place.start_clock_ns) return next_instant(place.start_clock_ns);
+  const time_ns_t earliest =
+      event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
+  return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
+}
+
+void Task::continue_after(Participant& place) noexcept {
+  const Commit& commit = *place.commit;
+  const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
+  if (ring_ != nullptr) ring_->push_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
+  for (const CommitAction* action : commit.actions()) {
+    if (action->task != this || action->trace_id() == 0) continue;  // another component's, or a mere check
+    trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
+    if (commit.committed()) trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
+  }
+  const bool committed = commit.committed();
+  if (committed && place.epoch_ns != nullptr) {
+    place.shift_ns = resynchronise(*place.epoch_ns);
+    if (place.afterwards == Afterwards::go_on) trace_deployment();
+  }
+  if (committed && place.afterwards != Afterwards::stop) {
+    if (place.afterwards == Afterwards::restart) start_machine(restart_instant(place));
+    place.grid = grid();
+    place.grid_place_ns = grid_place_ns_;
+    if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
+      earlier->released.store(Participant::kSuperseded, std::memory_order_release);
+      futex_wake_all(earlier->released);
+    }
+  }
+  place.armed_ns = boundary_ns_ = clock_->now_ns();
+  const bool ends = committed && place.afterwards == Afterwards::stop;
+  const std::int64_t lost = ends ? 0 : skip_lost(place, place.armed_ns);
+  place.resumes_ns = due_ns();
+  trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
+  if (ends) park_stopped();
+}
+
+void Task::hold_parked(Participant& place) const noexcept {
+  place.parked_ns = place.armed_ns = clock_->now_ns();
+  if (place.in_flight) place.pending_ns = due_ns();
+}
+
+void Task::finish_parked(Participant& place, bool committed) noexcept {
+  if (place.in_flight) {
+    continue_after(place);
+    return clock_->due_changed(*this);
+  }
+  if (committed && place.epoch_ns != nullptr) join(*place.epoch_ns);
+  const bool can_start =
+      simulated_ || has_thread_;  // a shutdown may have come before the commit held the task
+  if (committed && can_start && place.afterwards == Afterwards::restart) {
+    post_start(next_instant(place.start_clock_ns));
+    wait_started();
+  }
+}
+
+/// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
+/// instants come closer together. Returns by how much: less than a period.
+time_ns_t Task::resynchronise(time_ns_t epoch_ns) noexcept {
+  join(epoch_ns);
+  const Grid now = grid();
+  if (now.period_ns == 0 || clock_ns() == kForever) return 0;
+  const time_ns_t initial_ns =
+      clock_ns() - grid_place_ns_;  // the initial state is entered there, or whole periods off
+  const time_ns_t shift = now.first_not_before(initial_ns) - initial_ns;
+  set_clock_ns(clock_ns() + shift);
+  return shift;
+}
+
+void Task::refuse_commit() noexcept {
+  if ((control_.load(std::memory_order_seq_cst) & kCommit) == 0) return;
+  withdraw_commit();
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+}
+
+void Task::leave_behind(std::shared_ptr<void> used) {
+  const std::lock_guard lock(fault_mutex_);
+  left_behind_.push_back(std::move(used));
+}
+
+bool Task::wait_release(const Participant& place, time_ns_t until_ns) noexcept {
+  while (place.released.load(std::memory_order_acquire) == 0) {
+    if (until_ns <= monotonic_now_ns() || !futex_wait_until(place.released, 0, until_ns)) break;
+  }
+  return place.released.load(std::memory_order_acquire) == Participant::kReleased;
+}
+
+void Task::forget_release(Participant& place) noexcept {
+  Participant* mine = &place;
+  // Out of the slot the machine cannot reach it any more; not in the slot, it has written it, or does this moment.
+  if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) return;
+  wait_release(place, kForever);
+}
+
+void Task::write_outputs(bool commit) noexcept {
+  for (const auto& port : shell_->ports()) {
+    const OutputOptions output = port->output();
+    if ((commit ? output.on_commit : output.on_stop) == OutputPolicy::set_zero) port->write_zero();
+  }
+}
+
+}  // namespace mauve

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What becomes of an execution that is over its bound: rule 11. The watchdog's side first, then the machine's.
+#include <pthread.h>
+
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/run/task.hpp"
+
+namespace mauve {
+
+time_ns_t Task::earliest_excess_ns() const noexcept {
+  if (const auto execution = execution_.look()) return execution->end_ns();
+  const time_ns_t bound = wait_bound_ns_.load(std::memory_order_relaxed);
+  if (bound == 0) return kForever;
+  const std::optional<PresentState::Fact> fact = present_.look();
+  if (!fact || !fact->is_wait || fact->since_ns == 0) return kForever;
+  return ExecutionWord::end_ns(fact->since_ns, bound);
+}
+
+bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
+  const auto execution = execution_.look();
+  if (!execution || !execution->is_over(now_ns) || !execution_.condemn(*execution)) return false;
+  carry_out_sentence({.bound_ns = execution->limit_ns, .when_ns = now_ns});
+  return true;
+}
+
+bool Task::condemn(std::string what, time_ns_t now_ns) {
+  const auto execution = execution_.look();
+  if (!execution) return false;
+  auto text = std::make_shared<const std::string>(std::move(what));
+  if (!execution_.condemn(*execution)) return false;
+  carry_out_sentence({.what = std::move(text), .when_ns = now_ns});
+  return true;
+}
+
+/// FAULTED first, so that whoever has to act can; then the processor for the others; then the outputs.
+void Task::carry_out_sentence(FaultNote note) noexcept {
+  note.where = current_.load(std::memory_order_relaxed);
+  swap_fault(note);
+  publish_state(ComponentState::faulted);
+  withdraw_commit();  // it cannot come to the gate any more
+  if (has_thread_.load(std::memory_order_acquire)) {
+    const sched_param ordinary{};
+    pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
+    demoted_ = true;
+  }
+  bool all_written = true;
+  for (const auto& port : shell_->ports()) port->close();
+  for (const auto& port : shell_->ports()) all_written &= port->make_safe(false);
+  if (!all_written) {
+    outputs_.store(kLeft, std::memory_order_release);
+    if (watchdog_ != nullptr) watchdog_->write_what_is_left();
+  }
+  execution_.sentence();
+}
+
+bool Task::take_outputs_left() noexcept {
+  std::uint32_t left = kLeft;
+  return outputs_.compare_exchange_strong(left, kWriting, std::memory_order_acq_rel);
+}
+
+bool Task::write_outputs_left() noexcept {
+  bool all_written = true;
+  // Relaxed: a hint. Where the thread holds no lock, none of its resources' locks is held for ever by it.
+  const bool may_wait = locks_held_ == nullptr || locks_held_->load(std::memory_order_relaxed) == 0;
+  for (const auto& port : shell_->ports()) all_written &= port->make_safe(may_wait);
+  outputs_.store(all_written ? kAllWritten : kLeft, std::memory_order_release);
+  futex_wake_all(outputs_);
+  if (all_written) changes_.bump();  // the fault's text is another one now
+  return all_written;
+}
+
+void Task::abandon() noexcept {
+  control_.fetch_or(kExit, std::memory_order_acq_rel);
+  std::uint32_t left = kLeft;
+  outputs_.compare_exchange_strong(left, kAllWritten, std::memory_order_acq_rel);
+  execution_.abandon();
+}
+
+/// The thread's way out of a condemned execution.
+void Task::park_condemned() noexcept {
+  if (execution_.come_back()) {
+    take_back_outputs();
+    return end_in_fault();
+  }
+  waiting_ = next_ = nullptr;  // removed meanwhile: kExit is set, and nobody is to hear of it
+  parked_.store(1, std::memory_order_release);
+}
+
+void Task::take_back_outputs() noexcept {
+  for (;;) {
+    std::uint32_t left = kLeft;
+    if (outputs_.compare_exchange_strong(left, kAllWritten, std::memory_order_acq_rel)) return;
+    if (left == kAllWritten) return;
+    futex_wait_until(outputs_, left, kForever);
+  }
+}
+
+void Task::regain_priority() noexcept {
+  if (!demoted_) return;
+  demoted_ = false;
+  if (!has_thread_ || facts_.policy != "SCHED_FIFO") return;
+  const sched_param own{.sched_priority = facts_.priority};
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &own);
+}
+
+}  // namespace mauve

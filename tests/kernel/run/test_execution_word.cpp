@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// One word decides each execution: it has ended, or it is condemned, never both and never neither.
+#include <random>
+
+#include "mauve_rt/run/execution_word.hpp"
+
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+TEST(ExecutionWord, CondemnsOnlyTheExecutionThatWasLookedAt) {
+  ExecutionWord word;
+  EXPECT_FALSE(word.look());
+  word.begin(100, 10);
+  const auto first = word.look();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(110, first->end_ns());
+  EXPECT_FALSE(first->is_over(110)) << "equality is on time";
+  EXPECT_TRUE(first->is_over(111));
+  EXPECT_TRUE(word.end());
+  word.begin(200, 10);
+  EXPECT_FALSE(word.condemn(*first)) << "it had ended";
+  EXPECT_TRUE(word.condemn(*word.look()));
+  EXPECT_FALSE(word.end());
+  EXPECT_FALSE(word.look()) << "nothing is left to condemn";
+}
+
+TEST(ExecutionWord, WhoRemovesAndWhoComesBackDecideByTheSameWord) {
+  ExecutionWord word;
+  word.begin(100, 10);
+  EXPECT_FALSE(word.claim()) << "it is not condemned";
+  EXPECT_TRUE(word.condemn(*word.look()));
+  word.sentence();
+  EXPECT_TRUE(word.claim());
+  word.give_up_claim();
+  EXPECT_TRUE(word.come_back());
+  EXPECT_FALSE(word.claim()) << "it has come back";
+  word.begin(200, 10);
+  EXPECT_TRUE(word.condemn(*word.look()));
+  word.sentence();
+  EXPECT_TRUE(word.claim());
+  word.abandon();
+  EXPECT_FALSE(word.come_back());
+}
+
+/// A thread executes, another one condemns, a third one removes now and then; each at random phases.
+TEST(ExecutionWord, EachExecutionHasOneEndWhateverThePhases) {
+  constexpr int kExecutions = 20'000;
+  ExecutionWord word;
+  std::atomic<int> condemned{0};
+  std::atomic<bool> over{false};
+  std::thread watchdog([&] {
+    std::minstd_rand random(1);
+    while (!over) {
+      const auto execution = word.look();
+      for (std::uint_fast32_t spins = random() % 50; spins > 0; --spins)
+        std::atomic_signal_fence(std::memory_order_seq_cst);
+      if (!execution || execution->began_ns % 7 != 0 || !word.condemn(*execution)) continue;
+      EXPECT_EQ(2 * execution->began_ns, execution->limit_ns) << "of one and the same execution";
+      condemned.fetch_add(1);
+      word.sentence();
+    }
+  });
+  std::thread remover([&] {
+    while (!over) {
+      if (word.claim()) word.give_up_claim();
+    }
+  });
+  std::minstd_rand random(2);
+  int found_out = 0;
+  for (int i = 1; i <= kExecutions; ++i) {
+    word.begin(i, 2 * i);
+    for (std::uint_fast32_t spins = random() % 200; spins > 0; --spins)
+      std::atomic_signal_fence(std::memory_order_seq_cst);
+    if (word.end()) continue;
+    ++found_out;
+    EXPECT_EQ(0, i % 7) << "condemned though nobody looked at this one";
+    EXPECT_TRUE(word.come_back());
+  }
+  over = true;
+  watchdog.join();
+  remover.join();
+  EXPECT_EQ(condemned, found_out) << "every condemnation is found by the thread, and nothing else";
+}
+
+}  // namespace
+}  // namespace mauve::testing
