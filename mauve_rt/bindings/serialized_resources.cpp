@@ -65,8 +65,8 @@ class SerializedResource : public Resource {
   TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
     if (message.size() > options_.max_bytes) return TryWrite::done;
     {
-      const std::unique_lock lock(mutex_, std::try_to_lock);
-      if (!lock.owns_lock()) return TryWrite::busy;
+      if (!mutex_.try_lock()) return TryWrite::busy;
+      const std::lock_guard lock(mutex_, std::adopt_lock);
       if (!put_in(message, time_ns)) return TryWrite::done;
     }
     written(time_ns);

@@ -16,10 +16,14 @@ namespace {
 static_assert(sizeof(std::atomic<std::uint32_t>) == sizeof(std::uint32_t),
               "the futex word is the atomic itself");
 
-long futex(const std::atomic<std::uint32_t>& word, int operation, std::uint32_t value,
-           const timespec* until) noexcept {
-  return syscall(SYS_futex, reinterpret_cast<const std::uint32_t*>(&word), operation, value, until, nullptr,
-                 FUTEX_BITSET_MATCH_ANY);
+/// Returns 0, or the error's number.
+int futex(const std::atomic<std::uint32_t>& word, int operation, std::uint32_t value, const timespec* until)
+    MAUVE_RT {
+  // The one call of the system that [rt] allows.
+  return MAUVE_RT_TRUSTED(syscall(SYS_futex, reinterpret_cast<const std::uint32_t*>(&word), operation, value,
+                                  until, nullptr, FUTEX_BITSET_MATCH_ANY) >= 0
+                              ? 0
+                              : errno);
 }
 
 }  // namespace
@@ -29,10 +33,10 @@ bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expe
   const timespec until{.tv_sec = until_ns / s_to_ns(1), .tv_nsec = until_ns % s_to_ns(1)};
   for (;;) {
     // FUTEX_WAIT_BITSET: the timeout is an absolute instant of CLOCK_MONOTONIC
-    if (futex(word, FUTEX_WAIT_BITSET_PRIVATE, expected, until_ns == kForever ? nullptr : &until) == 0)
-      return true;
-    if (errno == ETIMEDOUT) return false;
-    if (errno != EINTR) return true;  // EAGAIN: the word had changed already
+    const int error =
+        futex(word, FUTEX_WAIT_BITSET_PRIVATE, expected, until_ns == kForever ? nullptr : &until);
+    if (error == ETIMEDOUT) return false;
+    if (error != EINTR) return true;  // 0: woken; EAGAIN: the word had changed already
   }
 }
 

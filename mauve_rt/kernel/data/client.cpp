@@ -56,7 +56,7 @@ CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) n
       count(refused, 0);
       return refused;
     }
-    put();
+    MAUVE_RT_TRUSTED(put());  // copies a message that lives in place; so does get()
     number = ++number_;
     is_posted_ = is_waiting_ = true;
     caller_ = caller;
@@ -70,7 +70,7 @@ CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) n
   CallOutcome outcome = outcome_;
   if (!has_ended)
     outcome = caller != nullptr && caller->is_to_stop() ? CallOutcome::stopped : CallOutcome::timed_out;
-  if (outcome == CallOutcome::answered) get();
+  if (outcome == CallOutcome::answered) MAUVE_RT_TRUSTED(get());
   count(outcome, monotonic_now_ns() - began);
   return outcome;
 }

@@ -85,7 +85,7 @@ void PortBase::swap(PortConnection& connection) noexcept {
   is_counted_ = true;
   if (connection.service != nullptr) connection.service->add_port();
   const std::lock_guard lock(shown_mutex_);
-  std::swap(connection_, connection);
+  MAUVE_RT_TRUSTED(std::swap(connection_, connection));  // moves: nothing is allocated, nothing freed
 }
 
 bool PortBase::make_safe(bool may_wait) noexcept {

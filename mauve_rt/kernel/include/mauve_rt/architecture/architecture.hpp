@@ -12,6 +12,7 @@
 
 #include "mauve_rt/architecture/change_lock.hpp"
 #include "mauve_rt/architecture/description.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/run/component.hpp"
@@ -43,7 +44,7 @@ struct ListChange {
   std::vector<Component*> changed{};
 };
 
-/// Components and resources by name. Ordinary threads. Every change is a transaction of one step or more, carried out
+/// Components and resources by name. All functions [non-rt] unless told. Every change is a transaction of one step or more, carried out
 /// by the host that runs the architecture, or by itself while nobody does; they are made one at a time.
 ///
 /// | member                          | written by            | read by | under                          |
@@ -146,11 +147,11 @@ class Architecture final : public Configurable {
     return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
   }
   /// The instant that all grids are counted from; 0 before deployment. [rt]
-  time_ns_t deployment_epoch_ns() const noexcept {
+  time_ns_t deployment_epoch_ns() const MAUVE_RT {
     return deployment_epoch_ns_.load(std::memory_order_relaxed);
   }
   /// By who deploys, and by a commit that resynchronises: now + kDeploymentLead. [rt]
-  void set_deployment_epoch(time_ns_t epoch_ns) noexcept {
+  void set_deployment_epoch(time_ns_t epoch_ns) MAUVE_RT {
     deployment_epoch_ns_.store(epoch_ns, std::memory_order_relaxed);
   }
 

@@ -25,8 +25,8 @@ struct ResourceParameters {
   time_ns_t timeout_ns{kDefaultCallTimeout};      // client
 };
 
-/// What the process knows how to make. Filled by libraries, asked by architectures. Ordinary threads, one at
-/// a time.
+/// What the process knows how to make. Filled by libraries, asked by architectures. One thread at a
+/// time. All functions [non-rt].
 class PluginRegistry {
  public:
   using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;

@@ -6,7 +6,7 @@
 
 namespace mauve {
 
-/// Something that is configured before use and cleaned up after. Ordinary threads only.
+/// Something that is configured before use and cleaned up after. All functions [non-rt].
 class Configurable {
  public:
   virtual ~Configurable() = default;

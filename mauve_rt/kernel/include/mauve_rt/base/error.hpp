@@ -7,10 +7,8 @@
 #include <string>
 #include <string_view>
 
-/// Tags that close the first doc line of every public function:
-///   [rt]      bounded, no allocation, no system call but a futex; may be called on a component thread
-///   [non-rt]  any thread but a component thread
-///   [setup]   only before the component is started
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 enum class ErrorCode : std::uint16_t {
@@ -51,7 +49,7 @@ enum class ErrorCode : std::uint16_t {
 };
 
 /// Name of a code as users read it, e.g. "unknown_port". [rt]
-std::string_view to_string(ErrorCode code) noexcept;
+std::string_view to_string(ErrorCode code) MAUVE_RT;
 
 /// Where an error happened and how to mend it; every field may be empty.
 struct ErrorDetail {
@@ -69,10 +67,11 @@ class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& what, ErrorDetail detail = {});
 
-  ErrorCode code() const noexcept { return code_; }
-  const ErrorDetail& detail() const noexcept { return detail_; }
+  /// [rt]
+  ErrorCode code() const MAUVE_RT { return code_; }
+  const ErrorDetail& detail() const MAUVE_RT { return detail_; }
   /// The bare statement, without where, expected, found and remedy. [rt]
-  const std::string& statement() const noexcept { return statement_; }
+  const std::string& statement() const MAUVE_RT { return statement_; }
 
  private:
   ErrorCode code_;

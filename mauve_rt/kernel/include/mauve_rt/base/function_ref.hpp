@@ -25,6 +25,7 @@ class FunctionRef<R(Args...)> {
           return (*static_cast<std::remove_reference_t<Callable>*>(object))(std::forward<Args>(args)...);
         }) {}
 
+  /// [rt] as far as the callable is.
   R operator()(Args... args) const { return call_(object_, std::forward<Args>(args)...); }
 
  private:

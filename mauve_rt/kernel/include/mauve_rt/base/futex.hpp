@@ -11,10 +11,10 @@ namespace mauve {
 
 /// Sleeps while the word holds `expected`, at most until the instant. [rt]
 /// Returns false at the instant, true when the word changed or a wake came (re-check the word).
-bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
-                      time_ns_t until_ns) noexcept;
+bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected, time_ns_t until_ns)
+    MAUVE_RT;
 
 /// Wakes every thread that sleeps on the word. [rt]
-void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept;
+void futex_wake_all(const std::atomic<std::uint32_t>& word) MAUVE_RT;
 
 }  // namespace mauve

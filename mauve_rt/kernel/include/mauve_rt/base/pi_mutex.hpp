@@ -7,6 +7,8 @@
 #include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 /// PTHREAD_PRIO_INHERIT mutex. Keep sections to a copy: a contended lock costs microseconds.
@@ -28,26 +30,26 @@ class PiMutex {
   PiMutex& operator=(const PiMutex&) = delete;
 
   /// Locks; a wait is traced with the holder and its duration. [rt]
-  void lock() noexcept;
+  void lock() MAUVE_RT;
   /// Locks if free. [rt]
-  bool try_lock() noexcept;
+  bool try_lock() MAUVE_RT;
   /// Unlocks. [rt]
-  void unlock() noexcept;
+  void unlock() MAUVE_RT;
 
   /// The name traced when the lock is contended. [setup]
   void set_trace_id(std::uint32_t id) noexcept { trace_id_ = id; }
   /// How many PiMutexes the calling thread holds; not 0 at a state boundary is a fault. [rt]
-  static int held_by_this_thread() noexcept;
+  static int held_by_this_thread() MAUVE_RT;
   /// The same for others to look at, while the calling thread lives. [rt]
-  static const std::atomic<int>& count_of_this_thread() noexcept;
+  static const std::atomic<int>& count_of_this_thread() MAUVE_RT;
   /// Unlocks what the calling thread has locked since it held so many. [rt]
-  static void let_go_of_all_but(int held) noexcept;
+  static void let_go_of_all_but(int held) MAUVE_RT;
   /// Whether the calling thread has, since the last call, taken a lock twice or let go of one it did not hold. [rt]
-  static bool was_misused_by_this_thread() noexcept;
+  static bool was_misused_by_this_thread() MAUVE_RT;
 
  private:
-  bool lock_contended() noexcept;
-  void note_holder() noexcept;
+  bool lock_contended() MAUVE_RT;
+  void note_holder() MAUVE_RT;
   void forget_held() noexcept;
 
   pthread_mutex_t mutex_;

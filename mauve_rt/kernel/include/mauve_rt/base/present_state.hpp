@@ -19,7 +19,8 @@ struct StateAge {
   time_ns_t hung_after_ns{0};  // an older state is told as hung
   bool is_wait{false};
 
-  bool is_hung() const noexcept { return age_ns > hung_after_ns; }
+  /// [rt]
+  bool is_hung() const MAUVE_RT { return age_ns > hung_after_ns; }
 };
 
 /// The state that a machine is in. One writer, the machine's thread; any number of readers, who cannot delay it.
@@ -39,7 +40,7 @@ class PresentState {
   };
 
   /// At every boundary of states. [rt] wait-free.
-  void tell(const Fact& fact) noexcept {
+  void tell(const Fact& fact) MAUVE_RT {
     since_ns_.store(kChanging, std::memory_order_release);
     bound_ns_.store(fact.bound_ns, std::memory_order_release);
     what_.store(fact.name | (fact.is_wait ? kWait : 0), std::memory_order_release);
@@ -48,7 +49,7 @@ class PresentState {
 
   /// Nothing when the state was changing at each of some looks. [rt] wait-free: who looks may be more urgent than the
   /// writer, and keep it from ending what it writes.
-  std::optional<Fact> look() const noexcept {
+  std::optional<Fact> look() const MAUVE_RT {
     constexpr int kAttempts = 100;
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const time_ns_t since_ns = since_ns_.load(std::memory_order_acquire);

@@ -11,6 +11,7 @@ struct RealtimeStatus {
   bool granted{true};
   std::vector<std::string> missing;  // one line a right: what, what it costs, how to grant it
 
+  /// [non-rt]
   void deny(std::string line);
 };
 
@@ -27,6 +28,7 @@ class RealtimeProcess {
   /// `priority`: the highest one needed. Throws Error (realtime_denied) when `require` and anything is
   /// denied.
   void acquire(int priority, bool require);
+  /// [non-rt]
   const RealtimeStatus& status() const noexcept { return status_; }
 
  private:

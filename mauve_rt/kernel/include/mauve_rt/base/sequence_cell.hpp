@@ -28,7 +28,7 @@ class SequenceCell {
 
  public:
   /// [rt] One thread at a time. Sequences count from 1, one by one.
-  void store(const T& value, time_ns_t time_ns, std::uint64_t sequence) noexcept {
+  void store(const T& value, time_ns_t time_ns, std::uint64_t sequence) MAUVE_RT {
     std::array<std::uint64_t, kWords> words{};
     std::memcpy(words.data(), &value, sizeof(T));
     version_.store(2 * sequence - 1, std::memory_order_release);
@@ -38,11 +38,11 @@ class SequenceCell {
   }
 
   /// Sequence of the last value that was written whole; 0 before the first. [rt] wait-free.
-  std::uint64_t sequence() const noexcept { return version_.load(std::memory_order_acquire) / 2; }
+  std::uint64_t sequence() const MAUVE_RT { return version_.load(std::memory_order_acquire) / 2; }
 
   /// The value's sequence, 0 when nothing was ever written; false, and nothing changed, when a write came in
   /// between. [rt] wait-free.
-  bool load(T& value, time_ns_t& time_ns, std::uint64_t& sequence) const noexcept {
+  bool load(T& value, time_ns_t& time_ns, std::uint64_t& sequence) const MAUVE_RT {
     const std::uint64_t before = version_.load(std::memory_order_acquire);
     if (before % 2 != 0) return false;
     const time_ns_t time = time_ns_.load(std::memory_order_acquire);

@@ -15,15 +15,15 @@ namespace mauve {
 class Maximum {
  public:
   /// [rt]
-  void record(time_ns_t value_ns) noexcept {
+  void record(time_ns_t value_ns) MAUVE_RT {
     if (value_ns > max_ns()) max_.store(value_ns, std::memory_order_relaxed);
     if (value_ns > recent_.load(std::memory_order_relaxed))
       recent_.store(value_ns, std::memory_order_relaxed);
   }
   /// [rt]
-  time_ns_t max_ns() const noexcept { return max_.load(std::memory_order_relaxed); }
+  time_ns_t max_ns() const MAUVE_RT { return max_.load(std::memory_order_relaxed); }
   /// Of the values since the last call; 0 when there was none. [rt]
-  time_ns_t take_recent_ns() const noexcept { return recent_.exchange(0, std::memory_order_relaxed); }
+  time_ns_t take_recent_ns() const MAUVE_RT { return recent_.exchange(0, std::memory_order_relaxed); }
 
  private:
   std::atomic<time_ns_t> max_{0};
@@ -35,7 +35,7 @@ class Maximum {
 class LatencyHistogram {
  public:
   /// [rt]
-  void record(time_ns_t latency_ns) noexcept;
+  void record(time_ns_t latency_ns) MAUVE_RT;
   /// The upper edge of the bucket that holds the quantile (0 to 1); 0 when empty. [non-rt]
   time_ns_t quantile_ns(double quantile) const noexcept;
   time_ns_t max_ns() const noexcept { return max_.max_ns(); }
@@ -52,21 +52,21 @@ class LatencyHistogram {
 class ExecutionTime {
  public:
   /// [rt]
-  void record(time_ns_t duration_ns) noexcept {
+  void record(time_ns_t duration_ns) MAUVE_RT {
     count_.store(count_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     total_.store(total_.load(std::memory_order_relaxed) + duration_ns, std::memory_order_relaxed);
     max_.record(duration_ns);
   }
   /// [rt]
-  std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
+  std::uint64_t count() const MAUVE_RT { return count_.load(std::memory_order_relaxed); }
   /// 0 when there was none. [rt]
-  time_ns_t mean_ns() const noexcept {
+  time_ns_t mean_ns() const MAUVE_RT {
     const std::uint64_t executions = count();
     return executions == 0 ? 0 : total_.load(std::memory_order_relaxed) / static_cast<time_ns_t>(executions);
   }
   /// [rt]
-  time_ns_t max_ns() const noexcept { return max_.max_ns(); }
-  const Maximum& maximum() const noexcept { return max_; }
+  time_ns_t max_ns() const MAUVE_RT { return max_.max_ns(); }
+  const Maximum& maximum() const MAUVE_RT { return max_; }
 
  private:
   std::atomic<std::uint64_t> count_{0};

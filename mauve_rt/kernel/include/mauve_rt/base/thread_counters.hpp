@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 /// Whose allocations the counters see. Counted are the C++ operators new of whatever is bound to libmauve_rt's;
@@ -20,7 +22,7 @@ enum class AllocationCounting : std::uint8_t {
 };
 
 /// "none", "some", "all" [rt]
-std::string_view to_string(AllocationCounting counting) noexcept;
+std::string_view to_string(AllocationCounting counting) MAUVE_RT;
 
 /// Found out by trying. [non-rt]
 AllocationCounting allocation_counting();
@@ -49,7 +51,7 @@ class ThreadCounters {
   void detach() noexcept;
 
   /// Calls of operator new. [rt]
-  std::uint64_t allocations() const noexcept { return allocations_.load(std::memory_order_relaxed); }
+  std::uint64_t allocations() const MAUVE_RT { return allocations_.load(std::memory_order_relaxed); }
   /// Page faults, minor and major; asked of the system, so that the thread itself pays nothing. [non-rt]
   std::uint64_t page_faults() const noexcept;
 

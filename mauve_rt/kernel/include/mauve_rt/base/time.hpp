@@ -5,15 +5,18 @@
 #include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 class Task;
 
 using time_ns_t = std::int64_t;
 
-constexpr time_ns_t us_to_ns(std::int64_t us) { return us * 1'000; }
-constexpr time_ns_t ms_to_ns(std::int64_t ms) { return ms * 1'000'000; }
-constexpr time_ns_t s_to_ns(std::int64_t s) { return s * 1'000'000'000; }
+/// [rt]
+constexpr time_ns_t us_to_ns(std::int64_t us) MAUVE_RT { return us * 1'000; }
+constexpr time_ns_t ms_to_ns(std::int64_t ms) MAUVE_RT { return ms * 1'000'000; }
+constexpr time_ns_t s_to_ns(std::int64_t s) MAUVE_RT { return s * 1'000'000'000; }
 
 /// An instant that never comes, and a length of time that never ends.
 inline constexpr time_ns_t kForever = INT64_MAX;
@@ -21,7 +24,7 @@ inline constexpr time_ns_t kForever = INT64_MAX;
 inline constexpr time_ns_t kLongest = INT64_MAX / 4;
 
 /// instant + length; kForever when that is later than there are instants. [rt]
-constexpr time_ns_t later_by(time_ns_t instant_ns, time_ns_t length_ns) noexcept {
+constexpr time_ns_t later_by(time_ns_t instant_ns, time_ns_t length_ns) MAUVE_RT {
   time_ns_t later = 0;
   if (!__builtin_add_overflow(instant_ns, length_ns, &later)) return later;
   return length_ns > 0 ? kForever : INT64_MIN;
@@ -32,17 +35,17 @@ class Clock {
  public:
   virtual ~Clock() = default;
   /// The present instant. [rt]
-  virtual time_ns_t now_ns() const noexcept = 0;
+  virtual time_ns_t now_ns() const MAUVE_RT = 0;
   /// Sleeps until the instant, or until the word no longer holds `expected`, whichever is first. [rt]
   /// Returns true when the instant was reached. Interrupted sleeps (EINTR) are resumed.
   virtual bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
-                           std::uint32_t expected) const noexcept = 0;
+                           std::uint32_t expected) const MAUVE_RT = 0;
   /// An execution state has ended that takes so much time where time is simulated: that passes by it. [rt]
-  virtual void spend(time_ns_t /*simulated_ns*/) const noexcept {}
+  virtual void spend(time_ns_t /*simulated_ns*/) const MAUVE_RT {}
   /// A simulated task waits for another instant now, or for none. [rt]
-  virtual void due_changed(Task& /*task*/) const noexcept {}
+  virtual void due_changed(Task& /*task*/) const MAUVE_RT {}
   /// A simulated task lives by this clock no longer. [rt]
-  virtual void leave(Task& /*task*/) const noexcept {}
+  virtual void leave(Task& /*task*/) const MAUVE_RT {}
 };
 
 /// CLOCK_MONOTONIC, with absolute futex waits.
@@ -52,13 +55,13 @@ class MonotonicClock final : public Clock {
   bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
                    std::uint32_t expected) const noexcept override;
   /// The process's one instance. [rt]
-  static const MonotonicClock& instance() noexcept;
+  static const MonotonicClock& instance() MAUVE_RT;
 };
 
 /// CLOCK_MONOTONIC now. [rt]
-time_ns_t monotonic_now_ns() noexcept;
+time_ns_t monotonic_now_ns() MAUVE_RT;
 /// CLOCK_REALTIME now. [rt]
-time_ns_t realtime_now_ns() noexcept;
+time_ns_t realtime_now_ns() MAUVE_RT;
 
 /// A component's grid: the instants reference + k * period.
 struct Grid {
@@ -66,9 +69,9 @@ struct Grid {
   time_ns_t period_ns{0};
 
   /// The first instant that is not before `earliest_ns` (period 0: the reference itself, or earliest). [rt]
-  time_ns_t first_not_before(time_ns_t earliest_ns) const noexcept;
+  time_ns_t first_not_before(time_ns_t earliest_ns) const MAUVE_RT;
   /// Signed distance of an instant from the nearest one of the grid. [rt]
-  time_ns_t phase_error(time_ns_t instant_ns) const noexcept;
+  time_ns_t phase_error(time_ns_t instant_ns) const MAUVE_RT;
 };
 
 }  // namespace mauve

@@ -85,11 +85,11 @@ class TraceRing {
 
   /// Records an event now, or at the time given; counted as dropped when the ring is full. [rt]
   void push(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
-            std::int64_t c = 0) noexcept {
+            std::int64_t c = 0) MAUVE_RT {
     push_at(clock_ == nullptr ? monotonic_now_ns() : clock_->now_ns(), kind, name, a, b, c);
   }
   void push_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0,
-               std::int64_t b = 0, std::int64_t c = 0) noexcept {
+               std::int64_t b = 0, std::int64_t c = 0) MAUVE_RT {
     const std::uint64_t head = head_.load(std::memory_order_relaxed);  // relaxed: only this thread writes it
     const std::uint64_t dropped = dropped_.load(std::memory_order_relaxed);
     if (head - seen_tail_ > mask_) [[unlikely]] {
@@ -111,7 +111,7 @@ class TraceRing {
   }
 
   /// Fetches the places that come next to the processor of the producer. [rt]
-  void warm_up() const noexcept {
+  void warm_up() const MAUVE_RT {
     constexpr std::uint64_t kPlaces = 16;
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     for (std::uint64_t at = head; at < head + kPlaces; ++at) __builtin_prefetch(&places_[at & mask_], 1);
@@ -124,7 +124,7 @@ class TraceRing {
   std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
   /// The ring of the calling thread, or nullptr where it is no component's. [rt]
-  static TraceRing* of_this_thread() noexcept { return detail::this_threads_ring; }
+  static TraceRing* of_this_thread() MAUVE_RT { return MAUVE_RT_TRUSTED(detail::this_threads_ring); }
   /// Called by the component's thread itself at its start. [setup]
   static void set_for_this_thread(TraceRing* ring) noexcept { detail::this_threads_ring = ring; }
 
@@ -140,15 +140,15 @@ class TraceRing {
 };
 
 /// Records an event of the user's own on the calling component's thread; nothing elsewhere. [rt]
-inline void trace_mark(std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
-                       std::int64_t c = 0) noexcept {
+inline void trace_mark(std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0, std::int64_t c = 0)
+    MAUVE_RT {
   if (TraceRing* ring = TraceRing::of_this_thread()) ring->push(TraceKind::mark, name, a, b, c);
 }
 
-/// Records begin and end of a service on the calling thread, also when it throws. [rt]
+/// Records begin and end of a service on the calling thread, also when it throws. All functions [rt].
 class ServiceSpan {
  public:
-  explicit ServiceSpan(std::uint32_t name) noexcept : name_(name), ring_(TraceRing::of_this_thread()) {
+  explicit ServiceSpan(std::uint32_t name) MAUVE_RT : name_(name), ring_(TraceRing::of_this_thread()) {
     if (ring_ != nullptr) ring_->push(TraceKind::service_begin, name_);
   }
   ~ServiceSpan() {

@@ -44,7 +44,7 @@ class TransactionStep {
   virtual void draft(Draft& draft) = 0;
 };
 
-/// A list of steps, taken in order; nothing happens before Host::commit or Architecture::commit. Ordinary threads.
+/// A list of steps, taken in order; nothing happens before Host::commit or Architecture::commit. All functions [non-rt].
 /// Parts are given by registered name or as objects; objects serve one commit.
 class Transaction {
  public:

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 /// At most N elements, stored in place; trivially copyable when T is. Not thread-safe. All functions [rt].
@@ -15,32 +17,32 @@ template <typename T, std::size_t N>
 class BoundedVector {
  public:
   using value_type = T;
-  static constexpr std::size_t capacity() noexcept { return N; }
+  static constexpr std::size_t capacity() MAUVE_RT { return N; }
 
-  std::size_t size() const noexcept { return size_; }
-  bool empty() const noexcept { return size_ == 0; }
-  bool full() const noexcept { return size_ == N; }
-  void clear() noexcept { size_ = 0; }
+  std::size_t size() const MAUVE_RT { return size_; }
+  bool empty() const MAUVE_RT { return size_ == 0; }
+  bool full() const MAUVE_RT { return size_ == N; }
+  void clear() MAUVE_RT { size_ = 0; }
   /// Appends; false (and unchanged) when full.
-  bool push_back(const T& value) noexcept {
+  bool push_back(const T& value) MAUVE_RT {
     if (full()) return false;
     items_[size_++] = value;
     return true;
   }
   /// Grows (with whatever the places hold) or shrinks; false when over the capacity.
-  bool resize(std::size_t size) noexcept {
+  bool resize(std::size_t size) MAUVE_RT {
     if (size > N) return false;
     size_ = static_cast<std::uint32_t>(size);
     return true;
   }
-  T& operator[](std::size_t i) noexcept { return items_[i]; }
-  const T& operator[](std::size_t i) const noexcept { return items_[i]; }
-  T* data() noexcept { return items_.data(); }
-  const T* data() const noexcept { return items_.data(); }
-  T* begin() noexcept { return items_.data(); }
-  T* end() noexcept { return items_.data() + size_; }
-  const T* begin() const noexcept { return items_.data(); }
-  const T* end() const noexcept { return items_.data() + size_; }
+  T& operator[](std::size_t i) MAUVE_RT { return items_[i]; }
+  const T& operator[](std::size_t i) const MAUVE_RT { return items_[i]; }
+  T* data() MAUVE_RT { return items_.data(); }
+  const T* data() const MAUVE_RT { return items_.data(); }
+  T* begin() MAUVE_RT { return items_.data(); }
+  T* end() MAUVE_RT { return items_.data() + size_; }
+  const T* begin() const MAUVE_RT { return items_.data(); }
+  const T* end() const MAUVE_RT { return items_.data() + size_; }
 
  private:
   std::uint32_t size_{0};
@@ -52,17 +54,17 @@ template <std::size_t N>
 class BoundedString {
  public:
   BoundedString() = default;
-  BoundedString(std::string_view text) noexcept { assign(text); }  // NOLINT: implicit like std::string
-  static constexpr std::size_t capacity() noexcept { return N; }
+  BoundedString(std::string_view text) MAUVE_RT { assign(text); }  // NOLINT: implicit like std::string
+  static constexpr std::size_t capacity() MAUVE_RT { return N; }
   /// Takes the text; false (and cut to N) when it is longer.
-  bool assign(std::string_view text) noexcept {
+  bool assign(std::string_view text) MAUVE_RT {
     size_ = static_cast<std::uint32_t>(std::min(text.size(), N));
     std::copy_n(text.data(), size_, text_.data());
     return text.size() <= N;
   }
-  std::string_view view() const noexcept { return {text_.data(), size_}; }
-  bool operator==(const BoundedString& other) const noexcept { return view() == other.view(); }
-  bool operator==(std::string_view other) const noexcept { return view() == other; }
+  std::string_view view() const MAUVE_RT { return {text_.data(), size_}; }
+  bool operator==(const BoundedString& other) const MAUVE_RT { return view() == other.view(); }
+  bool operator==(std::string_view other) const MAUVE_RT { return view() == other; }
 
  private:
   std::uint32_t size_{0};

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -25,7 +26,7 @@ enum class CallOutcome : std::uint8_t {
 };
 
 /// "answered", "no server", ... [rt]
-std::string_view to_string(CallOutcome outcome) noexcept;
+std::string_view to_string(CallOutcome outcome) MAUVE_RT;
 
 /// What MAUVE_CALL_TYPE specialises: `name`, the type's identity.
 template <typename S>

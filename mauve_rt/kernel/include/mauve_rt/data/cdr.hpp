@@ -15,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/bounded.hpp"
 
 static_assert(std::endian::native == std::endian::little,
@@ -43,7 +44,7 @@ inline constexpr bool kIsEmpty = std::tuple_size_v<decltype(TypeTraits<T>::field
 /// The encapsulation header of plain CDR, little-endian.
 inline constexpr std::array<std::byte, 4> kCdrHeader{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
 
-/// Serializes into a buffer that keeps its capacity between messages. [non-rt]
+/// Serializes into a buffer that keeps its capacity between messages. All functions [non-rt].
 class CdrWriter {
  public:
   explicit CdrWriter(std::vector<std::byte>& buffer) : buffer_(buffer) {
@@ -103,22 +104,22 @@ class CdrWriter {
 };
 
 /// Deserializes in place, without allocation; every getter returns false on a short or excessive message.
-/// [rt]
+/// All functions [rt].
 class CdrReader {
  public:
-  explicit CdrReader(std::span<const std::byte> data) : data_(data) {
+  explicit CdrReader(std::span<const std::byte> data) MAUVE_RT : data_(data) {
     ok_ = data.size() >= kCdrHeader.size() && data[1] == std::byte{1};
     position_ = kCdrHeader.size();
   }
 
   template <Primitive T>
-  bool get(T& value) {
+  bool get(T& value) MAUVE_RT {
     const std::byte* from = take(sizeof(T), sizeof(T));
     if (from != nullptr) std::memcpy(&value, from, sizeof(T));
     return ok_;
   }
   template <std::size_t N>
-  bool get(BoundedString<N>& value) {
+  bool get(BoundedString<N>& value) MAUVE_RT {
     std::uint32_t size = 0;
     if (!get(size)) return false;
     const std::byte* from = take(size, 1);
@@ -127,17 +128,17 @@ class CdrReader {
     return ok_ = value.assign({reinterpret_cast<const char*>(from), length});
   }
   template <typename T, std::size_t N>
-  bool get(std::array<T, N>& value) {
+  bool get(std::array<T, N>& value) MAUVE_RT {
     return get_items(std::span<T>(value));
   }
   template <typename T, std::size_t N>
-  bool get(BoundedVector<T, N>& value) {
+  bool get(BoundedVector<T, N>& value) MAUVE_RT {
     std::uint32_t size = 0;
     if (!get(size) || !value.resize(size)) return ok_ = false;
     return get_items(std::span<T>(value.data(), size));
   }
   template <Described T>
-  bool get(T& value) {
+  bool get(T& value) MAUVE_RT {
     if constexpr (kIsEmpty<T>) (void)take(1, 1);
     std::apply([&](auto... member) { (void)(get(value.*member) && ...); }, TypeTraits<T>::fields());
     return ok_;

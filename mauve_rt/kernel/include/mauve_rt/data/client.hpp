@@ -9,6 +9,7 @@
 
 #include "mauve_rt/base/function_ref.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -40,7 +41,8 @@ class ClientBase : public Resource {
   /// No call takes longer than `timeout_ns` (> 0; else Error: out_of_range).
   ClientBase(std::string type, time_ns_t timeout_ns);
 
-  time_ns_t timeout_ns() const noexcept { return timeout_ns_; }
+  /// [rt]
+  time_ns_t timeout_ns() const MAUVE_RT { return timeout_ns_; }
   ClientBase* client() noexcept override { return this; }
   void set_name(const std::string& name) override;
   /// [non-rt]
@@ -58,7 +60,7 @@ class ClientBase : public Resource {
 
  protected:
   /// One call: `put` writes the request, `get` copies the response, both under the mutex. [rt]
-  CallOutcome call(FunctionRef<void()> put, FunctionRef<void()> get) noexcept;
+  CallOutcome call(FunctionRef<void()> put, FunctionRef<void()> get) MAUVE_RT;
   /// `get` copies the request under the mutex; false when there is none. [non-rt]
   bool take_request(std::uint32_t& number, FunctionRef<void()> get);
   /// `put` writes the response under the mutex, if the call still waits. [non-rt]

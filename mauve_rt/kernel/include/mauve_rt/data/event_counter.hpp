@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/resource.hpp"
 
 namespace mauve {
@@ -29,7 +30,7 @@ enum class EventMessage : std::uint8_t {
 };
 
 /// The type's name. [rt]
-const char* type_of(EventMessage said) noexcept;
+const char* type_of(EventMessage said) MAUVE_RT;
 
 /// Services `raise` (event) and `read` (the count, with the time of the last raise), any number of each.
 /// Raises between two reads are not lost: the count says how many there were.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <type_traits>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/sequence_cell.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -55,7 +56,7 @@ class LatestRegister {
 
   /// Publishes a value, in at most `readers` + 2 looks for a free slot. [rt] One thread at a time.
   /// False, and nothing written, only when more readers than declared keep slots.
-  bool write(const T& value, time_ns_t time_ns) noexcept {
+  bool write(const T& value, time_ns_t time_ns) MAUVE_RT {
     const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written here only
     for (std::size_t i = next(newest); i != newest; i = next(i)) {
       Slot& slot = slots_[i];
@@ -75,7 +76,7 @@ class LatestRegister {
   }
 
   /// The newest entry as a port sees it; `fallback` when there is none. [rt] wait-free.
-  Sample<T> sample(const T& fallback, ReaderState& reader) noexcept {
+  Sample<T> sample(const T& fallback, ReaderState& reader) MAUVE_RT {
     if constexpr (kHasFront) {
       Sample<T> sample{.value = fallback};
       sample.status = read(sample.value, sample.time_ns, reader);
@@ -87,7 +88,7 @@ class LatestRegister {
     }
   }
   /// The same into a place of the caller's, untouched when there is none. [rt] wait-free.
-  DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+  DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     std::uint64_t sequence = 0;
     if constexpr (kHasFront) {
       if (!front_.load(value, time_ns, sequence)) [[unlikely]]
@@ -98,7 +99,7 @@ class LatestRegister {
     return sequence == 0 ? DataStatus::none : reader.look(sequence);
   }
   /// Gives back what the reader keeps. [rt] wait-free.
-  void let_go(std::uint32_t& held) noexcept {
+  void let_go(std::uint32_t& held) MAUVE_RT {
     if (held == 0) return;
     slots_[held - 1].released.fetch_add(1, std::memory_order_release);  // release: the copy is done
     held = 0;

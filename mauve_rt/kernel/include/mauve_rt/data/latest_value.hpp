@@ -44,7 +44,8 @@ class LatestValue final : public NewestResource {
     write_mutex_.set_trace_id(TraceNames::intern(name));
     serial_mutex_.set_trace_id(TraceNames::intern(name));
   }
-  std::uint32_t max_readers() const noexcept { return max_readers_; }
+  /// [rt]
+  std::uint32_t max_readers() const MAUVE_RT { return max_readers_; }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
@@ -84,8 +85,8 @@ class LatestValue final : public NewestResource {
     }
     TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
       {
-        const std::unique_lock lock(owner_.write_mutex_, std::try_to_lock);
-        if (!lock.owns_lock()) return TryWrite::busy;
+        if (!owner_.write_mutex_.try_lock()) return TryWrite::busy;
+        const std::lock_guard lock(owner_.write_mutex_, std::adopt_lock);
         if (!owner_.register_.write(value, time_ns)) return TryWrite::done;
       }
       owner_.written(time_ns);

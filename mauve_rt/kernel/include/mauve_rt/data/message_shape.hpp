@@ -35,7 +35,7 @@ struct MessageShape {
 };
 
 template <Described T>
-std::vector<FieldShape> field_shapes();
+std::vector<FieldShape> field_shapes();  // [non-rt]
 
 namespace detail {
 

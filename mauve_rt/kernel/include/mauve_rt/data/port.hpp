@@ -7,6 +7,7 @@
 #include <string>
 #include <type_traits>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/latest_register.hpp"
 #include "mauve_rt/data/port_base.hpp"
 
@@ -28,9 +29,9 @@ class ReadPort final : public PortBase {
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
-  Sample<T> read() noexcept { return is_previewed() ? read_ahead() : read_now(); }
+  Sample<T> read() MAUVE_RT { return is_previewed() ? read_ahead() : read_now(); }
   /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
-  DataStatus read(T& value, time_ns_t* time_ns = nullptr) noexcept {
+  DataStatus read(T& value, time_ns_t* time_ns = nullptr) MAUVE_RT {
     if (is_previewed()) [[unlikely]]
       return read_ahead(value, time_ns);
     time_ns_t time = reader_.time_ns;
@@ -41,9 +42,9 @@ class ReadPort final : public PortBase {
   }
 
   /// What the last read found, without reading; none before the first one. [rt]
-  DataStatus status() const noexcept { return is_previewed() ? stand_in<ReadPort>().status_ : status_; }
+  DataStatus status() const MAUVE_RT { return is_previewed() ? stand_in<ReadPort>().status_ : status_; }
   /// How old what the last read found is by the component's clock; 0 when there was nothing. [rt]
-  time_ns_t age_ns() const noexcept {
+  time_ns_t age_ns() const MAUVE_RT {
     if (is_previewed()) [[unlikely]]
       return stand_in<ReadPort>().age_ns();
     return status_ == DataStatus::none ? 0 : stamp_ns() - reader_.time_ns;
@@ -135,7 +136,7 @@ class WritePort final : public PortBase {
   }
 
   /// False when the resource had no room. [rt]
-  bool write(const T& value) noexcept {
+  bool write(const T& value) MAUVE_RT {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(value, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
@@ -181,7 +182,7 @@ class CallPort<R(Args...)> final : public PortBase {
   CallPort(std::string name, std::string type) : PortBase(std::move(name), PortKind::call, std::move(type)) {}
 
   std::vector<MessageShape> messages() const override { return message_shapes<Args...>(); }
-  /// Calls, traced. [rt] if the service is. Throws std::logic_error when not connected, which only a port that
+  /// Calls, traced. [rt] as far as the service is. Throws std::logic_error when not connected, which only a port that
   /// belongs to no component can be.
   R operator()(Args... args) {
     if (is_previewed()) [[unlikely]]
@@ -216,7 +217,7 @@ class EventPort final : public PortBase {
     return *this;
   }
   /// [rt]
-  void raise() noexcept {
+  void raise() MAUVE_RT {
     if (service_ != nullptr && !is_closed() && !is_previewed()) service_->raise(stamp_ns());
   }
 

@@ -12,6 +12,8 @@
 
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/this_thread.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -61,21 +63,23 @@ class PortBase {
   PortBase(const PortBase&) = delete;
   PortBase& operator=(const PortBase&) = delete;
 
-  const std::string& name() const noexcept { return name_; }
-  PortKind kind() const noexcept { return kind_; }
-  const std::string& type() const noexcept { return type_; }
+  /// [rt]
+  const std::string& name() const MAUVE_RT { return name_; }
+  PortKind kind() const MAUVE_RT { return kind_; }
+  const std::string& type() const MAUVE_RT { return type_; }
   /// As ServiceBase::representation(). [rt]
-  virtual std::string_view representation() const noexcept { return "C++"; }
+  virtual std::string_view representation() const MAUVE_RT { return "C++"; }
   /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
   virtual std::vector<MessageShape> messages() const { return {}; }
   /// Whether its component is configured only with it connected: call ports always, others unless optional. [rt]
-  bool is_required() const noexcept { return kind_ == PortKind::call || !optional_; }
+  bool is_required() const MAUVE_RT { return kind_ == PortKind::call || !optional_; }
   /// Lets it go unconnected; a call port stays required. [setup]
   void make_optional() noexcept { optional_ = true; }
-  bool is_connected() const noexcept { return connection().service != nullptr; }
+  /// [rt]
+  bool is_connected() const MAUVE_RT { return connection().service != nullptr; }
   /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
-  ServiceBase* service() const noexcept { return connection().service; }
-  const std::string& resource_name() const noexcept { return connection().resource; }
+  ServiceBase* service() const MAUVE_RT { return connection().service; }
+  const std::string& resource_name() const MAUVE_RT { return connection().resource; }
   /// Where it leads to, also while that is being changed. [non-rt]
   ConnectedTo connected_to() const;
 
@@ -86,13 +90,14 @@ class PortBase {
   PortConnection prepare(ServiceBase& service, const std::string& resource_name) const;
   /// Exchanges the connection for one made by this port's prepare(), or for none. [rt]
   /// The component is parked or held. What was read is forgotten; the caller frees what it gets.
-  void swap(PortConnection& connection) noexcept;
+  void swap(PortConnection& connection) MAUVE_RT;
 
   /// check, prepare and swap. [non-rt] The component is parked.
   /// Throws Error: type_mismatch, invalid_argument (the service takes no more ports).
   void connect(ServiceBase& service, const std::string& resource_name);
   /// [non-rt] The component is parked.
   void disconnect() noexcept;
+  /// [setup]
   void set_context(const Context* context) noexcept { context_ = context; }
 
   /// Until end_preview() the calling thread has a port of its own in place of this one, connected as told; all others
@@ -102,22 +107,22 @@ class PortBase {
   void end_preview() noexcept;
 
   /// Writes the type's default value; a port that is no write port does nothing. [rt]
-  virtual void write_zero() noexcept {}
+  virtual void write_zero() MAUVE_RT {}
   /// The same without waiting for a lock. [rt]
-  virtual TryWrite try_write_zero() noexcept { return TryWrite::done; }
-  virtual OutputOptions output() const noexcept { return {OutputPolicy::hold, OutputPolicy::hold}; }
+  virtual TryWrite try_write_zero() MAUVE_RT { return TryWrite::done; }
+  virtual OutputOptions output() const MAUVE_RT { return {OutputPolicy::hold, OutputPolicy::hold}; }
   /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
-  void close() noexcept { closed_.store(kClosed, std::memory_order_release); }
-  void reopen() noexcept {
+  void close() MAUVE_RT { closed_.store(kClosed, std::memory_order_release); }
+  void reopen() MAUVE_RT {
     is_safe_ = false;
     closed_.store(kOpen, std::memory_order_release);
   }
   /// Of a closed port: writes what `on_stop` says, once; waits for a lock only where the service cannot do without, and
   /// the caller allows it. [rt] Whether it is written.
-  bool make_safe(bool may_wait) noexcept;
+  bool make_safe(bool may_wait) MAUVE_RT;
   /// Its component is removed while a state of it still uses the port: gives up its place at the service, and swallows
   /// writes for good. The connection stays until disconnect(). [rt]
-  void leave_behind() noexcept;
+  void leave_behind() MAUVE_RT;
 
   /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
   virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
@@ -131,13 +136,13 @@ class PortBase {
   /// Whether a service of equal kind and type name is of the C++ type this port needs.
   virtual bool fits(const ServiceBase& service) const noexcept = 0;
   /// Lets go of the old service and takes the new one, which fits, or none. [rt]
-  virtual void attach(ServiceBase* service) noexcept = 0;
+  virtual void attach(ServiceBase* service) MAUVE_RT = 0;
   /// Another port of this type, for a preview; not connected.
   virtual std::unique_ptr<PortBase> make_stand_in() const = 0;
   bool is_previewed() const noexcept {
     // Relaxed: only the thread that stored its own id here finds it, and that one has made the stand-in itself.
     const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
-    return previewer != kNobody && pthread_equal(previewer, pthread_self()) != 0;
+    return previewer != kNobody && is_this_thread(previewer);
   }
   /// The port that the previewing thread has in place of this one.
   template <typename Port>
@@ -146,12 +151,12 @@ class PortBase {
   }
   std::uint32_t trace_id() const noexcept { return connection_.trace_id; }
   /// Component's logical clock, or the real one outside of any. [rt]
-  time_ns_t stamp_ns() const noexcept {
+  time_ns_t stamp_ns() const MAUVE_RT {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
   }
-  bool is_closed() const noexcept { return closed_.load(std::memory_order_acquire) != kOpen; }
+  bool is_closed() const MAUVE_RT { return closed_.load(std::memory_order_acquire) != kOpen; }
   /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
-  bool keeps_zero() const noexcept { return closed_.load(std::memory_order_acquire) == kClosed; }
+  bool keeps_zero() const MAUVE_RT { return closed_.load(std::memory_order_acquire) == kClosed; }
 
  private:
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread

@@ -11,6 +11,7 @@
 
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -26,12 +27,12 @@ class ClientBase;
 class Notifier {
  public:
   /// Wakes the waiter if one sleeps. [rt]
-  void notify() noexcept;
+  void notify() MAUVE_RT;
   /// Sleeps until notified after `seen` was returned, or until the instant; returns the word to pass next.
   /// [non-rt]
   std::uint32_t wait(std::uint32_t seen, time_ns_t until_ns) noexcept;
   /// [rt]
-  std::uint32_t word() const noexcept { return word_.load(std::memory_order_seq_cst); }
+  std::uint32_t word() const MAUVE_RT { return word_.load(std::memory_order_seq_cst); }
 
  private:
   std::atomic<std::uint32_t> word_{0};
@@ -48,7 +49,7 @@ class EventListener {
 
   /// Called on the writer's thread with the writer's time, the data in place, under the listeners' lock.
   /// [rt] Short; writes to and listens to no resource.
-  virtual void on_event(time_ns_t time_ns) noexcept = 0;
+  virtual void on_event(time_ns_t time_ns) MAUVE_RT = 0;
 };
 
 /// The listeners of one resource; a write without any costs one load.
@@ -69,12 +70,12 @@ class EventListeners {
   /// Gives the registration of one to another: no write goes by in between. [non-rt]
   void replace(EventListener& listener, EventListener& by) noexcept;
   /// Calls all. [rt]
-  void call(time_ns_t time_ns) noexcept {
+  void call(time_ns_t time_ns) MAUVE_RT {
     if (count_.load(std::memory_order_relaxed) != 0) call_all(time_ns);
   }
 
  private:
-  void call_all(time_ns_t time_ns) noexcept;
+  void call_all(time_ns_t time_ns) MAUVE_RT;
 
   PiMutex mutex_;
   std::array<EventListener*, kCapacity> listeners_{};
@@ -90,12 +91,14 @@ class Resource : public Configurable {
   /// `kind` and `type` as the architecture file names them.
   Resource(std::string kind, std::string type) : kind_(std::move(kind)), type_(std::move(type)) {}
 
-  const std::string& kind() const noexcept { return kind_; }
-  const std::string& type() const noexcept { return type_; }
-  const std::vector<ServiceBase*>& services() const noexcept { return services_; }
-  /// The service of that name, or nullptr.
+  /// [rt]
+  const std::string& kind() const MAUVE_RT { return kind_; }
+  const std::string& type() const MAUVE_RT { return type_; }
+  const std::vector<ServiceBase*>& services() const MAUVE_RT { return services_; }
+  /// The service of that name, or nullptr. [non-rt]
   ServiceBase* find_service(std::string_view name) const noexcept;
-  const std::string& name() const noexcept { return name_; }
+  /// [rt]
+  const std::string& name() const MAUVE_RT { return name_; }
   /// Given by the architecture, once. [setup]
   virtual void set_name(const std::string& name) { name_ = name; }
   std::string description() const override { return "resource " + name_; }
@@ -115,8 +118,8 @@ class Resource : public Configurable {
 
   // The serialized face, for topics and for languages other than C++. Ordinary threads.
 
-  /// Whether the three below do anything.
-  virtual bool is_serializable() const noexcept { return false; }
+  /// Whether the three below do anything. [rt]
+  virtual bool is_serializable() const MAUVE_RT { return false; }
   /// The next sample not seen yet (`seen` is kept by the caller); a ring's element is removed. [non-rt]
   virtual bool next_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
                            std::uint64_t& /*seen*/) {
@@ -138,7 +141,7 @@ class Resource : public Configurable {
   virtual std::string why_refused(std::span<const std::byte> message) const;
 
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
-  virtual ClientBase* client() noexcept { return nullptr; }
+  virtual ClientBase* client() MAUVE_RT { return nullptr; }
 
  protected:
   void offer(ServiceBase& service) {
@@ -146,11 +149,11 @@ class Resource : public Configurable {
     services_.push_back(&service);
   }
   /// Tells who carries samples and calls out of the architecture. [rt]
-  void notify() noexcept {
+  void notify() MAUVE_RT {
     if (notifier_ != nullptr) notifier_->notify();
   }
   /// To be called by services after a write that succeeded, no lock held. [rt]
-  void written(time_ns_t time_ns) noexcept {
+  void written(time_ns_t time_ns) MAUVE_RT {
     notify();
     listeners_.call(time_ns);
   }

@@ -41,9 +41,10 @@ class RingBuffer final : public Resource {
     mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool is_serializable() const noexcept override { return true; }
-  std::size_t capacity() const noexcept { return places_.size(); }
+  /// [rt]
+  std::size_t capacity() const MAUVE_RT { return places_.size(); }
   /// Elements refused or overwritten since the start. [rt]
-  std::uint64_t lost() noexcept {
+  std::uint64_t lost() MAUVE_RT {
     const std::lock_guard lock(mutex_);
     return lost_;
   }
@@ -120,8 +121,8 @@ class RingBuffer final : public Resource {
   }
   TryWrite try_push(const T& value, time_ns_t time_ns) noexcept {
     {
-      const std::unique_lock lock(mutex_, std::try_to_lock);
-      if (!lock.owns_lock()) return TryWrite::busy;
+      if (!mutex_.try_lock()) return TryWrite::busy;
+      const std::lock_guard lock(mutex_, std::adopt_lock);
       if (!put(value, time_ns)) return TryWrite::done;
     }
     written(time_ns);

@@ -19,7 +19,7 @@ enum class CallOutcome : std::uint8_t;  // call_type.hpp
 enum class PortKind : std::uint8_t { read = 1, write = 2, call = 3, event = 4 };
 
 /// "read", "write", "call" or "event". [rt]
-std::string_view to_string(PortKind kind) noexcept;
+std::string_view to_string(PortKind kind) MAUVE_RT;
 
 /// What a read found, seen from the port that reads: nothing yet, what it had read before, or something
 /// newer.
@@ -39,14 +39,15 @@ struct Sample {
   DataStatus status{DataStatus::none};
   time_ns_t time_ns{0};
 
-  bool is_new() const noexcept { return status == DataStatus::new_data; }
+  /// [rt]
+  bool is_new() const MAUVE_RT { return status == DataStatus::new_data; }
   /// Age against a later instant; 0 when nothing was written yet. [rt]
-  time_ns_t age_ns(time_ns_t now_ns) const noexcept {
+  time_ns_t age_ns(time_ns_t now_ns) const MAUVE_RT {
     return status == DataStatus::none ? 0 : now_ns - time_ns;
   }
 };
 
-/// The identity of a type: MAUVE_TYPE's name.
+/// The identity of a type: MAUVE_TYPE's name. [non-rt]
 template <Described T>
 std::string type_name() {
   return std::string(TypeTraits<T>::name);
@@ -59,7 +60,7 @@ struct ReaderState {
   time_ns_t time_ns{0};   // writer's time of the last sample read; set by the port
 
   /// Whether the sample of this number is another one than the last; remembers it. [rt]
-  DataStatus look(std::uint64_t sequence) noexcept {
+  DataStatus look(std::uint64_t sequence) MAUVE_RT {
     const bool is_new = seen != sequence;
     seen = sequence;
     return is_new ? DataStatus::new_data : DataStatus::old_data;
@@ -84,30 +85,31 @@ class ServiceBase {
   ServiceBase(const ServiceBase&) = delete;
   ServiceBase& operator=(const ServiceBase&) = delete;
 
-  const std::string& name() const noexcept { return name_; }
-  PortKind kind() const noexcept { return kind_; }
-  const std::string& type() const noexcept { return type_; }
+  /// [rt]
+  const std::string& name() const MAUVE_RT { return name_; }
+  PortKind kind() const MAUVE_RT { return kind_; }
+  const std::string& type() const MAUVE_RT { return type_; }
   /// How it holds values of the type: "C++", or what another language does. [rt]
-  virtual std::string_view representation() const noexcept { return "C++"; }
+  virtual std::string_view representation() const MAUVE_RT { return "C++"; }
   /// The messages it carries, as their C++ structs have them; none where no struct is known. [non-rt]
   virtual std::vector<MessageShape> messages() const { return {}; }
   /// The resource that offers it, or nullptr. [rt]
-  Resource* resource() const noexcept { return resource_; }
+  Resource* resource() const MAUVE_RT { return resource_; }
 
   /// Whether the next does anything: a call whose type is a ROS service's. [rt]
-  virtual bool is_call_serializable() const noexcept { return false; }
+  virtual bool is_call_serializable() const MAUVE_RT { return false; }
   /// A call by serialized messages; the reply is written when it was answered. [non-rt]
   virtual CallOutcome call_serialized(std::span<const std::byte> request, std::vector<std::byte>& reply);
 
   /// How many ports may be connected at once; 0: any number. [rt]
-  virtual std::uint32_t max_ports() const noexcept { return 0; }
+  virtual std::uint32_t max_ports() const MAUVE_RT { return 0; }
   /// How many are connected. [rt]
-  std::uint32_t ports() const noexcept { return ports_.load(std::memory_order_relaxed); }
+  std::uint32_t ports() const MAUVE_RT { return ports_.load(std::memory_order_relaxed); }
   /// Refuses more ports than max_ports(). [non-rt] Throws Error (invalid_argument).
   void check_ports(std::uint32_t wanted) const;
   /// A port came or went; kept by PortBase and Resource. [rt]
-  void add_port() noexcept { ports_.fetch_add(1, std::memory_order_relaxed); }
-  void remove_port() noexcept { ports_.fetch_sub(1, std::memory_order_relaxed); }
+  void add_port() MAUVE_RT { ports_.fetch_add(1, std::memory_order_relaxed); }
+  void remove_port() MAUVE_RT { ports_.fetch_sub(1, std::memory_order_relaxed); }
 
  private:
   friend class Resource;
@@ -125,17 +127,17 @@ class ReadService : public ServiceBase {
   explicit ReadService(std::string name) : ServiceBase(std::move(name), PortKind::read, type_name<T>()) {}
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Copies what is there; leaves value and time alone when there is nothing. [rt]
-  virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept = 0;
+  virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT = 0;
   /// The same by value, `fallback` when there is nothing; override it where that saves a copy. [rt]
-  virtual Sample<T> sample(const T& fallback, ReaderState& reader) noexcept {
+  virtual Sample<T> sample(const T& fallback, ReaderState& reader) MAUVE_RT {
     Sample<T> found{.value = fallback};
     found.status = read(found.value, found.time_ns, reader);
     return found;
   }
   /// The register a port may read by itself, at a third of a call's price; nullptr: there is none. [rt]
-  virtual LatestRegister<T>* latest() noexcept { return nullptr; }
+  virtual LatestRegister<T>* latest() MAUVE_RT { return nullptr; }
   /// Gives back what is held for a reader that goes; the state is fresh afterwards. [rt]
-  virtual void let_go(ReaderState& reader) noexcept { reader = {}; }
+  virtual void let_go(ReaderState& reader) MAUVE_RT { reader = {}; }
 };
 
 template <Described T>
@@ -144,9 +146,9 @@ class WriteService : public ServiceBase {
   explicit WriteService(std::string name) : ServiceBase(std::move(name), PortKind::write, type_name<T>()) {}
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Takes a copy; false when there was no room. [rt]
-  virtual bool write(const T& value, time_ns_t time_ns) noexcept = 0;
+  virtual bool write(const T& value, time_ns_t time_ns) MAUVE_RT = 0;
   /// The same without waiting for a lock; for the outputs of a component that hangs. [rt]
-  virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept {
+  virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) MAUVE_RT {
     return TryWrite::must_wait;
   }
 };
@@ -170,7 +172,7 @@ class EventService : public ServiceBase {
  public:
   explicit EventService(std::string name) : ServiceBase(std::move(name), PortKind::event, "") {}
   /// Says that something happened at that time. [rt]
-  virtual void raise(time_ns_t time_ns) noexcept = 0;
+  virtual void raise(time_ns_t time_ns) MAUVE_RT = 0;
 };
 
 }  // namespace mauve

@@ -66,8 +66,8 @@ class SharedData final : public NewestResource {
     }
     TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
       {
-        const std::unique_lock lock(owner_.mutex_, std::try_to_lock);
-        if (!lock.owns_lock()) return TryWrite::busy;
+        if (!owner_.mutex_.try_lock()) return TryWrite::busy;
+        const std::lock_guard lock(owner_.mutex_, std::adopt_lock);
         owner_.put(value, time_ns);
       }
       owner_.written(time_ns);

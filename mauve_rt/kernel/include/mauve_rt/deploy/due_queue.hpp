@@ -26,10 +26,10 @@ struct QueuePlace {
 /// could all begin now: by priority alone. Each task knows its place, so that a change costs no search.
 class DueQueue {
  public:
-  /// The task's instant is another one now; kForever: it waits for nothing. [rt] but for the first time of each task
+  /// The task's instant is another one now; kForever: it waits for nothing. [non-rt]
   void update(Task& task, time_ns_t now_ns);
   void forget(Task& task);
-  /// The next to run, which stays in the queue; nullptr when none waits. [rt]
+  /// The next to run, which stays in the queue; nullptr when none waits. [non-rt]
   Task* next(time_ns_t now_ns);
 
  private:

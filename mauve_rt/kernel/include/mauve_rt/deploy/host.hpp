@@ -17,7 +17,7 @@ namespace mauve {
 
 class Conductor;
 
-/// Runs one architecture, which has at most one host at a time. Ordinary threads.
+/// Runs one architecture, which has at most one host at a time. All functions [non-rt] unless told.
 ///
 /// | member    | written by           | read by | under                                                  |
 /// | --------- | -------------------- | ------- | ------------------------------------------------------ |

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/deploy/due_queue.hpp"
 #include "mauve_rt/deploy/host.hpp"
 
@@ -24,12 +25,14 @@ class SimulatedClock final : public Clock {
     return false;
   }
   void spend(time_ns_t declared_ns) const noexcept override { now_ns_ += declared_ns; }
-  void due_changed(Task& task) const noexcept override { queue_.update(task, now_ns_); }
-  void leave(Task& task) const noexcept override { queue_.forget(task); }
-  /// The task that lives by this clock and can begin first; nullptr: none waits for an instant. [rt]
+  void due_changed(Task& task) const noexcept override {
+    MAUVE_RT_TRUSTED(queue_.update(task, now_ns_));  // nobody's time passes meanwhile
+  }
+  void leave(Task& task) const noexcept override { MAUVE_RT_TRUSTED(queue_.forget(task)); }
+  /// The task that lives by this clock and can begin first; nullptr: none waits for an instant. [non-rt]
   Task* next() const noexcept { return queue_.next(now_ns_); }
   /// Goes forward to the instant, never back. [rt]
-  void advance_to(time_ns_t instant_ns) noexcept { now_ns_ = std::max(now_ns_, instant_ns); }
+  void advance_to(time_ns_t instant_ns) MAUVE_RT { now_ns_ = std::max(now_ns_, instant_ns); }
 
  private:
   // Mutable, for a clock is const to the task that lives by it.
@@ -88,7 +91,7 @@ class SimulatedHost final : public Host {
 /// Every architecture has one virtual processor. On it the task that is due runs to its next wait, without preemption;
 /// of several that are due the one of the highest priority, then the one declared first. An execution state takes the
 /// time that it declares (State::simulated_execution_ns, else all that its max_execution allows; default: none). Callbacks come before the tasks of the same instant.
-/// Everything on one thread: the caller's.
+/// Everything on one thread: the caller's. All functions [non-rt].
 class Simulation {
  public:
   using Callback = std::function<void()>;

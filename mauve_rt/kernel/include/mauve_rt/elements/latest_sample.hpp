@@ -2,6 +2,7 @@
 // What a port read last, kept in place with its writer's time.
 #pragma once
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/port.hpp"
 
 namespace mauve {
@@ -11,7 +12,7 @@ template <Described T>
 class LatestSample {
  public:
   /// Reads the port once. [rt]
-  void update(ReadPort<T>& port) noexcept {
+  void update(ReadPort<T>& port) MAUVE_RT {
     time_ns_t time_ns = 0;
     const DataStatus status = port.read(value_, &time_ns);
     is_new_ = status == DataStatus::new_data;
@@ -23,12 +24,12 @@ class LatestSample {
     }
   }
   /// Whether there is a value, not older at that instant than `max_age_ns` (0: of any age). [rt]
-  bool is_fresh(time_ns_t now_ns, time_ns_t max_age_ns) const noexcept {
+  bool is_fresh(time_ns_t now_ns, time_ns_t max_age_ns) const MAUVE_RT {
     return has_value_ && (max_age_ns == 0 || now_ns - time_ns_ <= max_age_ns);
   }
   /// Whether the last update found one that the port had not seen. [rt]
-  bool is_new() const noexcept { return is_new_; }
-  const T& value() const noexcept { return value_; }
+  bool is_new() const MAUVE_RT { return is_new_; }
+  const T& value() const MAUVE_RT { return value_; }
 
  private:
   T value_{};

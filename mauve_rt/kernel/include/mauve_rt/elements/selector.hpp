@@ -40,6 +40,7 @@ struct SelectorShell : PeriodicShell {
 template <typename ShellType, Described T, std::size_t N>
 class SelectorCore : public UpdateCore<ShellType> {
  public:
+  /// [rt] as far as choose() is.
   void update() final {
     for (std::size_t i = 0; i < N; ++i) samples_[i].update(*this->shell().inputs[i]);
     pass(choose());
@@ -54,7 +55,7 @@ class SelectorCore : public UpdateCore<ShellType> {
  protected:
   static constexpr int kNone = -1;
 
-  /// The number of the input to pass, or kNone. [rt]
+  /// The number of the input to pass, or kNone. [rt] as far as the core is.
   virtual int choose() const = 0;
 
   bool is_fresh(std::size_t input, std::int64_t max_age_ms) const noexcept {

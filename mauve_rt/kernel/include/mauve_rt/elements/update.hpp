@@ -17,7 +17,7 @@ namespace mauve {
 template <typename ShellType>
 class UpdateCore : public Core<ShellType> {
  public:
-  /// Called once in each period. [rt]
+  /// Called once in each period. [rt] as far as the core is.
   virtual void update() = 0;
 };
 

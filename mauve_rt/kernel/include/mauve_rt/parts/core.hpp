@@ -7,6 +7,7 @@
 
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/context.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/parts/shell.hpp"
 
 namespace mauve {
@@ -19,32 +20,33 @@ class CoreBase : public Configurable {
   /// Whether bind_shell would succeed; changes nothing. [non-rt]
   virtual bool accepts(const Shell& /*shell*/) const noexcept { return false; }
 
-  /// Checks that the old core's state can be carried over; nothing is changed yet. [rt]
+  /// Checks that the old core's state can be carried over; nothing is changed yet. [rt] as far as the core is.
   /// Runs on the component's thread, inside its wait; while that is stopped on the requester's, who waits for its end
   /// however long it lasts, and so does a start of this component; nobody else does. Returning false or throwing refuses the replacement.
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
-  /// Moves the old core's state over; cannot fail. [rt]
+  /// Moves the old core's state over; cannot fail. [rt] as far as the core is.
   virtual void take(CoreBase& /*old*/) noexcept {}
-  /// The time adopt and take need together, held against them: an adopt that takes longer refuses the change, after a
+  /// The time adopt and take need together, held against them. [non-rt] An adopt that takes longer refuses the change, after a
   /// longer take the component is FAULTED. A commit with less left before a release waits for the one after.
   /// 0: none declared.
   virtual time_ns_t budget_ns() const noexcept { return 0; }
-  /// What is reckoned with where none is declared.
+  /// What is reckoned with where none is declared. [non-rt]
   virtual time_ns_t reckoned_budget_ns() const noexcept { return us_to_ns(200); }
 
+  /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }
   void set_implementation(std::string name) { implementation_ = std::move(name); }
-  /// package/Class
-  const std::string& implementation() const noexcept { return implementation_; }
+  /// package/Class [rt]
+  const std::string& implementation() const MAUVE_RT { return implementation_; }
   std::string description() const override { return "core " + implementation_; }
 
  protected:
   /// The component's logical clock: the nominal instant it acts at. [rt]
-  time_ns_t clock_ns() const noexcept {
+  time_ns_t clock_ns() const MAUVE_RT {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
   }
   /// The component's period g. [rt]
-  time_ns_t period_ns() const noexcept {
+  time_ns_t period_ns() const MAUVE_RT {
     return context_ != nullptr ? context_->period_ns.load(std::memory_order_relaxed) : 0;
   }
 
@@ -80,9 +82,9 @@ class DynamicCore : public CoreBase {
  public:
   /// The number of a method, or -1 when the core has none of that name. [non-rt]
   virtual int find_method(std::string_view name) const = 0;
-  /// Runs an action; may throw.
+  /// Runs an action; may throw. [rt] as far as the core is.
   virtual void run(int method) = 0;
-  /// Evaluates a guard; may throw.
+  /// Evaluates a guard; may throw. [rt] as far as the core is.
   virtual bool test(int method) = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <optional>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -26,9 +27,10 @@ class EventInput final : public EventListener {
 
   void on_event(time_ns_t time_ns) noexcept override;
   /// The time of the first event since the last call. [rt], the task's thread
-  std::optional<time_ns_t> consume() noexcept;
+  std::optional<time_ns_t> consume() MAUVE_RT;
 
-  const PortBase& port() const noexcept { return *port_; }
+  /// [rt]
+  const PortBase& port() const MAUVE_RT { return *port_; }
   /// The task that it wakes; before it listens, and no other later. [non-rt]
   void set_task(Task& task) noexcept { task_.store(&task, std::memory_order_relaxed); }
   /// Listens to the resource that the port is connected to now, and to no other. [non-rt]

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/statistics.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/event_input.hpp"
@@ -24,7 +25,7 @@ struct CoreBinding {
   const CoreBase* core{nullptr};  // the same, given by the component
 
   /// Whether the fsm can run the core. [rt]
-  bool is_bound() const noexcept { return object != nullptr || dynamic != nullptr; }
+  bool is_bound() const MAUVE_RT { return object != nullptr || dynamic != nullptr; }
   /// Whether the core is configured too: a component may start with it. [non-rt]
   bool is_ready() const noexcept { return is_bound() && core != nullptr && core->is_configured(); }
 };
@@ -32,6 +33,7 @@ struct CoreBinding {
 /// A method of the core, by name and by pointer, whichever the core at hand needs.
 class Method {
  public:
+  /// [setup]
   template <typename C, typename R>
   static Method action(std::string name, int number, R (C::*method)()) {
     return Method(std::move(name), number, method, [](const Storage& storage, void* object) -> bool {
@@ -39,6 +41,7 @@ class Method {
       return true;
     });
   }
+  /// [setup]
   template <typename C, typename Pointer>
   static Method guard(std::string name, int number, Pointer method) {
     return Method(std::move(name), number, method, [](const Storage& storage, void* object) -> bool {
@@ -46,7 +49,8 @@ class Method {
     });
   }
 
-  const std::string& name() const noexcept { return name_; }
+  /// [rt]
+  const std::string& name() const MAUVE_RT { return name_; }
   /// Runs the action on whichever core is bound. [rt] as far as the core is.
   void run(const CoreBinding& core) const {
     if (core.dynamic != nullptr) {
@@ -111,7 +115,7 @@ struct State {
   ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
 
   /// How much of virtual time it takes. [rt]
-  time_ns_t simulated_ns() const noexcept {
+  time_ns_t simulated_ns() const MAUVE_RT {
     return simulated_execution_ns < 0 ? max_execution_ns : simulated_execution_ns;
   }
 };
@@ -124,20 +128,23 @@ class FsmBase : public Configurable {
   /// Resolves a core against this machine. [non-rt] Throws Error (type_mismatch) when it does not suit.
   virtual CoreBinding bind_core(CoreBase& core) const = 0;
 
-  const State& initial() const noexcept { return *initial_; }
-  const std::vector<std::unique_ptr<State>>& states() const noexcept { return states_; }
-  const std::vector<Method>& methods() const noexcept { return methods_; }
+  /// [rt]
+  const State& initial() const MAUVE_RT { return *initial_; }
+  const std::vector<std::unique_ptr<State>>& states() const MAUVE_RT { return states_; }
+  const std::vector<Method>& methods() const MAUVE_RT { return methods_; }
   /// The execution states' times; who holds them may read them when the machine is gone. [non-rt]
   std::shared_ptr<const StateTimes> times() const noexcept { return times_; }
   /// g: the greatest common divisor of the lengths of all cycles; 0 when sporadic. Valid once configured. [rt]
-  time_ns_t period_ns() const noexcept { return period_ns_; }
+  time_ns_t period_ns() const MAUVE_RT { return period_ns_; }
   /// Whether it waits for events: phase and missed releases do not apply to it then. Valid once configured. [rt]
-  bool is_sporadic() const noexcept { return sporadic_; }
+  bool is_sporadic() const MAUVE_RT { return sporadic_; }
   /// The smallest max_execution of all states; 0: none declares one. Valid once configured. [rt]
-  time_ns_t smallest_bound_ns() const noexcept { return smallest_bound_ns_; }
+  time_ns_t smallest_bound_ns() const MAUVE_RT { return smallest_bound_ns_; }
 
+  /// [setup]
   void set_implementation(std::string name) { implementation_ = std::move(name); }
-  const std::string& implementation() const noexcept { return implementation_; }
+  /// [rt]
+  const std::string& implementation() const MAUVE_RT { return implementation_; }
   std::string description() const override { return "fsm " + implementation_; }
 
  protected:
@@ -221,7 +228,7 @@ class Fsm : public FsmBase {
   ShellType* shell_{nullptr};
 };
 
-/// The greatest common divisor of the cycle lengths of what is reachable from a state.
+/// The greatest common divisor of the cycle lengths of what is reachable from a state. [non-rt]
 /// One depth-first search gives the strongly connected components (Tarjan 1972) and the potentials; every
 /// edge inside a component then contributes |potential(u) + length(u) - potential(v)|. Throws Error:
 /// loop_without_wait naming the loop.

@@ -13,6 +13,9 @@
 #include <variant>
 #include <vector>
 
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/this_thread.hpp"
+
 namespace mauve {
 
 using PropertyValue = std::variant<bool, std::int64_t, double, std::string>;
@@ -22,18 +25,19 @@ concept PropertyType = std::same_as<T, bool> || std::same_as<T, std::int64_t> ||
                        std::same_as<T, std::string>;
 
 /// "bool", "int", "float" or "str", as architecture files have them. [rt]
-std::string_view property_type_name(const PropertyValue& value) noexcept;
+std::string_view property_type_name(const PropertyValue& value) MAUVE_RT;
 /// The value as an architecture file would show it. [non-rt]
 std::string to_string(const PropertyValue& value);
 
 /// The parts of a component that read a property only when they are configured: `ReadBy::core | ReadBy::fsm`.
 enum class ReadBy : std::uint8_t { none = 0, shell = 1, core = 2, fsm = 4 };
 
-constexpr ReadBy operator|(ReadBy a, ReadBy b) noexcept {
+/// [rt]
+constexpr ReadBy operator|(ReadBy a, ReadBy b) MAUVE_RT {
   return static_cast<ReadBy>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
 }
 /// Those of `a` that are not in `b`. [rt]
-constexpr ReadBy without(ReadBy a, ReadBy b) noexcept {
+constexpr ReadBy without(ReadBy a, ReadBy b) MAUVE_RT {
   return static_cast<ReadBy>(static_cast<unsigned>(a) & ~static_cast<unsigned>(b));
 }
 /// "shell", "core", "fsm", as many as there are. [non-rt]
@@ -64,15 +68,16 @@ class PropertyBase {
       : name_(std::move(name)), options_(std::move(options)) {}
   virtual ~PropertyBase() = default;
 
-  const std::string& name() const noexcept { return name_; }
-  const PropertyOptions& options() const noexcept { return options_; }
+  /// [rt]
+  const std::string& name() const MAUVE_RT { return name_; }
+  const PropertyOptions& options() const MAUVE_RT { return options_; }
   /// The present value; of a running component ask Component::property_values(). [setup]
   virtual PropertyValue boxed() const = 0;
   /// The value converted to the property's type (an integer serves where a float is asked for). [non-rt]
   /// Throws Error: type_mismatch, out_of_range.
   virtual PropertyValue checked(const PropertyValue& value) const = 0;
   /// Takes a value that checked() returned, by swapping it with the present one. [rt]
-  virtual void swap(PropertyValue& value) noexcept = 0;
+  virtual void swap(PropertyValue& value) MAUVE_RT = 0;
   /// Until end_preview() the calling thread reads this value, which checked() returned; all others read the present
   /// one. So the parts that a transaction puts in are configured with what it sets. [non-rt]
   virtual void preview(const PropertyValue& value) = 0;
@@ -84,7 +89,7 @@ class PropertyBase {
   bool is_previewed() const noexcept {
     // Relaxed: only the thread that stored its own id here finds it, and that one has written the preview itself.
     const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
-    return previewer != kNobody && pthread_equal(previewer, pthread_self()) != 0;
+    return previewer != kNobody && is_this_thread(previewer);
   }
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread
 
@@ -101,14 +106,17 @@ class Property final : public PropertyBase {
       : PropertyBase(std::move(name), std::move(options)), value_(std::move(initial)) {}
 
   /// The value in force since the component last left a wait. [rt]
-  const T& value() const noexcept { return is_previewed() ? preview_ : value_; }
-  operator const T&() const noexcept {
+  const T& value() const MAUVE_RT { return is_previewed() ? preview_ : value_; }
+  operator const T&() const MAUVE_RT {
     return value();
   }  // NOLINT: reads like the value, as in the paper's listings
 
   PropertyValue boxed() const override { return value(); }
   PropertyValue checked(const PropertyValue& value) const override;
-  void swap(PropertyValue& value) noexcept override { std::swap(std::get<T>(value), value_); }
+  void swap(PropertyValue& value) noexcept override {
+    if (T* const other = std::get_if<T>(&value))
+      MAUVE_RT_TRUSTED(std::swap(*other, value_));  // texts change places
+  }
   void preview(const PropertyValue& value) override {
     preview_ = std::get<T>(value);
     set_previewer(pthread_self());

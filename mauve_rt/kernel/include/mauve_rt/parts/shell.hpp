@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/parts/property.hpp"
@@ -23,8 +24,9 @@ namespace mauve {
 /// Every port is to be connected before configure, unless declared so: read_port<Point>("goal").optional().
 class Shell : public Configurable {
  public:
-  const std::vector<std::unique_ptr<PortBase>>& ports() const noexcept { return ports_; }
-  const std::vector<std::unique_ptr<PropertyBase>>& properties() const noexcept { return properties_; }
+  /// [rt]
+  const std::vector<std::unique_ptr<PortBase>>& ports() const MAUVE_RT { return ports_; }
+  const std::vector<std::unique_ptr<PropertyBase>>& properties() const MAUVE_RT { return properties_; }
   /// The port or property of that name, or nullptr. [non-rt]
   PortBase* find_port(std::string_view name) const noexcept;
   PropertyBase* find_property(std::string_view name) const noexcept;
@@ -32,8 +34,8 @@ class Shell : public Configurable {
   /// Given by the component, before configure. [setup]
   void set_context(const Context* context) noexcept;
   void set_implementation(std::string name) { implementation_ = std::move(name); }
-  /// package/Class
-  const std::string& implementation() const noexcept { return implementation_; }
+  /// package/Class [rt]
+  const std::string& implementation() const MAUVE_RT { return implementation_; }
   std::string description() const override { return "shell " + implementation_; }
 
  protected:
