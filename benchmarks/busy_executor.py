@@ -11,8 +11,8 @@ from processes import Processes
 
 from mauve_rt.cli.client import Client, connected
 from mauve_rt.model import load_architecture
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.trace import Trace
 
 COMPONENT = "metronome"
 ARCHITECTURE = ROOT / "mauve_examples" / "architecture" / "metronome.yaml"

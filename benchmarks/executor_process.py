@@ -33,7 +33,7 @@ class ExecutorProcess:
         words = [word for parameter in parameters for word in ("-p", parameter)]
         self.pid = processes.spawn(
             name,
-            *("-m", "mauve_rt.node.executor", "--ros-args", "-r", f"__ns:={self.namespace}"),
+            *("-m", "mauve_rt.node.executor.main", "--ros-args", "-r", f"__ns:={self.namespace}"),
             *("-p", f"architecture:={architecture}", *words),
             AMENT_PREFIX_PATH=os.pathsep.join(prefixes),
         )

@@ -15,7 +15,7 @@ from settings import Settings
 from trace_bags import make_bag
 
 import mauve_rt.trace
-from mauve_rt.trace.statistics import all_statistics
+from mauve_rt.trace.reading.statistics import all_statistics
 
 _ROUNDS = 5  # of the larger bags, which vary less
 _MANY = 5_000_000

@@ -17,7 +17,7 @@ from rows import Row, alone, exactly_zero, never_over
 from settings import Settings
 
 import mauve_rt.trace
-from mauve_rt.trace.bag_repair import examine_bag, repair_bag
+from mauve_rt.trace.bag.repair import examine_bag, repair_bag
 
 _LIBRARY = ROOT / "build" / "benchmarks" / "libbench_talker.so"
 _PROGRAM = Path(__file__).with_name("recording_process.py")

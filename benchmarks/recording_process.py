@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 from mauve_rt.api import Architecture, Deployer, PluginRegistry
-from mauve_rt.trace.recorder import Recorder
+from mauve_rt.trace.recording.recorder import Recorder
 
 COMPONENTS, MARKS = 5, 16
 

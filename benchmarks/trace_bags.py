@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mauve_rt.trace.recorded import Split
-from mauve_rt.trace.records import RECORD, Kind, Records
-from mauve_rt.trace.trace_bag import Drained, TraceBag
+from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.format.records import RECORD, Kind, Records
+from mauve_rt.trace.recording.trace_bag import Drained, TraceBag
 
 COMPONENTS = ("control", "guidance", "mapping", "planner", "watch")
 _NAMES = ["", "Work", "Rest"]

@@ -11,8 +11,8 @@ from rows import Row
 from settings import Settings
 from wakeup import bare_latencies_ns, percentile_rows
 
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.trace import Trace
 
 _SETTLE_S = 0.02  # left out on both sides: caches are cold
 

@@ -14,8 +14,8 @@ foreach(shell bash zsh)
   install(FILES cmake/local_setup.sh DESTINATION share/mauve_rt RENAME local_setup.${shell})
 endforeach()
 
-mauve_install_program(executor mauve_rt.node.executor lib/mauve_rt)
-mauve_install_program(supervisor mauve_rt.node.supervisor lib/mauve_rt)
+mauve_install_program(executor mauve_rt.node.executor.main lib/mauve_rt)
+mauve_install_program(supervisor mauve_rt.node.supervisor.main lib/mauve_rt)
 mauve_install_program(mauve mauve_rt.cli.main bin)
 
 # What pip writes beside a package it installs: by it `ros2` finds the entry points, and with them `ros2 mauve`.

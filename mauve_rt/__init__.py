@@ -1,8 +1,8 @@
 """MAUVE RT: real-time components whose software can be rewired and re-implemented while it runs, on ROS 2.
 
-`mauve_rt.model` reads architecture files, `mauve_rt.node` runs them as ROS 2 nodes, `mauve_rt.trace` records
-and reads what happened, `mauve_rt.cores` is for who writes a core in Python, `mauve_rt.cli` is the `mauve`
-command.
+`mauve_rt.api` is the door for who writes parts and programs in Python; `mauve_rt.trace` reads what happened.
+`mauve_rt.model` reads architecture files, `mauve_rt.node` runs them as ROS 2 nodes, `mauve_rt.cli` is the
+`mauve` command.
 """
 
 from mauve_rt._kernel import __version__

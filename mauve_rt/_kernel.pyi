@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any, ClassVar, Final, Literal, TypeAlias, final, overload
 
-from mauve_rt.cores import Core
-from mauve_rt.fsms import Fsm
-from mauve_rt.resources import AnyResource, Resource
-from mauve_rt.shells import Shell
+from mauve_rt.parts.cores import Core
+from mauve_rt.parts.fsms import Fsm
+from mauve_rt.parts.resources import AnyResource, Resource
+from mauve_rt.parts.shells import Shell
 
 __version__: Final[str]
 

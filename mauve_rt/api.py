@@ -29,11 +29,11 @@ from mauve_rt._kernel import (
     TransactionReport,
     monotonic_ns,
 )
-from mauve_rt.cores import Core
-from mauve_rt.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
-from mauve_rt.fsms import Fsm, State
-from mauve_rt.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
-from mauve_rt.resources import (
+from mauve_rt.parts.cores import Core
+from mauve_rt.parts.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
+from mauve_rt.parts.fsms import Fsm, State
+from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
+from mauve_rt.parts.resources import (
     AnyResource,
     EventCounter,
     LatestValue,
@@ -42,8 +42,8 @@ from mauve_rt.resources import (
     SharedData,
     service,
 )
-from mauve_rt.shells import NativeShell, Shell
-from mauve_rt.time import FOREVER, ms_to_ns, s_to_ns, us_to_ns
+from mauve_rt.parts.shells import NativeShell, Shell
+from mauve_rt.parts.time import FOREVER, ms_to_ns, s_to_ns, us_to_ns
 
 __all__ = [
     "FOREVER",

@@ -12,7 +12,7 @@ from mauve_examples.figures.measures import (
     without,
 )
 from mauve_examples.figures.runs import Run
-from mauve_rt.trace.trace import Deployment
+from mauve_rt.trace.reading.facts import Deployment
 
 _MARGIN_NS = 6_000_000
 _EXECUTIONS = 3  # of tau_2 that are shown

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from mauve_examples.figures.runs import Run
-from mauve_rt.trace.reconfigurations import Reconfiguration, reconfigurations
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.statistics import component_statistics, state_spans
-from mauve_rt.trace.trace import Deployment, Trace
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.facts import Deployment
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
+from mauve_rt.trace.reading.statistics import component_statistics, state_spans
+from mauve_rt.trace.reading.trace import Trace
 
 Interval = tuple[int, int]
 

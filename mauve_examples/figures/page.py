@@ -17,7 +17,7 @@ from mauve_examples.figures.measures import (
     tasks_of,
 )
 from mauve_examples.figures.runs import PERIOD_MS, PREPARE_MS, WORK_MS, Run
-from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 
 _PARAGRAPH_WIDTH = 120
 _HEAD = """\

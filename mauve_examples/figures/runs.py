@@ -14,8 +14,8 @@ from pathlib import Path
 import mauve_rt.trace
 from mauve_rt.api import Architecture, Deployer, PluginRegistry, monotonic_ns, ms_to_ns
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.trace import Trace, merge_traces
+from mauve_rt.trace.reading.trace import Trace, merge_traces
+from mauve_rt.trace.recording.recorder import Recorder
 
 PERIOD_MS = 40
 WORK_MS = (8, 10)  # of tau_1 and tau_2, in each period

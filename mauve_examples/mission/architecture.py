@@ -9,9 +9,9 @@ from typing import Any
 from mauve_examples import _mission
 from mauve_examples.mission.demo_errors import BadInputError
 from mauve_examples.mission.facts import MissionArea, MissionFacts, Pose, load_area
-from mauve_rt.model.ament_index import share_folder
-from mauve_rt.yaml_text import read_yaml
-from mauve_rt.yaml_writer import write_yaml
+from mauve_rt.parts.ament_index import share_folder
+from mauve_rt.yaml.text import read_yaml
+from mauve_rt.yaml.writer import write_yaml
 
 ROBOT, SUPERVISOR = "robot.yaml", "supervisor.yaml"
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from mauve_rt.node.process import leave_now
+from mauve_rt.node.shared.process import leave_now
 
 SUCCESS, FAILURE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Imported here so that Ctrl-C while modules load is handled already.
     from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
     from mauve_rt.cli.pipe import piped  # noqa: PLC0415
-    from mauve_rt.node.discovery import limit_discovery  # noqa: PLC0415
+    from mauve_rt.node.shared.discovery import limit_discovery  # noqa: PLC0415
 
     limit_discovery()  # its children's too
     try:

@@ -104,12 +104,14 @@ class MissionRun(Mission):
                 "autostart": "false",
                 "record_topics": json.dumps(RECORDED),
             }
-            processes.start(f"{setup.name}_executor", "mauve_rt.node.executor", *ros_arguments(parameters))
+            processes.start(
+                f"{setup.name}_executor", "mauve_rt.node.executor.main", *ros_arguments(parameters)
+            )
             nodes.append(f"/{setup.name}/executor")
             if setup.rules is not None:
                 arguments = ["-r", f"__ns:=/{setup.name}"]
                 arguments = [*ros_arguments({"rules": str(setup.rules)}), *arguments]
-                processes.start(f"{setup.name}_supervisor", "mauve_rt.node.supervisor", *arguments)
+                processes.start(f"{setup.name}_supervisor", "mauve_rt.node.supervisor.main", *arguments)
                 nodes.append(f"/{setup.name}/supervisor")
         return nodes
 

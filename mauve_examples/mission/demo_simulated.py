@@ -17,9 +17,9 @@ from mauve_examples.mission.medium import Medium
 from mauve_examples.mission.progress import Progress
 from mauve_rt.api import Simulation
 from mauve_rt.errors import MauveError
-from mauve_rt.node.simulated_executor import SimulatedExecutor
-from mauve_rt.node.simulated_supervisor import SimulatedSupervisor
-from mauve_rt.node.simulated_topics import Sample, SimulatedTopics
+from mauve_rt.simulation.executor import SimulatedExecutor
+from mauve_rt.simulation.supervisor import SimulatedSupervisor
+from mauve_rt.simulation.topics import Sample, SimulatedTopics
 from mauve_rt.trace import TraceError
 
 T = TypeVar("T")

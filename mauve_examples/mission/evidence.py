@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from mauve_examples.mission.coverage import CoverageTracker
 from mauve_examples.mission.facts import BoolGrid, MissionArea, MissionFacts
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.trace import Trace
 
 COVERAGE_PERIOD_NS = 250_000_000
 

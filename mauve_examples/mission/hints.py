@@ -2,7 +2,7 @@
 
 import shlex
 
-from mauve_rt.model.ament_index import share_folder
+from mauve_rt.parts.ament_index import share_folder
 
 
 def sourcing() -> list[str]:

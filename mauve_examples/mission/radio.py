@@ -7,8 +7,8 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr
 
 import sys
 
-from mauve_rt.node.discovery import limit_discovery
-from mauve_rt.node.process import Stop, run_until_signalled
+from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.process import Stop, run_until_signalled
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -24,7 +24,7 @@ from std_srvs.srv import SetBool
 
 from mauve_examples.mission.medium import Counts, Medium
 from mauve_msgs.msg import PeerMessage
-from mauve_rt.node.process import BAD_INPUT, complain
+from mauve_rt.node.shared.process import BAD_INPUT, complain
 
 DEPTH = 50
 CONNECTION_CHECK_S = 0.1

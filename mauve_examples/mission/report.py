@@ -20,8 +20,9 @@ from mauve_examples.mission.story import cores_in_words, happenings, key_figures
 from mauve_examples.mission.supervised import Supervised, compared_in_words
 from mauve_examples.mission.swaps import Swap
 from mauve_rt.trace import report
+from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.reading.trace import Trace, merge_traces
 from mauve_rt.trace.report.blocks import bullets, picture, prose
-from mauve_rt.trace.trace import Message, Trace, merge_traces
 
 REPORT, MAP, COVERAGE = "report.html", "map.png", "coverage.png"
 SUPERVISORS = "supervisors.png"

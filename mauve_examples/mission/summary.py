@@ -8,8 +8,8 @@ from mauve_examples.mission.collisions import find_encounters
 from mauve_examples.mission.evidence import CoverageHistory, RobotEvidence
 from mauve_examples.mission.facts import MissionFacts
 from mauve_examples.mission.swaps import Swap, find_swaps, swap_problems
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.statistics import ComponentStatistics, all_statistics
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.statistics import ComponentStatistics, all_statistics
 
 SUMMARY = "summary.json"
 _WHOLE = 0.995  # a share of the map above which the robots may find nothing new

@@ -5,9 +5,9 @@ from typing import Any
 
 from mauve_examples.mission.evidence import RobotEvidence, Timed
 from mauve_examples.mission.facts import MissionFacts
-from mauve_rt.trace.reconfigurations import Reconfiguration, reconfigurations
+from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.report.requests import Request, join_requests
-from mauve_rt.trace.trace import Message
 
 EXPLORATION = "exploration"
 _ACTED = ("do", "undo")

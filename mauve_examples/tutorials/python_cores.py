@@ -2,7 +2,7 @@
 
 from std_msgs.msg import Float64
 
-from mauve_rt.cores import Core
+from mauve_rt.parts.cores import Core
 
 
 class Metronome(Core):

@@ -76,7 +76,7 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
 
 def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
     from mauve_rt.model.steps import load_change  # noqa: PLC0415
-    from mauve_rt.node.rehearsal import try_change  # noqa: PLC0415
+    from mauve_rt.supervision.rehearsal import try_change  # noqa: PLC0415
 
     change = load_change(path)
     if model is not None:
@@ -85,9 +85,9 @@ def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
-    from mauve_rt.model.rule_types import heard_type  # noqa: PLC0415
-    from mauve_rt.model.rules import RulesFile  # noqa: PLC0415
-    from mauve_rt.node.rehearsal import try_rule  # noqa: PLC0415
+    from mauve_rt.supervision.rehearsal import try_rule  # noqa: PLC0415
+    from mauve_rt.supervision.rule_types import heard_type  # noqa: PLC0415
+    from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(path)
     rules = file.rules.rules

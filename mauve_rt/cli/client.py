@@ -14,7 +14,7 @@ from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 
 from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
 from mauve_rt.errors import ParameterError
-from mauve_rt.node.discovery import limit_discovery
+from mauve_rt.node.shared.discovery import limit_discovery
 
 DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another machine
 STARTING_S = 3.0  # where there is no executor at all, one may be starting

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mauve_rt.cli.views import console, duration
-from mauve_rt.node.state_age import in_words
+from mauve_rt.control.state_age import in_words
 
 STATES = (
     "UNCONFIGURED",

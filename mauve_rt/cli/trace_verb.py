@@ -11,7 +11,7 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part
 
 if TYPE_CHECKING:  # numpy takes its time to load
-    from mauve_rt.trace.trace import Trace
+    from mauve_rt.trace.reading.trace import Trace
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,14 +54,14 @@ def _export(args: argparse.Namespace) -> int:
         traces = _open(bags, part(progress, 0.0, 0.5))
         writing = part(progress, 0.5, 1.0)
         if args.format == "csv":
-            from mauve_rt.trace.export_csv import export_csv  # noqa: PLC0415
-            from mauve_rt.trace.trace import merge_traces  # noqa: PLC0415
+            from mauve_rt.trace.export.csv_files import export_csv  # noqa: PLC0415
+            from mauve_rt.trace.reading.trace import merge_traces  # noqa: PLC0415
 
             out = args.out or Path(f"{name}_csv")
             trace = merge_traces(traces) if len(traces) > 1 else traces[name]
             export_csv(trace, out, force=args.force, progress=writing)
         else:
-            from mauve_rt.trace.export_perfetto import export_perfetto  # noqa: PLC0415
+            from mauve_rt.trace.export.perfetto import export_perfetto  # noqa: PLC0415
 
             out = args.out or Path(f"{name}.pftrace")
             export_perfetto(traces, out, force=args.force, progress=writing)
@@ -110,7 +110,7 @@ def _info(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
-    from mauve_rt.trace.check import check_bag  # noqa: PLC0415
+    from mauve_rt.trace.reading.check import check_bag  # noqa: PLC0415
 
     bag = one_bag(args.bag)
     with shown() as progress:
@@ -127,7 +127,7 @@ def _check(args: argparse.Namespace) -> int:
 
 def _repair(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
-    from mauve_rt.trace.bag_repair import examine_bag, repair_bag  # noqa: PLC0415
+    from mauve_rt.trace.bag.repair import examine_bag, repair_bag  # noqa: PLC0415
 
     bag = one_bag(args.bag)
     with shown() as progress:
@@ -145,8 +145,8 @@ def _stats(args: argparse.Namespace) -> int:
     from mauve_rt.cli.tables import print_tables  # noqa: PLC0415
     from mauve_rt.cli.trace_views import statistics_values, statistics_view  # noqa: PLC0415
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
-    from mauve_rt.trace.reconfigurations import reconfigurations  # noqa: PLC0415
-    from mauve_rt.trace.statistics import all_statistics  # noqa: PLC0415
+    from mauve_rt.trace.reading.reconfigurations import reconfigurations  # noqa: PLC0415
+    from mauve_rt.trace.reading.statistics import all_statistics  # noqa: PLC0415
 
     with shown() as progress:
         trace = mauve_rt.trace.open(one_bag(args.bag), progress=part(progress, 0.0, 0.5))

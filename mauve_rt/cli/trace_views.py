@@ -9,9 +9,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from mauve_rt.cli.tables import number_table
-from mauve_rt.trace.reconfigurations import Reconfiguration
-from mauve_rt.trace.statistics import ComponentStatistics, Distribution
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.statistics import ComponentStatistics, Distribution
+from mauve_rt.trace.reading.trace import Trace
 
 _ROUNDED_UP = 0.9995
 """From this share of the next unit on, three digits are no longer enough: 1e+03 us."""

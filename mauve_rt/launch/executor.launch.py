@@ -21,7 +21,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from mauve_rt.model import Overrides, load_architecture
-from mauve_rt.model.rules import RulesFile
+from mauve_rt.supervision.rules import RulesFile
 
 # Arguments that are parameters of the executor, which is not given the empty ones.
 _PARAMETERS = {

@@ -2,8 +2,8 @@
 
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection, Overrides, load_architecture
 from mauve_rt.model.build import allowed_parts, build, configure
-from mauve_rt.model.message_types import message_class
 from mauve_rt.model.plugins import Plugin, PluginIndex, PluginLoader
+from mauve_rt.parts.message_types import message_class
 
 __all__ = [
     "ArchitectureModel",

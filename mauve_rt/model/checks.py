@@ -12,12 +12,12 @@ from mauve_rt._kernel import (
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, PortTypeError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.message_shapes import REMEDY, mismatches
-from mauve_rt.model.message_types import message_class, service_class
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import GIVEN_RESOURCES, PropertyValue
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.model.yaml_file import Location
+from mauve_rt.parts.message_types import message_class, service_class
 
 
 class Checks:

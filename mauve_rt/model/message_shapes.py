@@ -6,7 +6,7 @@ from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from mauve_rt._kernel import FieldShape, MessageShape
-from mauve_rt.model.message_types import message_class, service_class
+from mauve_rt.parts.message_types import message_class, service_class
 
 REMEDY = "give MAUVE_TYPE the message's fields, in its order and with its types, and build the package again"
 _WORDS = {"double": "float64", "float": "float32", "boolean": "bool", "octet": "uint8"}

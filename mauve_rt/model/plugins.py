@@ -19,9 +19,9 @@ from typing import Any, Self
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
-from mauve_rt.model import ament_index
 from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp, module_files
 from mauve_rt.model.words import did_you_mean
+from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "mauve_rt_plugins"
 KINDS = ("shell", "core", "fsm", "resource", "type", "call_type")
@@ -207,7 +207,7 @@ class PluginLoader:
 
 
 def _factory(plugin: Plugin) -> Callable[[Any], object]:
-    from mauve_rt.cores import core_factory  # noqa: PLC0415 - needs ROS, which the architecture file does not
+    from mauve_rt.parts.cores import core_factory  # noqa: PLC0415 - needs ROS, which the architecture file does not
 
     module_name, _, class_name = plugin.target.partition(":")
     try:

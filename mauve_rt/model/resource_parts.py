@@ -3,13 +3,13 @@
 from typing import Any
 
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
-from mauve_rt.model.message_types import message_class
 from mauve_rt.model.schema import ResourceModel
+from mauve_rt.parts.message_types import message_class
 
 
 def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str, Any]:
     """How a resource is added: serialized where its type is a message that no library registered."""
-    from mauve_rt.resources import RingBuffer, SharedData  # noqa: PLC0415 - they need the model themselves
+    from mauve_rt.parts.resources import RingBuffer, SharedData  # noqa: PLC0415 - they need the model themselves
 
     kind, name, capacity = resource.kind, resource.type, resource.capacity or 0
     if kind in ("shared_data", "ring_buffer") and name not in registry.names("type") and message_class(name):

@@ -10,8 +10,8 @@ import re
 from pathlib import Path
 from typing import Protocol
 
-from mauve_rt.model.ament_index import share_folder
 from mauve_rt.model.schema import PropertyValue
+from mauve_rt.parts.ament_index import share_folder
 
 _PLACE = re.compile(r"\$\(([^()]*)\)")
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.yaml_text import MAX_BYTES, Node, YamlError, parse_yaml
+from mauve_rt.yaml.text import MAX_BYTES, Node, YamlError, parse_yaml
 
 Location = tuple[int | str, ...]
 

@@ -14,7 +14,7 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from mauve_rt.trace.trace import Trace
+    from mauve_rt.trace.reading.trace import Trace
 
 __all__ = ["TraceError", "open"]
 
@@ -33,6 +33,6 @@ def open(path: str | Path, *, progress: Progress = silent) -> "Trace":  # noqa: 
         mauve_rt, or one that cannot be read.
 
     """
-    from mauve_rt.trace.reader import open_trace  # noqa: PLC0415 - numpy takes its time to load
+    from mauve_rt.trace.reading.reader import open_trace  # noqa: PLC0415 - numpy takes its time to load
 
     return open_trace(path, progress=progress)

@@ -110,7 +110,7 @@ def test_executor(start: str, installation: Installation, tmp_path: Path) -> Non
     architecture.write_text(ARCHITECTURE, encoding="utf-8")
     command = {
         "program": [prefix / "lib" / "mauve_rt" / "executor"],
-        "module": [prefix / "bin" / "python", "-m", "mauve_rt.node.executor"],
+        "module": [prefix / "bin" / "python", "-m", "mauve_rt.node.executor.main"],
     }[start]
     with installed_executor(
         command, architecture, mauve=prefix / "bin" / "mauve", environment=installation.shell

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from mauve_msgs.srv import ReplaceCore, Stop
-from mauve_rt.cores import Core
+from mauve_rt.parts.cores import Core
 
 
 class PyCounter(Core):

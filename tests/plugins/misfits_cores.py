@@ -1,6 +1,6 @@
 """A core in Python for a port whose type only C++ has."""
 
-from mauve_rt.cores import Core
+from mauve_rt.parts.cores import Core
 
 
 class PyLarge(Core):

@@ -10,10 +10,10 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mauve_examples.mission.facts import ComponentFacts, MissionArea, MissionFacts, RealtimeFacts
-from mauve_rt.trace.definitions import find_definition
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.format.definitions import find_definition
+from mauve_rt.trace.format.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 S, MS, US = 1_000_000_000, 1_000_000, 1_000
 EPOCH_NS = 100 * S

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import RECORD, Kind, Records
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Loss, Message, Trace
+from mauve_rt.trace.format.records import RECORD, Kind, Records
+from mauve_rt.trace.reading.facts import Loss, Message
+from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 MS = 1_000_000
 EPOCH_NS = 20 * MS

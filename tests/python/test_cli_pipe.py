@@ -9,7 +9,7 @@ import pytest
 from synthetic_traces import record_small_bag
 
 from mauve_rt.cli.pipe import PIPE_CLOSED, piped
-from mauve_rt.model.ament_index import share_folder
+from mauve_rt.parts.ament_index import share_folder
 
 BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from mauve_rt.node.discovery import limit_discovery
+from mauve_rt.node.shared.discovery import limit_discovery
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 HERE = f"discovery on this machine only; {RANGE} can widen it"

@@ -13,11 +13,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import Deployer, PluginRegistry
-from mauve_rt.cores import Core, core_factory
-from mauve_rt.model import ament_index, load_architecture
+from mauve_rt.model import load_architecture
 from mauve_rt.model.build import build
-from mauve_rt.model.message_types import message_class
 from mauve_rt.model.plugins import INDEX_RESOURCE, PluginIndex, PluginLoader, parse_index
+from mauve_rt.parts import ament_index
+from mauve_rt.parts.cores import Core, core_factory
+from mauve_rt.parts.message_types import message_class
 
 FILTER_SHELL = "mauve_rt/Float64FilterShell"
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mauve_rt.errors import ArchitectureFileError, ParameterError
-from mauve_rt.node.executor_settings import Settings
-from mauve_rt.node.ros_arguments import parse_ros_arguments
+from mauve_rt.node.executor.settings import Settings
+from mauve_rt.node.shared.ros_arguments import parse_ros_arguments
 
 
 def _parse(*words: str) -> dict[str, object]:

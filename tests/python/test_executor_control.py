@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from mauve_rt._kernel import ComponentDescription
+from mauve_rt.control import control as executor_control
+from mauve_rt.control.control import Control
+from mauve_rt.control.reports import message_of
+from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Request, Step
+from mauve_rt.control.runtime import Runtime
 from mauve_rt.model import load_architecture
-from mauve_rt.node import executor_control
-from mauve_rt.node.executor_control import Control
-from mauve_rt.node.executor_reports import message_of
-from mauve_rt.node.executor_requests import NOT_MEASURED, Code, Outcome, Request, Step
-from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
 
 PATIENCE_S = 100.0
 FILE = """\

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mauve_rt.node.executor_events import Event, Events
-from mauve_rt.node.executor_requests import Code, Outcome, Request
-from mauve_rt.node.watch import Watch
+from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.node.executor.events import Event, Events
+from mauve_rt.node.shared.watch import Watch
 
 PATIENCE_S = 100.0
 

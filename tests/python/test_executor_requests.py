@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from mauve_rt.node.executor_requests import (
+from mauve_rt.control.requests import (
     Code,
     Outcome,
     RecordingOrder,

@@ -8,7 +8,7 @@ import pytest
 from python_parts import ActFsm, CountCore, CountShell, Stage
 
 from mauve_rt._kernel import Deployer, Host, MauveError, SimulatedHost, Simulation, Transaction
-from mauve_rt.trace.records import RECORD
+from mauve_rt.trace.format.records import RECORD
 
 MS = 1_000_000
 

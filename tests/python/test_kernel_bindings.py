@@ -20,7 +20,7 @@ from mauve_rt._kernel import (
     monotonic_ns,
 )
 from mauve_rt.model.plugins import PluginIndex
-from mauve_rt.trace.records import RECORD, Kind
+from mauve_rt.trace.format.records import RECORD, Kind
 
 SHELL, FSM = "mauve_examples/MetronomeShell", "mauve_examples/MetronomeFsm"
 METRONOME, ACCELERANDO = "mauve_examples/Metronome", "mauve_examples/Accelerando"

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 from mauve_examples.mission.demo_options import parse_options
-from mauve_rt.model.ament_index import share_folder
+from mauve_rt.parts.ament_index import share_folder
 
 FILES = {"mauve_rt": "executor.launch.py", "mauve_examples": "exploration.launch.py"}
 # Where the parameters of an executable are described.
 DESCRIBED = {
-    "executor": "mauve_rt.node.executor",
-    "supervisor": "mauve_rt.node.supervisor",
+    "executor": "mauve_rt.node.executor.main",
+    "supervisor": "mauve_rt.node.supervisor.main",
     "radio": "mauve_examples.mission.radio",
 }
 

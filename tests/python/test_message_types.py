@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import SetBool
 
-from mauve_rt.model.message_types import message_class, service_class
+from mauve_rt.parts.message_types import message_class, service_class
 
 NO_TYPES = (
     "",

@@ -8,8 +8,8 @@ from geometry_msgs.msg import Point
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
-from mauve_rt.cores import Core
-from mauve_rt.shells import NativeShell
+from mauve_rt.parts.cores import Core
+from mauve_rt.parts.shells import NativeShell
 
 
 class View:

@@ -6,8 +6,8 @@ import pytest
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import PluginError
-from mauve_rt.model.ament_index import prefixes, share_folder
 from mauve_rt.model.plugins import PluginIndex, PluginLoader, parse_index
+from mauve_rt.parts.ament_index import prefixes, share_folder
 
 PREFIX = Path("/opt/somewhere")
 INDEX = """\

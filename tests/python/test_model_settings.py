@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model import load_architecture, rules, schema, steps
+from mauve_rt.model import load_architecture, schema, steps
 from mauve_rt.model.kinds import Choice, Faults, Flag, Kind, ListOf, Real, TableOf, Text, Whole
 from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.supervision import rules
 
 SECTIONS = sorted(
     {each for module in (schema, rules, steps) for each in vars(module).values() if isinstance(each, type)}

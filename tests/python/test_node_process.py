@@ -8,7 +8,7 @@ import pytest
 
 BODY = """\
 import threading
-from mauve_rt.node.process import leave_now, run_until_signalled
+from mauve_rt.node.shared.process import leave_now, run_until_signalled
 
 def work(stop):
     {work}

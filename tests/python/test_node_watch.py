@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from mauve_rt.errors import exception_text
-from mauve_rt.node import watch as watch_module
-from mauve_rt.node.watch import Watch
+from mauve_rt.node.shared import watch as watch_module
+from mauve_rt.node.shared.watch import Watch
 
 PATIENCE_S = 100.0
 

@@ -18,10 +18,10 @@ from mauve_rt._kernel import (
     PluginRegistry,
     monotonic_ns,
 )
-from mauve_rt.cores import Core, Shell, core_factory
 from mauve_rt.model import load_architecture
 from mauve_rt.model.build import build
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
+from mauve_rt.parts.cores import Core, Shell, core_factory
 
 SHELL, FSM = "mauve_examples/MetronomeShell", "mauve_examples/MetronomeFsm"
 METRONOME, PYTHON = "mauve_examples/Metronome", "mauve_examples/PythonMetronome"

@@ -9,8 +9,8 @@ from python_parts import ActFsm, IdleCore, Stage
 
 from mauve_rt.api import Core, MauveError, Resource, Shell, call_port, service
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
-from mauve_rt.resources import service_type
-from mauve_rt.trace.records import RECORD, Kind
+from mauve_rt.parts.resources import service_type
+from mauve_rt.trace.format.records import RECORD, Kind
 
 
 class Ledger(Resource):

@@ -13,10 +13,10 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
+from mauve_rt.interfaces.qos import qos_profile
 from mauve_rt.model import load_architecture
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import TopicModel
-from mauve_rt.node.qos import qos_profile
 
 # What create_publisher(type, topic, 10) offers, with nothing left to the middleware to say.
 ORDINARY = QoSProfile(

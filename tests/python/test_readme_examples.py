@@ -18,8 +18,8 @@ from mauve_rt import _kernel
 from mauve_rt.cli.main import build_parser
 from mauve_rt.model import load_architecture
 from mauve_rt.model.schema import GIVEN_RESOURCES
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from mauve_rt.model.rules import Rule
-from mauve_rt.node.supervisor_conditions import SilenceCondition
-from mauve_rt.node.supervisor_engine import Decision, RuleEngine
-from mauve_rt.node.supervisor_inventory import Inventory, ListedComponent
-from mauve_rt.node.supervisor_requests import Outcome, Request
-from mauve_rt.node.supervisor_rule import ArchitectureView, ComponentView
+from mauve_rt.supervision.conditions import SilenceCondition
+from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.requests import Outcome, Request
+from mauve_rt.supervision.rule import ArchitectureView, ComponentView
+from mauve_rt.supervision.rules import Rule
 
 TICK_S = 0.05
 LOCAL = "mauve_examples/LocalExploration"

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.rules import RulesFile
+from mauve_rt.supervision.rules import RulesFile
 
 GOOD = """\
 mauve: 1

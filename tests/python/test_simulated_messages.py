@@ -17,7 +17,7 @@ from mauve_msgs.msg import (
     StepReport,
     TraceArchitecture,
 )
-from mauve_rt.node.simulated_messages import serialize
+from mauve_rt.simulation.messages import serialize
 
 PORT = PortInfo(name="a port", kind=2, type="geometry_msgs/msg/Point", resource="r", service="write")
 COMPONENT = ComponentInfo(

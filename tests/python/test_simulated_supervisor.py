@@ -9,11 +9,11 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import PluginRegistry, Simulation
-from mauve_rt.model.ament_index import share_folder
-from mauve_rt.node.executor_runtime import Runtime
-from mauve_rt.node.simulated_executor import SimulatedExecutor
-from mauve_rt.node.simulated_supervisor import SimulatedSupervisor
-from mauve_rt.node.simulated_topics import SimulatedTopics
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.parts.ament_index import share_folder
+from mauve_rt.simulation.executor import SimulatedExecutor
+from mauve_rt.simulation.supervisor import SimulatedSupervisor
+from mauve_rt.simulation.topics import SimulatedTopics
 
 RULES = """\
 mauve: 1

@@ -9,7 +9,7 @@ from std_msgs.msg import Float64
 
 from mauve_rt._kernel import Architecture, Host, MauveError, PluginRegistry, Simulation
 from mauve_rt.model.plugins import PluginIndex
-from mauve_rt.trace.records import RECORD, Kind
+from mauve_rt.trace.format.records import RECORD, Kind
 
 SHELL, FSM = "mauve_examples/MetronomeShell", "mauve_examples/MetronomeFsm"
 METRONOME, ACCELERANDO = "mauve_examples/Metronome", "mauve_examples/Accelerando"

@@ -3,7 +3,7 @@
 import pytest
 
 from mauve_rt.model.steps import Step
-from mauve_rt.node.supervisor_inventory import Inventory, ListedComponent
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
 
 THERE = Inventory(
     "one",

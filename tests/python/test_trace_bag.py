@@ -20,8 +20,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag import BagWriter
-from mauve_rt.trace.recorded import TopicQos
+from mauve_rt.trace.bag.recorded import TopicQos
+from mauve_rt.trace.bag.writer import BagWriter
 
 T0 = 1_700_000_000_000_000_000
 TEXT = "mauve_test_msgs/msg/Text"
@@ -298,7 +298,7 @@ def test_when_the_metadata_does_not_fit_what_was_flushed_waits_again(
 WRITING = """
 import sys, time
 from pathlib import Path
-from mauve_rt.trace.bag import BagWriter
+from mauve_rt.trace.bag.writer import BagWriter
 bag = BagWriter(Path(sys.argv[1]))
 bag.add_topic("/robot/words", "mauve_test_msgs/msg/Text")
 number = 0

@@ -12,10 +12,11 @@ import pytest
 import zstandard
 from synthetic_traces import record_small_bag
 
-from mauve_rt.trace.cdr import encode_names
+from mauve_rt.trace.bag.mcap_file import MAGIC
+from mauve_rt.trace.bag.mcap_scan import McapScan
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.mcap_file import MAGIC
-from mauve_rt.trace.mcap_records import (
+from mauve_rt.trace.format.cdr import encode_names
+from mauve_rt.trace.format.mcap_records import (
     HEAD,
     Channel,
     Chunk,
@@ -29,8 +30,7 @@ from mauve_rt.trace.mcap_records import (
     Schema,
     serialized,
 )
-from mauve_rt.trace.mcap_scan import McapScan
-from mauve_rt.trace.reader import open_trace
+from mauve_rt.trace.reading.reader import open_trace
 
 ADDRESS_SPACE = 2 << 30
 NAMES = "mauve_msgs/msg/TraceNames"

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.cdr import Batch, decode_batch, encode_batch, encode_names
-from mauve_rt.trace.records import RECORD
+from mauve_rt.trace.format.cdr import Batch, decode_batch, encode_batch, encode_names
+from mauve_rt.trace.format.records import RECORD
 
 MESSAGES = Path(__file__).parents[2] / "mauve_msgs" / "msg"
 STORE = get_typestore(Stores.EMPTY)

@@ -13,11 +13,11 @@ import mauve_rt.trace
 from mauve_rt.cli.main import main
 from mauve_rt.cli.tables import print_tables
 from mauve_rt.cli.trace_views import statistics_view, time_text
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.statistics import all_statistics
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import all_statistics
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.definitions import SEPARATOR, find_definition
+from mauve_rt.trace.format.definitions import SEPARATOR, find_definition
 
 AddMessage = Callable[..., None]
 

@@ -9,9 +9,9 @@ import pytest
 from perfetto_decoding import Decoded
 
 from mauve_rt.cli.main import main
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace_bag import TraceBag
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import TraceBag
 
 TABLES = {
     "components",

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_traces import trace_of
 
-from mauve_rt.trace import frames
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
-from mauve_rt.trace.statistics import component_statistics, distribution
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.format.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.reading import frames
+from mauve_rt.trace.reading.statistics import component_statistics, distribution
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 PERIOD_NS = 10_000
 

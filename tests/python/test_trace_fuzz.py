@@ -10,14 +10,14 @@ from synthetic_traces import deploy, overrun, record, run, swap
 
 from mauve_rt.cli.trace_views import info_values, statistics_values
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag_repair import examine_bag, repair_bag
-from mauve_rt.trace.check import check_bag
-from mauve_rt.trace.export_csv import export_csv
-from mauve_rt.trace.export_perfetto import export_perfetto
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.statistics import all_statistics
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.bag.repair import examine_bag, repair_bag
+from mauve_rt.trace.export.csv_files import export_csv
+from mauve_rt.trace.export.perfetto import export_perfetto
+from mauve_rt.trace.reading.check import check_bag
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import all_statistics
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 ROUNDS = 60
 
@@ -94,7 +94,7 @@ def test_a_damaged_bag(
     damage: Callable[[bytes, random.Random], bytes],
     monkeypatch: pytest.MonkeyPatch,
 ):
-    monkeypatch.setattr("mauve_rt.trace.mcap_scan._PAUSE_S", 0.0)
+    monkeypatch.setattr("mauve_rt.trace.bag.mcap_scan._PAUSE_S", 0.0)
     errors = []
     for seed in range(ROUNDS):
         chance = random.Random(seed)  # noqa: S311 - no cryptography

@@ -7,13 +7,13 @@ import pytest
 from perfetto_decoding import Decoded
 
 from mauve_rt import _kernel
-from mauve_rt.trace.export_perfetto import export_perfetto
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.statistics import all_statistics
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.export.perfetto import export_perfetto
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import all_statistics
+from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.recording.recorder import Recorder
 
 PERIODS_MS = {"fast": 2, "slow": 20}
 CORES = ("Backwards", "Counter", "Reluctant", "Backwards")

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.writer import CompressionType, Writer
 
-from mauve_rt.trace import mcap_records as ours
-from mauve_rt.trace.mcap_limits import unpacked
-from mauve_rt.trace.mcap_records import HEAD, McapError
+from mauve_rt.trace.bag.mcap_limits import unpacked
+from mauve_rt.trace.format import mcap_records as ours
+from mauve_rt.trace.format.mcap_records import HEAD, McapError
 
 u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (16, 32, 64))
 texts, counts = st.text(max_size=20), st.dictionaries(u16, u64, max_size=4)

@@ -13,8 +13,8 @@ from rclpy.serialization import serialize_message
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from mauve_rt.trace.definitions import find_definition
-from mauve_rt.trace.message_decoding import Decoder
+from mauve_rt.trace.format.definitions import find_definition
+from mauve_rt.trace.format.message_decoding import Decoder
 
 TYPES = (
     "builtin_interfaces/msg/Time",

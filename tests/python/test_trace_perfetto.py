@@ -13,10 +13,10 @@ from perfetto_decoding import Decoded, Event
 from synthetic_traces import trace_of
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.export_perfetto import export_perfetto
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Message
+from mauve_rt.trace.export.perfetto import export_perfetto
+from mauve_rt.trace.format.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 EPOCH_NS, PERIOD_NS = 10**15, 1_000_000
 

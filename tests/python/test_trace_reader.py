@@ -8,14 +8,15 @@ from typing import get_args
 import pytest
 
 import mauve_rt.trace
-import mauve_rt.trace.typed_records as typed
+import mauve_rt.trace.reading.typed_records as typed
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag import BagWriter
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind, ReconfigurationPhase
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Deployment, Loss, Trace, merge_traces
+from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.format.records import Kind, ReconfigurationPhase
+from mauve_rt.trace.reading.facts import Deployment, Loss
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.trace import Trace, merge_traces
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 
 @pytest.fixture(autouse=True)
@@ -123,7 +124,7 @@ def test_a_bag_without_a_trace_is_refused(tmp_path: Path):
 
 
 def test_a_bag_cut_off_anywhere_gives_what_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("mauve_rt.trace.mcap_scan._PAUSE_S", 0)
+    monkeypatch.setattr("mauve_rt.trace.bag.mcap_scan._PAUSE_S", 0)
     source = SyntheticSource(["a"])
     recorder = Recorder(source, tmp_path / "bag", node_name="/e", flush_period_s=0.001, drain_period_s=0.001)
     recorder.start()

@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.reader import open_trace
-from mauve_rt.trace.recorder import DROPPED_MESSAGES, Recorder
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.recording.recorder import DROPPED_MESSAGES, Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 NODE = "/robot_1/executor"
 TEXT = "mauve_test_msgs/msg/Text"

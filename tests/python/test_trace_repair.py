@@ -18,14 +18,14 @@ from rosbags.rosbag2 import Reader, ReaderError
 
 import mauve_rt.trace
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag import BagWriter
-from mauve_rt.trace.bag_repair import examine_bag, repair_bag
-from mauve_rt.trace.check import check_bag
-from mauve_rt.trace.mcap_file import McapFile
-from mauve_rt.trace.recorded import Split
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.synthetic import SyntheticSource
+from mauve_rt.trace.bag.mcap_file import McapFile
+from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.bag.repair import examine_bag, repair_bag
+from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.check import check_bag
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 NODE = "/robot/executor"
 KILLS = 5
@@ -33,7 +33,7 @@ KILLS = 5
 
 @pytest.fixture(autouse=True)
 def no_pause(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("mauve_rt.trace.mcap_scan._PAUSE_S", 0)
+    monkeypatch.setattr("mauve_rt.trace.bag.mcap_scan._PAUSE_S", 0)
 
 
 def record(directory: Path, count: int = 30, split: Split | None = None) -> Path:
@@ -283,7 +283,7 @@ RUN = """
     import sys, threading
     from pathlib import Path
     from mauve_rt import _kernel
-    from mauve_rt.trace.recorder import Recorder
+    from mauve_rt.trace.recording.recorder import Recorder
     library, bag, acknowledged = sys.argv[1:]
     registry = _kernel.PluginRegistry()
     registry.load_library(library)

@@ -9,8 +9,8 @@ import pytest
 from headless_browser import Browser, started_browser
 from synthetic_traces import deploy, long_trace, overrun, run, swap, trace_of
 
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import write_report
-from mauve_rt.trace.synthetic import SyntheticSource
 
 SCHEMES = ("light", "dark")
 INK = """(() => {

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_traces import EPOCH_NS, MS, PERIOD_NS, long_trace, periodic_trace, trace_of
 
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.columns import Columns, read_columns
 from mauve_rt.trace.report.cycles import SLICE, UNKNOWN, releases_of
 from mauve_rt.trace.report.detail import choose_detail
 from mauve_rt.trace.report.markers import MOST, markers_of
 from mauve_rt.trace.report.timeline import json_for_script, timeline_data
-from mauve_rt.trace.synthetic import SyntheticSource
 
 INTEGERS = st.integers(-(2**53), 2**53)
 

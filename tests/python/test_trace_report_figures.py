@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_traces import EPOCH_NS, PERIOD_NS, deploy, overrun, run, swap, trace_of
 
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.comparison import reconfigurations_section
 from mauve_rt.trace.report.histograms import bins_of
 from mauve_rt.trace.report.layers import Size, place
 from mauve_rt.trace.report.scales import linear_ticks, log_ticks
 from mauve_rt.trace.report.units import counted, digits, listed, share_text, tick_texts, time_text
-from mauve_rt.trace.synthetic import SyntheticSource
 
 NODES = [f"n{index}" for index in range(12)]
 EDGES = st.lists(st.tuples(st.sampled_from(NODES), st.sampled_from(NODES)), max_size=30)

@@ -8,9 +8,9 @@ import pytest
 from headless_browser import Browser, started_browser
 from synthetic_traces import deploy, overrun, run, swap, trace_of
 
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import Card, write_report
-from mauve_rt.trace.synthetic import SyntheticSource
 
 WIDTHS = (320, 400, 800, 1200, 1920)
 FOLD = (1200, 800)

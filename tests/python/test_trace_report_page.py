@@ -20,16 +20,17 @@ from synthetic_traces import (
 )
 
 from mauve_rt.cli.main import main
-from mauve_rt.trace.architecture import ComponentInfo, PortInfo
-from mauve_rt.trace.recorder import Recorder
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.architecture import ComponentInfo, PortInfo
+from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.reading.trace import Trace, merge_traces
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import Card, Section, Sentence, Verdict, judge, write_report
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.bags import bag_names
 from mauve_rt.trace.report.blocks import prose
 from mauve_rt.trace.report.verdict import verdict_html
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Message, Trace, merge_traces
 
 HOSTILE = "</script><script>alert(1)</script><!--\"'&amp;"
 

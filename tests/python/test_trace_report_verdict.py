@@ -15,12 +15,12 @@ from synthetic_traces import (
     trace_of,
 )
 
-from mauve_rt.trace.architecture import ComponentInfo, with_known_policies
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
+from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import Verdict, judge
 from mauve_rt.trace.report.analysis import analyse
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.trace import Trace
 
 
 def verdict_on(trace: Trace) -> Verdict:

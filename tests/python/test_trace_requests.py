@@ -3,10 +3,10 @@
 from types import SimpleNamespace
 from typing import Any
 
-from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.report.requests import join_requests
 from mauve_rt.trace.report.timeline import swap_title
-from mauve_rt.trace.trace import Message
 
 MS = 1_000_000
 

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_traces import trace_of
 
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.records import IN_VAIN, Kind, ReconfigurationPhase
-from mauve_rt.trace.statistics import Distribution, component_statistics, distribution, state_spans
-from mauve_rt.trace.synthetic import SyntheticSource
-from mauve_rt.trace.typed_records import Armed, typed_records
+from mauve_rt.trace.format.records import IN_VAIN, Kind, ReconfigurationPhase
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import Distribution, component_statistics, distribution, state_spans
+from mauve_rt.trace.reading.typed_records import Armed, typed_records
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 EPOCH_NS, OFFSET_NS, PERIOD_NS = 1_000_000, 300, 10_000
 FIRST_NS = EPOCH_NS + OFFSET_NS

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from mauve_rt import yaml_text
-from mauve_rt.yaml_text import MAX_BYTES, MAX_DEPTH, YamlError, parse_yaml, read_yaml
-from mauve_rt.yaml_writer import write_yaml
+from mauve_rt.yaml import text as yaml_text
+from mauve_rt.yaml.text import MAX_BYTES, MAX_DEPTH, YamlError, parse_yaml, read_yaml
+from mauve_rt.yaml.writer import write_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 WORDS = ["true", "False", "TRUE", "tRue", "on", "off", "yes", "No", "y", "n", "null", "~", "Null", "nULL"]

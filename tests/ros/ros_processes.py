@@ -46,7 +46,7 @@ class ExecutorProcess:
         self._log = folder / f"executor_{time.monotonic_ns()}.log"
         with self._log.open("w", encoding="utf-8") as log:
             self.process = subprocess.Popen(
-                [*wrapper, sys.executable, "-m", "mauve_rt.node.executor", "--ros-args", *arguments],
+                [*wrapper, sys.executable, "-m", "mauve_rt.node.executor.main", "--ros-args", *arguments],
                 env={**os.environ, **environment},
                 stdout=log,
                 stderr=subprocess.STDOUT,

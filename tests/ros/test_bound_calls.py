@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool
 
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import Reconfigure
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 CALLER = "{shell: executor_tests/CallerShell, core: executor_tests/Caller, fsm: executor_tests/CallerFsm}"

@@ -27,10 +27,10 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, Empty, Float64, String
 
 from mauve_rt._bridge import TopicReport
+from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError
 from mauve_rt.model import load_architecture
-from mauve_rt.node.executor_bound_resources import BoundResources
-from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor.bound_resources import BoundResources
 
 PARTS = """\
 mauve: 1

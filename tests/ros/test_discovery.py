@@ -15,10 +15,10 @@ import pytest
 from ros_processes import PATIENCE_S
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-EXECUTOR = ("-m", "mauve_rt.node.executor", "--ros-args", "-p", "architecture:=FILE")
+EXECUTOR = ("-m", "mauve_rt.node.executor.main", "--ros-args", "-p", "architecture:=FILE")
 PROGRAMS = {
     "executor": EXECUTOR,
-    "supervisor": ("-m", "mauve_rt.node.supervisor", "--ros-args", "-p", "rules:=RULES"),
+    "supervisor": ("-m", "mauve_rt.node.supervisor.main", "--ros-args", "-p", "rules:=RULES"),
     "mauve": ("-m", "mauve_rt.cli", "events", "/executor"),
     "radio": ("-m", "mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[robot_1,robot_2]"),
 }

@@ -12,7 +12,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
-from mauve_rt.node.executor_requests import NOT_MEASURED, Code
+from mauve_rt.control.requests import NOT_MEASURED, Code
 
 PATIENT = "executor_tests/PyPatient"
 BACKWARDS = "executor_tests/Backwards"

@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 from mauve_rt.cli.list_view import print_components
-from mauve_rt.node.executor_console import REFUSED_EVERY_S, TopicWatch
+from mauve_rt.node.executor.console import REFUSED_EVERY_S, TopicWatch
 
 NODE = "/robot_1/executor"
 INFO, WARN = b"\x14"[0], b"\x1e"[0]

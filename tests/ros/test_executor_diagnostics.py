@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from mauve_msgs.srv import ReplaceCore
 from mauve_rt._kernel import allocation_counting
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 PARTS = ("counter", "guard", "sleepy")

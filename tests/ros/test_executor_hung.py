@@ -15,7 +15,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus
 from mauve_msgs.srv import ListComponents, Stop
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 WAYS = ("loop", "sleep", "lock", "pipe")

@@ -15,9 +15,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import ArchitectureState
 from mauve_msgs.srv import ListComponents
+from mauve_rt.control.runtime import Runtime
 from mauve_rt.model import ArchitectureModel, load_architecture
-from mauve_rt.node.executor_node import ExecutorNode
-from mauve_rt.node.executor_runtime import Runtime
+from mauve_rt.node.executor.node import ExecutorNode
 
 NODE = "/robot_1/executor"
 NUMBER = b"\0\1\0\0" + bytes(8)  # a Float64 in CDR

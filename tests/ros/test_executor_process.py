@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo
 from mauve_msgs.srv import ListComponents, Start, Stop
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

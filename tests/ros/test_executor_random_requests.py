@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
+from mauve_rt.control.requests import Code
 from mauve_rt.model.steps import STEP_KINDS
-from mauve_rt.node.executor_requests import Code
 
 NODE = "/robot_1/executor"
 ASKED_FOR = os.environ.get("MAUVE_RANDOM_REQUESTS", "")

@@ -8,7 +8,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
-from mauve_rt.node.executor_requests import NOT_MEASURED, Code
+from mauve_rt.control.requests import NOT_MEASURED, Code
 
 NODE = "/robot_1/executor"
 NO_TYPE = "{kind: shared_data, type: std_msgs/msg/Flaot64, topic: {name: late, direction: publish}}"

@@ -20,9 +20,9 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure
-from mauve_rt.node.executor_settings import PARAMETERS
-from mauve_rt.node.settings import OF_RCLPY
-from mauve_rt.node.supervisor_settings import PARAMETERS as OF_SUPERVISOR
+from mauve_rt.node.executor.settings import PARAMETERS
+from mauve_rt.node.shared.settings import OF_RCLPY
+from mauve_rt.node.supervisor.settings import PARAMETERS as OF_SUPERVISOR
 
 NODE = "/robot_1/executor"
 FIXED = sorted(name for name, setting in PARAMETERS.items() if setting.is_fixed)
@@ -192,7 +192,7 @@ def test_a_structural_property_is_set_beside_its_reader(executor: ExecutorProces
 
 def test_the_supervisor_s_parameters(domain: int, graph: Any, tmp_path: Path) -> None:
     (tmp_path / "rules.yaml").write_text(RULES, encoding="utf-8")
-    words = [sys.executable, "-m", "mauve_rt.node.supervisor"]
+    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main"]
     rules = ["--ros-args", "-p", f"rules:={tmp_path / 'rules.yaml'}"]
     file = tmp_path / "parameters.yaml"
     file.write_text("supervisor: {ros__parameters: {rulse: x}}\n", encoding="utf-8")

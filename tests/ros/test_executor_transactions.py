@@ -16,8 +16,8 @@ from mauve_msgs.msg import (
 )
 from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.cli.main import main
-from mauve_rt.node.executor_requests import NOT_MEASURED, Code
-from mauve_rt.trace.reader import open_trace
+from mauve_rt.control.requests import NOT_MEASURED, Code
+from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.report.analysis import analyse
 
 NODE = "/robot_1/executor"

@@ -11,7 +11,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 BACKWARDS = "executor_tests/Backwards"
 

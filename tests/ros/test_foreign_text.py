@@ -18,9 +18,9 @@ from std_msgs.msg import Float64
 import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
-from mauve_rt.node.executor_requests import Code
-from mauve_rt.node.service_thread import refused_reply
-from mauve_rt.trace.bag_repair import examine_bag
+from mauve_rt.control.requests import Code
+from mauve_rt.node.shared.service_thread import refused_reply
+from mauve_rt.trace.bag.repair import examine_bag
 
 NODE = "/robot_1/executor"
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -29,7 +29,9 @@ MORE_CORES = """\
                            """
 BROKEN_THREAD = """\
 import sys
-from mauve_rt.node import executor, executor_state, watch
+from mauve_rt.node.executor import main as executor
+from mauve_rt.node.executor import state as executor_state
+from mauve_rt.node.shared import watch
 
 def fail(self, *arguments):
     raise SystemExit("the eyes are gone")

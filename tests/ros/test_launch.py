@@ -22,7 +22,7 @@ from std_msgs.msg import Bool, Float64
 
 from mauve_msgs.msg import SupervisorDecision
 from mauve_msgs.srv import ListComponents
-from mauve_rt.model.ament_index import share_folder
+from mauve_rt.parts.ament_index import share_folder
 
 for module in ("launch", "launch_ros"):
     pytest.importorskip(module, reason=f"{module} is not installed: it is no wheel")

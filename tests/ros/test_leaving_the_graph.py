@@ -136,7 +136,7 @@ rules:
     when: {silence: {topic: in, type: std_msgs/msg/Bool, longer_than_s: 0.5}}
     do: [{kind: stop, target: counter}]
 """
-SUPERVISOR = ["mauve_rt.node.supervisor", "--ros-args", "-p", "rules:={rules}"]
+SUPERVISOR = ["mauve_rt.node.supervisor.main", "--ros-args", "-p", "rules:={rules}"]
 RADIO = ["mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[robot_1]"]
 EVENTS = ["mauve_rt.cli", "events", EXECUTOR]
 

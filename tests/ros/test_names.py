@@ -16,8 +16,8 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent
 from mauve_msgs.srv import ListComponents, Stop
-from mauve_rt.model.rules import RulesFile
-from mauve_rt.node.supervisor_node import Supervisor
+from mauve_rt.node.supervisor.node import Supervisor
+from mauve_rt.supervision.rules import RulesFile
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 REMAPPINGS = (

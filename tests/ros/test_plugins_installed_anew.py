@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from mauve_msgs.srv import ListComponents, ReplaceCore
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 ARCHITECTURE = """\
@@ -20,7 +20,7 @@ components:
             alternatives: installed, properties: {period_ms: 20}}
 """
 CORE = """\
-from mauve_rt.cores import Core
+from mauve_rt.parts.cores import Core
 
 class Mine(Core):
     def configure(self) -> None:

@@ -15,9 +15,9 @@ from std_msgs.msg import Float64
 import mauve_rt.trace
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording
-from mauve_rt.trace.bag_repair import examine_bag
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.statistics import component_statistics
+from mauve_rt.trace.bag.repair import examine_bag
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import component_statistics
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]

@@ -8,7 +8,7 @@ import pytest
 
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 MB = 1_000_000

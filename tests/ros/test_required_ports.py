@@ -8,7 +8,7 @@ from ros_processes import ExecutorProcess
 
 from mauve_msgs.msg import ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
 CALLER = """\

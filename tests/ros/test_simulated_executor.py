@@ -7,10 +7,10 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import Simulation
-from mauve_rt.node.executor_requests import Request, Step
-from mauve_rt.node.simulated_executor import SimulatedExecutor
-from mauve_rt.node.simulated_topics import Sample, SimulatedTopics
-from mauve_rt.trace.reader import open_trace
+from mauve_rt.control.requests import Request, Step
+from mauve_rt.simulation.executor import SimulatedExecutor
+from mauve_rt.simulation.topics import Sample, SimulatedTopics
+from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.report.analysis import analyse
 
 FALLBACK = "executor_tests/Backwards"

@@ -14,7 +14,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Stop
-from mauve_rt.node.executor_requests import Code
+from mauve_rt.control.requests import Code
 
 PATIENT = "executor_tests/Patient"
 PY_PATIENT = "executor_tests/PyPatient"

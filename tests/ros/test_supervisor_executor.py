@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, SupervisorDecision
-from mauve_rt.model.ament_index import share_folder
+from mauve_rt.parts.ament_index import share_folder
 
 RULES = """\
 mauve: 1

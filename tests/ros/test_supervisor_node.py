@@ -22,8 +22,8 @@ from ros_processes import PATIENCE_S, wait_for_signals
 from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus, PeerMessage, SupervisorDecision
 from mauve_msgs.srv import Reconfigure
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.rules import RulesFile
-from mauve_rt.node.supervisor_node import Supervisor
+from mauve_rt.node.supervisor.node import Supervisor
+from mauve_rt.supervision.rules import RulesFile
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
 RULES = f"""\
@@ -204,7 +204,7 @@ def test_a_message_type_that_is_not_installed_is_refused(graph: Graph, rules: Pa
 
 def run(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "mauve_rt.node.supervisor", "--ros-args", *arguments],
+        [sys.executable, "-m", "mauve_rt.node.supervisor.main", "--ros-args", *arguments],
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311

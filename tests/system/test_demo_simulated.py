@@ -12,7 +12,7 @@ from bag_rules import assert_rosbag2_reads
 from demo_harness import Demo, Starter
 from rosbags.highlevel import AnyReader
 
-from mauve_rt.trace.reader import open_trace
+from mauve_rt.trace.reading.reader import open_trace
 
 LOCAL, USUAL = "mauve_examples/LocalExploration", "mauve_examples/Exploration"
 ROBOTS = ("robot_1", "robot_2")

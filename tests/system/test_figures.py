@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import mauve_rt.trace
-from mauve_rt.trace.reconfigurations import reconfigurations
-from mauve_rt.trace.records import Kind
-from mauve_rt.trace.statistics import state_spans
-from mauve_rt.trace.trace import Trace, merge_traces
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.statistics import state_spans
+from mauve_rt.trace.reading.trace import Trace, merge_traces
 
 FIRST_WORK_NS, PERIOD_NS = 8_000_000, 40_000_000
 DEPLOYMENT_LEAD_NS = 20_000_000

@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, silent
-from mauve_rt.trace.reconfigurations import Reconfiguration, reconfigurations
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
+from mauve_rt.trace.reading.statistics import ComponentStatistics, component_statistics
+from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.report.cycles import Array, releases_of, slices_by_state
 from mauve_rt.trace.report.requests import Request, join_requests
-from mauve_rt.trace.statistics import ComponentStatistics, component_statistics
-from mauve_rt.trace.trace import Trace
 
 
 class Swap(NamedTuple):

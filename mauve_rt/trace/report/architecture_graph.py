@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import networkx as nx
 
-from mauve_rt.trace.architecture import ComponentInfo, PortInfo
+from mauve_rt.trace.reading.architecture import ComponentInfo, PortInfo
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import Section

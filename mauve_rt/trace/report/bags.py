@@ -6,7 +6,7 @@ from pathlib import Path
 import mauve_rt.trace
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part, silent
-from mauve_rt.trace.trace import Trace, merge_traces
+from mauve_rt.trace.reading.trace import Trace, merge_traces
 
 
 def open_bags(paths: Sequence[Path], *, progress: Progress = silent) -> Trace:

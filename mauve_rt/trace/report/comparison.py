@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from mauve_rt.trace.reading.statistics import distribution
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, prose, table
 from mauve_rt.trace.report.cycles import UNKNOWN
@@ -14,7 +15,6 @@ from mauve_rt.trace.report.swap_figure import blackout_figure, grid_figure, phas
 from mauve_rt.trace.report.tables import reconfigurations_table
 from mauve_rt.trace.report.timeline import swap_title
 from mauve_rt.trace.report.units import counted, time_text
-from mauve_rt.trace.statistics import distribution
 
 RELEASES = 200
 """How many releases before and after are compared, at most."""

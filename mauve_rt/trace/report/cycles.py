@@ -3,10 +3,10 @@
 import numpy as np
 import numpy.typing as npt
 
-from mauve_rt.trace.pairs import gaps
-from mauve_rt.trace.records import Kind, Records
-from mauve_rt.trace.statistics import state_spans
-from mauve_rt.trace.trace import Trace
+from mauve_rt.trace.format.records import Kind, Records
+from mauve_rt.trace.reading.pairs import gaps
+from mauve_rt.trace.reading.statistics import state_spans
+from mauve_rt.trace.reading.trace import Trace
 
 SLICE = np.dtype([("begin_ns", "<i8"), ("extent_ns", "<i8"), ("busy_ns", "<i8"), ("number", "<i8")])
 """One execution of a state, or several of the same state merged: then busy is less than the extent."""

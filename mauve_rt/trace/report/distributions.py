@@ -4,12 +4,12 @@ from html import escape
 
 import numpy as np
 
+from mauve_rt.trace.reading.statistics import Distribution, distribution
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import Section
 from mauve_rt.trace.report.cycles import UNKNOWN
 from mauve_rt.trace.report.histograms import Values, histogram
 from mauve_rt.trace.report.units import time_text
-from mauve_rt.trace.statistics import Distribution, distribution
 
 _OPEN_UP_TO = 6
 """Components up to which the histograms of all are shown unfolded, else those of the first."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.reading.statistics import Distribution, distribution
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.blocks import attribute
 from mauve_rt.trace.report.scales import asks_for_log, linear_ticks, log_ticks
 from mauve_rt.trace.report.timeline import json_for_script
 from mauve_rt.trace.report.units import tick_texts, time_text
-from mauve_rt.trace.statistics import Distribution, distribution
 
 Values = npt.NDArray[np.int64]
 

@@ -4,8 +4,8 @@ from html import escape
 
 import numpy as np
 
-from mauve_rt.trace.reconfigurations import Reconfiguration
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import bullets
 from mauve_rt.trace.report.cycles import Array

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mauve_rt.trace.records import Kind, Records
+from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.report.analysis import Analysis
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.trace.progress import Progress, part, silent
+from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.report.analysis import Analysis, analyse
 from mauve_rt.trace.report.architecture_graph import architecture_section
 from mauve_rt.trace.report.blocks import Card, Section, cards
@@ -22,7 +23,6 @@ from mauve_rt.trace.report.tables import (
 from mauve_rt.trace.report.timeline import json_for_script, timeline_data
 from mauve_rt.trace.report.timeline_section import timeline_section
 from mauve_rt.trace.report.verdict import Verdict, judge, verdict_html
-from mauve_rt.trace.trace import Trace
 
 _EVENT_TYPE = "mauve_msgs/msg/ReconfigurationEvent"
 _ANALYSED, _PACKED = 0.5, 0.7

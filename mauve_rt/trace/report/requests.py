@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 
 _REPLY_WITHIN_NS = 5_000_000_000  # the executor publishes its event after the reply
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from mauve_rt.trace.reading.statistics import ComponentStatistics
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.machine import Machine
 from mauve_rt.trace.report.overruns import culprits
 from mauve_rt.trace.report.units import counted, listed, share_text, time_text, times
-from mauve_rt.trace.statistics import ComponentStatistics
 
 GOOD, ATTENTION, BAD = "good", "attention", "bad"
 _RANKS = (BAD, ATTENTION, GOOD, "")

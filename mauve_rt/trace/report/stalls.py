@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mauve_rt.trace.records import Kind
+from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.cycles import Times, next_of
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.cycles import Times

@@ -2,12 +2,12 @@
 
 from html import escape
 
-from mauve_rt.trace.architecture import ComponentInfo
-from mauve_rt.trace.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.architecture import ComponentInfo
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration
+from mauve_rt.trace.reading.statistics import Distribution
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, details, table
 from mauve_rt.trace.report.units import share_text, time_text
-from mauve_rt.trace.statistics import Distribution
 
 _PERCENTILES = ("count", "min", "p50", "p99", "p99.9", "max")
 _COUNTS = ("component", "scheduled", "period", "load", "releases", "overruns", "skipped")

@@ -1,0 +1,104 @@
+"""What can be told of a request without a look at the steps' effects: form and time. Knows no ROS."""
+
+import math
+
+from mauve_rt._kernel import ComponentDescription
+from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Request, Step
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.model.steps import MAX_MISSED, STEP_KINDS
+from mauve_rt.model.words import did_you_mean, shown
+
+MAX_TIMEOUT_S = 10.0
+MAX_TEXT = 1000
+MAX_VALUE = 20_000
+MAX_STEPS = 100
+MAX_TOPICS = 100
+MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
+MIN_SPLIT_BYTES = 100_000
+
+
+def check_form(request: Request) -> None:
+    """Whether a request makes sense at all.
+
+    Raises:
+        RefusalError: INVALID.
+    """
+    if not math.isfinite(request.timeout_s) or not 0.0 <= request.timeout_s <= MAX_TIMEOUT_S:
+        text = f"bad timeout: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {request.timeout_s:g}"
+        raise RefusalError(Code.INVALID, text)
+    if not 0 <= request.max_missed <= MAX_MISSED:
+        text = f"bad max_missed: expected 0 to {MAX_MISSED:,} releases, found {request.max_missed:,}"
+        raise RefusalError(Code.INVALID, text)
+    if request.clock_ns < 0:
+        text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"
+        raise RefusalError(Code.INVALID, text)
+    texts = [request.request_id, request.requested_by, request.cause]
+    texts += [text for step in request.steps for text in (step.kind, step.target, step.name)]
+    if any(len(text) > MAX_TEXT for text in texts):
+        raise RefusalError(Code.INVALID, f"a text of the request is longer than {MAX_TEXT} characters")
+    if any(len(step.value) > MAX_VALUE for step in request.steps):
+        raise RefusalError(Code.INVALID, f"the value of a step is longer than {MAX_VALUE} characters")
+    if request.recording is not None:
+        _check_recording(request.recording)
+        return
+    if not 1 <= len(request.steps) <= MAX_STEPS:
+        found = f"of {len(request.steps)} steps" if request.steps else "without a step"
+        raise RefusalError(Code.INVALID, f"a transaction {found}: expected 1 to {MAX_STEPS}")
+    for number, step in enumerate(request.steps, start=1):
+        if step.kind not in STEP_KINDS:
+            where = f"step {number}: " if len(request.steps) > 1 else ""
+            text = f"{where}unknown kind of step {shown(step.kind)}; {did_you_mean(step.kind, STEP_KINDS)}"
+            raise RefusalError(Code.INVALID, text)
+
+
+def check_time(request: Request, runtime: Runtime) -> None:
+    """Whether it is the moment for a request.
+
+    Raises:
+        RefusalError: NOT_ACTIVE or WRONG_REVISION.
+    """
+    only_properties = all(step.kind == "set_property" for step in request.steps)
+    if not runtime.active and not (only_properties and runtime.configured):
+        needed = "configure" if only_properties else "activate"
+        text = f"the executor is not active; {needed} it first (lifecycle)"
+        raise RefusalError(Code.NOT_ACTIVE, text)
+    check_revision(request, runtime)
+
+
+def check_revision(request: Request, runtime: Runtime) -> None:
+    """Whether the architecture is at the revision that the request expects.
+
+    Raises:
+        RefusalError: WRONG_REVISION.
+    """
+    revision = runtime.revision
+    if request.expected_revision not in (0, revision):
+        text = f"the architecture is at revision {revision}, the request expected {request.expected_revision}"
+        raise RefusalError(Code.WRONG_REVISION, f"{text}; look at ~/state and decide again")
+
+
+def _check_recording(order: RecordingOrder) -> None:
+    texts = [order.bag, *order.topics]
+    if len(order.topics) > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
+        text = f"expected at most {MAX_TOPICS} topics, and no text longer than {MAX_TEXT} characters"
+        raise RefusalError(Code.INVALID, text)
+    if "\0" in order.bag:
+        raise RefusalError(Code.INVALID, "bag: a folder's name has no null character")
+    if order.split_s != 0 and not MIN_SPLIT_S <= order.split_s <= MAX_SPLIT_S:
+        text = f"bad split_s: expected 0 (the default) or {MIN_SPLIT_S:g} to {MAX_SPLIT_S:g} s"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.split_s:g}")
+    if order.split_bytes != 0 and order.split_bytes < MIN_SPLIT_BYTES:
+        text = f"bad split_bytes: expected 0 (any size) or at least {MIN_SPLIT_BYTES:,}"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.split_bytes:,}")
+
+
+def check_state(step: Step, component: ComponentDescription) -> None:
+    """Whether a start or stop finds the component in the other state.
+
+    Raises:
+        RefusalError: NOT_RUNNING or ALREADY_RUNNING.
+    """
+    if step.kind == "stop" and component.state in ("STOPPED", "UNCONFIGURED"):
+        raise RefusalError(Code.NOT_RUNNING, f"component '{component.name}' is already stopped")
+    if step.kind == "start" and component.state in ("RUNNING", "HELD"):
+        raise RefusalError(Code.ALREADY_RUNNING, f"component '{component.name}' is already running")

@@ -1,0 +1,270 @@
+"""Requests carried out or refused. Knows nothing of ROS: `executor_services` is its ROS face."""
+
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Protocol
+
+from mauve_rt._kernel import (
+    Committed,
+    ComponentDescription,
+    ResourceDescription,
+    monotonic_ns,
+)
+from mauve_rt.control.checks import check_form, check_revision, check_state, check_time
+from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.reports import Following, message_of, reports_of
+from mauve_rt.control.requests import (
+    Code,
+    Outcome,
+    RecordingOrder,
+    RefusalError,
+    Report,
+    Request,
+    RequestLog,
+    Step,
+    code_of,
+    reused_id,
+)
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.steps import Bound, Plan
+from mauve_rt.errors import MauveError, error_code, exception_text, one_line
+from mauve_rt.model.schema import ResourceModel
+
+DEFAULT_TIMEOUT_S = 1.0
+_CALLED_OFF = ("wrong_revision", "not_configured", "timeout")
+
+
+class Outside(Protocol):
+    """What binds resources to topics and services; see `executor_bound_resources`."""
+
+    def open(
+        self, resources: Mapping[str, ResourceModel], described: Mapping[str, ResourceDescription]
+    ) -> dict[str, list[int]]:
+        """Open what resources to come are bound to.
+
+        Raises:
+            MauveError: nothing is open then.
+        """
+
+    def attach(self, opened: Mapping[str, list[int]]) -> None:
+        """They are there: let what was opened serve them."""
+
+    def discard(self, opened: Mapping[str, list[int]]) -> None:
+        """They did not come."""
+
+    def remove(self, resources: Iterable[str]) -> None:
+        """These are gone."""
+
+
+class Recordings(Protocol):
+    """What starts and stops recordings; see `executor_recording`."""
+
+    def carry_out(self, order: RecordingOrder) -> tuple[str, str]:
+        """Start or stop; returns what was done, in words, and the bag's folder.
+
+        Raises:
+            RefusalError: and nothing was started or stopped.
+        """
+
+
+class Control:
+    """Carries out requests. handle() may be called from any thread.
+
+    Changes, which may take long to prepare, are carried out one at a time. A stop or a start by itself waits
+    for none of them: it takes no lock but the kernel's, of that one component. What it does to a component
+    that a change prepared meanwhile is about, the kernel finds at the commit: the change is refused then.
+
+    | member       | written by                    | guarded by                                      |
+    | ------------ | ----------------------------- | ----------------------------------------------- |
+    | `_log`       | every request                 | `_answered`, for a moment                       |
+    | `_under_way` | every request with an id      | `_answered`; who repeats a request waits in it  |
+    | `_taken`     | changes                       | `_changing`                                     |
+    | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
+    | the bag      | orders, in `_recordings`      | `_changing`                                     |
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        *,
+        phase_timeout_s: float = 1.0,
+        outside: Outside | None = None,
+        recordings: Recordings | None = None,
+        limits: RequestLimits | None = None,
+    ) -> None:
+        """The report of a commit is pending up to `phase_timeout_s`, until the next release tells its phase.
+
+        Without an `outside`, a request that binds a resource to a topic or service is refused; without
+        `recordings`, one that records.
+        """
+        self._runtime = runtime
+        self._outside = outside
+        self._recordings = recordings
+        self._limits = limits or RequestLimits()
+        self._taken: dict[str, int] = {}  # bytes, by name of what requests added and nobody removed
+        self._phase_timeout_ns = round(phase_timeout_s * 1e9)
+        self._log = RequestLog()
+        self._under_way: dict[str, Request] = {}
+        self._answered = threading.Condition()
+        self._changing = threading.Lock()
+
+    def handle(self, request: Request) -> Outcome:
+        """Do what is asked, or nothing at all. Never raises: every request gets its outcome."""
+        identity = request.request_id
+        with self._answered:
+            self._answered.wait_for(lambda: self._under_way.get(identity) != request)
+            if identity in self._under_way:
+                return replace(reused_id(request, self._under_way[identity]), revision=self._runtime.revision)
+            known = self._log.find(request)
+            if known is not None:
+                if known.code is Code.REQUEST_ID_REUSED:
+                    return replace(known, revision=self._runtime.revision)
+                return replace(known, replayed=True)
+            if identity:
+                self._under_way[identity] = request
+        outcome: Outcome | None = None
+        try:
+            if request.is_direct:
+                outcome = self._outcome(request)
+            else:
+                with self._changing, self._runtime.changing(str(request)):
+                    outcome = self._outcome(request)
+            return outcome
+        finally:
+            with self._answered:
+                if outcome is not None:
+                    self._log.add(request, replace(outcome, pending=None))
+                self._under_way.pop(identity, None)
+                self._answered.notify_all()
+
+    def _outcome(self, request: Request) -> Outcome:
+        # The kernel's count is taken first: what changes from here on, the commit finds.
+        kernel_revision = self._runtime.kernel_revision()
+        revision, parts = self._runtime.observe()
+        from_core, to_core = _replaced_core(request, parts)
+        try:
+            self._limits.check_size(request)
+            check_form(request)
+            if request.recording is not None:
+                outcome = self._order(request, request.recording)
+            else:
+                outcome = self._carry_out(request, parts, kernel_revision=kernel_revision)
+        except RefusalError as refusal:
+            outcome = Outcome(code=refusal.code, message=str(refusal))
+        except MauveError as error:
+            outcome = Outcome(code=code_of(error), message=one_line(str(error)))
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it must not cost the requester the answer
+            text = f"internal error: {exception_text(error)}"
+            outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
+        after = self._runtime.observe(
+            changed_since=revision if outcome.success and request.steps and not request.dry_run else None
+        )
+        return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core).cut()
+
+    def _carry_out(
+        self, request: Request, parts: Sequence[ComponentDescription], *, kernel_revision: int
+    ) -> Outcome:
+        check_time(request, self._runtime)
+        taken = {} if request.is_direct else self._still_taken(parts)
+        plan = Plan(request.steps, self._runtime, parts, limits=self._limits, taken=taken)
+        if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):  # be it a dry run
+            step = request.steps[0]
+            for part in self._runtime.components():  # of this moment: a stop may just have begun
+                if part.name == step.target:
+                    check_state(step, part)
+            if not request.dry_run:
+                return self._start_or_stop(step, request)
+        with self._bound(plan.bound, dry_run=request.dry_run):
+            committed = self._commit(plan, request, kernel_revision=kernel_revision)
+        if request.dry_run:
+            words = "; ".join(str(step) for step in request.steps)
+            return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
+        self._runtime.declare(added=plan.added, removed=plan.removed)
+        self._taken = plan.taken
+        measured = committed.report()
+        report, pending = reports_of(request.steps, measured), None
+        if not measured.is_complete and (timeout_ns := self._phase_timeout_of(request)) > 0:
+            pending = Following(committed, request.steps, monotonic_ns() + timeout_ns)
+        message = message_of(request.steps, measured)
+        return Outcome(code=Code.OK, message=message, report=report, pending=pending)
+
+    def _still_taken(self, parts: Sequence[ComponentDescription]) -> dict[str, int]:
+        there = {*self._runtime.resources(), *(part.name for part in parts)}
+        return {name: taken for name, taken in self._taken.items() if name in there}
+
+    def _commit(self, plan: Plan, request: Request, *, kernel_revision: int) -> Committed:
+        try:
+            return self._runtime.host.make(
+                plan.transaction,
+                dry_run=request.dry_run,
+                expected_revision=kernel_revision if request.expected_revision else 0,
+                commit_timeout_ns=_timeout_ns(request),
+                max_missed=request.max_missed,
+            )
+        except MauveError as error:
+            if error_code(error) in _CALLED_OFF:
+                check_time(request, self._runtime)  # whether it was by a deactivation
+            if error_code(error) == "wrong_revision":  # of what changed meanwhile, in our own count
+                self._runtime.observe()
+                check_revision(request, self._runtime)
+            raise
+
+    def _order(self, request: Request, order: RecordingOrder) -> Outcome:
+        check_revision(request, self._runtime)
+        if self._recordings is None:
+            raise RefusalError(Code.UNSUPPORTED, "this executor does not record by request")
+        message, bag = self._recordings.carry_out(order)
+        return Outcome(code=Code.OK, message=message, bag=bag)
+
+    @contextmanager
+    def _bound(self, bound: Bound, *, dry_run: bool) -> Iterator[None]:
+        """Around a commit: topics of what is added open before it, of what is removed close after it."""
+        outside = self._outside
+        if outside is None:
+            if bound.added:
+                text = f"resource '{next(iter(bound.added))}': nothing can be bound to ROS here"
+                raise RefusalError(Code.UNSUPPORTED, f"{text}; leave its topic or service out")
+            yield
+            return
+        opened = outside.open(bound.added, bound.described)
+        try:
+            yield
+        except BaseException:
+            outside.discard(opened)
+            raise
+        if dry_run:
+            outside.discard(opened)
+            return
+        outside.remove(bound.removed)
+        outside.attach(opened)
+
+    def _phase_timeout_of(self, request: Request) -> int:
+        """Of a property alone nobody wants to know the phase."""
+        only_properties = all(step.kind == "set_property" for step in request.steps)
+        return 0 if only_properties else self._phase_timeout_ns
+
+    def _start_or_stop(self, step: Step, request: Request) -> Outcome:
+        """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
+        if step.kind == "stop":
+            self._runtime.host.stop(step.target, _timeout_ns(request))
+            message = f"component '{step.target}' is stopped"
+        else:
+            self._runtime.host.start(step.target, request.clock_ns or None)
+            message = f"component '{step.target}' is started"
+        return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
+
+
+def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:
+    """Which core the request's one replace_core step puts in the place of which."""
+    replacing = [step for step in request.steps if step.kind == "replace_core"]
+    if len(replacing) != 1 or request.dry_run:
+        return "", ""
+    step = replacing[0]
+    present = [part.core for part in parts if part.name == step.target]
+    return (present[0], step.name) if present else ("", "")
+
+
+def _timeout_ns(request: Request) -> int:
+    return round((request.timeout_s or DEFAULT_TIMEOUT_S) * 1e9)

@@ -1,0 +1,76 @@
+"""What requests may take, all of them together: settings of the executor. Knows no ROS."""
+
+from dataclasses import dataclass
+
+from mauve_rt._kernel import PluginRegistry
+from mauve_rt.control.requests import Code, RefusalError, Request
+from mauve_rt.model.schema import ComponentModel, ResourceModel
+
+_TRACE_RECORD_BYTES = 48
+_USUAL_TRACE_RECORDS = 2048
+_CELLS = 3  # values that a shared_data or latest_value holds, beside one for each reader
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequestLimits:
+    """Each is a parameter of the executor with the same name."""
+
+    max_request_bytes: int = 262_144
+    max_requested_bytes: int = 67_108_864
+    max_requested_priority: int = 80
+
+    def check_size(self, request: Request) -> None:
+        """Whether a request is not too large as a whole.
+
+        Raises:
+            RefusalError: INVALID.
+        """
+        found = sum(len(text.encode("utf-8", "surrogatepass")) for text in request.texts())
+        if found > self.max_request_bytes:
+            remedy = "split it, or start the executor with a larger max_request_bytes"
+            expected = f"expected at most {self.max_request_bytes:,} bytes, found {found:,}"
+            raise RefusalError(Code.INVALID, f"the request is too large: {expected}; {remedy}")
+
+    def check_priority(self, name: str, component: ComponentModel) -> None:
+        """Whether a component may be added with its priority.
+
+        Raises:
+            RefusalError: INVALID.
+        """
+        if component.priority > self.max_requested_priority:
+            remedy = "lower it, or start the executor with a higher max_requested_priority"
+            expected = f"expected at most {self.max_requested_priority}, found {component.priority}"
+            raise RefusalError(Code.INVALID, f"priority of component '{name}': {expected}; {remedy}")
+
+    def check_bytes(self, name: str, wanted: int, taken: int) -> None:
+        """Whether there is so much left of what requests may take.
+
+        Raises:
+            RefusalError: INVALID.
+        """
+        left = max(0, self.max_requested_bytes - taken)
+        if wanted > left:
+            remedy = "ask for less, remove what is not needed, or start the executor with a larger"
+            expected = f"expected at most {left:,} bytes, found {wanted:,}"
+            text = f"'{name}' needs more memory than requests may take: {expected}"
+            raise RefusalError(Code.INVALID, f"{text}; {remedy} max_requested_bytes")
+
+
+def bytes_of_component(component: ComponentModel) -> int:
+    """What the thread of a component takes, at least."""
+    return component.stack_bytes + (component.trace_records or _USUAL_TRACE_RECORDS) * _TRACE_RECORD_BYTES
+
+
+def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
+    """What the values of a resource take, at least; the resources of plug-ins count for nothing."""
+    value = registry.value_bytes(resource.type)
+    depth = (resource.topic.qos.depth or 0) if resource.topic is not None else 0
+    match resource.kind:
+        case "ring_buffer":
+            return (value or resource.max_bytes) * ((resource.capacity or 0) + depth)
+        case "shared_data":
+            return (value or resource.max_bytes) * (_CELLS + depth)
+        case "latest_value":
+            return value * (_CELLS + resource.max_readers + depth)
+        case _:
+            return 0

@@ -1,0 +1,91 @@
+"""What a transaction cost, as replies and events tell it. Knows no ROS."""
+
+from dataclasses import dataclass, replace
+
+from mauve_rt._kernel import Committed, StepReport, TransactionReport, monotonic_ns
+from mauve_rt.control.requests import NOT_MEASURED, Outcome, Report, Step
+
+
+@dataclass(frozen=True)
+class Following:
+    """The releases that follow a commit."""
+
+    committed: Committed
+    steps: tuple[Step, ...]
+    until_ns: int
+
+    def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
+        """As Pending.look."""
+        left_ns = self.until_ns - monotonic_ns()
+        measured = self.committed.report(max(0, min(left_ns, wait_ns)))
+        is_over = measured.is_complete or left_ns <= wait_ns
+        return replace(
+            outcome,
+            message=message_of(self.steps, measured),
+            report=reports_of(self.steps, measured),
+            pending=None if is_over else outcome.pending,
+        )
+
+
+def message_of(steps: tuple[Step, ...], measured: TransactionReport) -> str:
+    """What was done, in one line, and which components are known to have missed releases for it."""
+    # Every step of a component tells of all that it missed.
+    missed = {report.component: report for report in measured.steps if report.missed_releases > 0}
+    return "; ".join([_done(steps, measured), *(_missed(report) for report in missed.values())])
+
+
+def _missed(report: StepReport) -> str:
+    count = report.missed_releases
+    text = f"component '{report.component}' missed {count:,} release{'s' if count > 1 else ''}"
+    return f"{text} ({report.remark})" if report.remark else text
+
+
+def _done(steps: tuple[Step, ...], measured: TransactionReport) -> str:
+    if len(steps) > 1:
+        figures = f"prepared in {measured.prepare_ns / 1e6:.3g} ms"
+        if measured.blackout_ns > 0:
+            figures += f", longest blackout {measured.blackout_ns / 1e6:.3g} ms"
+        return f"{len(steps)} steps are in force; {figures}"
+    step, report = steps[0], measured.steps[0]
+    match step.kind:
+        case "replace_core":
+            return f"component '{step.target}' runs {report.to_core}, before {report.from_core}"
+        case "set_property":
+            return f"property '{step.name}' of component '{step.target}' is {step.value}"
+        case _:
+            return f"done: {step}"
+
+
+def reports_of(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Report, ...]:
+    """What every step changed and cost, as far as it is known."""
+    if len(measured.steps) == 1:  # then all of it was for this one
+        alone, complete = measured.steps[0], measured.is_complete
+        return (_report(steps[0], alone, prepare_ns=measured.prepare_ns, is_complete=complete),)
+    # Lines beyond the steps' own are of components that a step for all was about.
+    for_all = [Step("resynchronise", "")] * (len(measured.steps) - len(steps))
+    return tuple(
+        _report(step, report, prepare_ns=report.prepare_ns, is_complete=measured.is_complete)
+        for step, report in zip([*steps, *for_all], measured.steps, strict=True)
+    )
+
+
+def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: bool) -> Report:
+    is_long = step.kind in ("add_component", "add_resource")
+    on_resource = step.kind in ("add_resource", "remove_resource")
+    words = [step.kind, step.target if on_resource else step.name]
+    if not is_long and step.kind != "replace_core":
+        words.append(step.value)
+    held = measured.blackout_ns != 0
+    follows = held and not is_complete and measured.phase_actual_ns == NOT_MEASURED
+    return Report(
+        step=" ".join(word for word in words if word),
+        component=measured.component,
+        prepare_ns=prepare_ns,
+        blackout_ns=measured.blackout_ns if held else NOT_MEASURED,
+        missed_releases=NOT_MEASURED if follows else measured.missed_releases,
+        phase_nominal_ns=measured.phase_nominal_ns if held else NOT_MEASURED,
+        phase_actual_ns=measured.phase_actual_ns,
+        from_core=measured.from_core,
+        to_core=measured.to_core,
+        remark=measured.remark,
+    )

@@ -1,0 +1,301 @@
+"""The steps of a request, checked one after another and made into a transaction. Knows no ROS.
+
+What a step before will have made of the architecture counts: step 3 may connect what step 1 adds. What needs
+the kernel to tell (states, wiring, whether parts fit), the kernel tells at the commit.
+
+What is loaded for a name that comes by request, and where the name has to be listed before:
+
+| name                               | listed in the ament index as        | loaded                     |
+| ---------------------------------- | ----------------------------------- | -------------------------- |
+| core, fsm, shell, kind of resource | mauve_rt_plugins                    | its library, its module    |
+| type of a resource                 | the same, else in rosidl_interfaces | its library, package.msg   |
+| type of a topic to record          | rosidl_interfaces                   | package.msg                |
+| type of a service                  | rosidl_interfaces                   | package.srv, type supports |
+"""
+
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from mauve_rt._kernel import (
+    ComponentDescription,
+    PropertyDescription,
+    ResourceDescription,
+    ShellDescription,
+    Transaction,
+)
+from mauve_rt.control.limits import RequestLimits, bytes_of_component, bytes_of_resource
+from mauve_rt.control.requests import Code, RefusalError, Step, code_of
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
+from mauve_rt.model.architecture_file import ArchitectureModel
+from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
+from mauve_rt.model.checks import Checks, property_mismatch
+from mauve_rt.model.fragment import fragment
+from mauve_rt.model.message_shapes import REMEDY, mismatches
+from mauve_rt.model.resource_parts import describe_resource
+from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
+from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.yaml.text import YamlError, read_yaml
+
+_TOLD_PROBLEMS = 10
+
+
+@dataclass
+class _Sketch:
+    """A component as the steps so far will have left it."""
+
+    model: ComponentModel
+    properties: dict[str, PropertyDescription] = field(default_factory=dict)
+    is_new: bool = False
+
+
+@dataclass
+class Bound:
+    """Resources that a plan binds to topics or services, and resources that it removes."""
+
+    added: dict[str, ResourceModel] = field(default_factory=dict)
+    described: dict[str, ResourceDescription] = field(default_factory=dict)
+    removed: set[str] = field(default_factory=set)
+
+
+class Plan:
+    """The transaction that a request asks for, and what it will have added and removed."""
+
+    def __init__(
+        self,
+        steps: Iterable[Step],
+        runtime: Runtime,
+        parts: Iterable[ComponentDescription],
+        *,
+        limits: RequestLimits,
+        taken: Mapping[str, int],
+    ) -> None:
+        """Check and translate every step for the present components; loads the plug-ins that they name.
+
+        `taken`: bytes that requests took before, by name of what they added; `self.taken`, those afterwards.
+
+        Raises:
+            RefusalError: naming the step, where there are several.
+        """
+        self.transaction = Transaction()
+        self.added: dict[str, ComponentModel] = {}
+        self.removed: set[str] = set()
+        self.bound = Bound()
+        self.taken = {**taken}
+        self._limits = limits
+        self._runtime = runtime
+        self._sketches: dict[str, _Sketch] = {}
+        for part in parts:
+            if (model := runtime.declared(part.name)) is not None:
+                self._sketches[part.name] = _sketch_of(part, model)
+        self._resources = set(runtime.resources())
+        all_steps = tuple(steps)
+        for number, step in enumerate(all_steps, start=1):
+            where = f"step {number} ({step}): " if len(all_steps) > 1 else ""
+            try:
+                self._take(step)
+            except RefusalError as refusal:
+                raise RefusalError(refusal.code, f"{where}{refusal}") from None
+            except MauveError as error:
+                raise RefusalError(code_of(error), one_line(f"{where}{_words(error)}")) from None
+
+    def _take(self, step: Step) -> None:
+        transaction, name = self.transaction, step.target
+        match step.kind:
+            case "add_component":
+                self._add_component(step)
+            case "add_resource":
+                self._add_resource(step)
+            case "remove_resource":
+                self._remove_resource(step)
+            case "remove_component":
+                self._component(step)
+                transaction.remove_component(name)
+                del self._sketches[name]
+                self.removed.add(name)
+                self.taken.pop(name, None)
+                self.added.pop(name, None)
+            case "start" | "stop" | "configure":
+                self._component(step)
+                ask = {"stop": transaction.stop, "configure": transaction.configure}
+                ask.get(step.kind, transaction.start)(name)
+            case "resynchronise":
+                self._resynchronise(step)
+            case "connect" | "disconnect":
+                self._connect(step)
+            case "set_property":
+                transaction.set_property(name, step.name, _property_value(step, self._component(step)))
+            case _:
+                self._replace(step)
+
+    def _component(self, step: Step) -> _Sketch:
+        """The component that a step is about.
+
+        Raises:
+            RefusalError: UNKNOWN_COMPONENT or NOT_RECONFIGURABLE.
+        """
+        name = step.target
+        sketch = self._sketches.get(name)
+        if sketch is None:
+            remedy = did_you_mean(name, self._sketches)
+            text = f"component {shown(name)} is unknown; the executor has {', '.join(self._sketches)}"
+            raise RefusalError(
+                Code.UNKNOWN_COMPONENT, f"{text}; {remedy}" if remedy.startswith("did") else text
+            )
+        if not sketch.model.reconfigurable and not sketch.is_new:
+            text = f"component '{name}' is protected: it was declared with reconfigurable: false"
+            raise RefusalError(Code.NOT_RECONFIGURABLE, text)
+        return sketch
+
+    def _connect(self, step: Step) -> None:
+        self._component(step)
+        if step.kind == "disconnect":
+            self.transaction.disconnect(step.target, step.name)
+        else:
+            resource, service = _service(step)
+            self.transaction.connect(step.target, step.name, resource, service)
+
+    def _resynchronise(self, step: Step) -> None:
+        if step.target:
+            text = f"a step of kind 'resynchronise' is for all components; found target {shown(step.target)}"
+            raise RefusalError(Code.INVALID, text)
+        self.transaction.resynchronise()
+
+    def _replace(self, step: Step) -> None:
+        kind = step.kind.removeprefix("replace_")
+        sketch = self._component(step)
+        with self._runtime.loading() as loader:
+            allowed = allowed_parts(sketch.model, kind, loader)
+            if step.name not in allowed:
+                installed = step.name in loader.names(kind)
+                raise _undeclared(step, kind, allowed, installed=installed)
+            loader.require(kind, step.name)
+        match kind:
+            case "core":
+                self.transaction.replace_core(step.target, step.name)
+            case "fsm":
+                self.transaction.replace_fsm(step.target, step.name)
+            case _:
+                self.transaction.replace_shell(step.target, step.name)
+                shell = self._runtime.registry.describe_shell(step.name)
+                _check_structs(shell)
+                sketch.properties = {item.name: item for item in shell.properties}
+
+    def _add_component(self, step: Step) -> None:
+        name = step.target
+        self._check_name(step)
+        model = self._fragment(step, "components")
+        self._limits.check_priority(name, model.components[name])
+        self._take_bytes(name, bytes_of_component(model.components[name]))
+        with self._runtime.loading() as loader:
+            if problems := Checks(model, loader).problems():
+                raise ArchitectureFileError(model.path, problems)
+            add_component_step(self.transaction, model, name, loader)
+        component = model.components[name]
+        shell = self._runtime.registry.describe_shell(component.shell)
+        properties = {item.name: item for item in shell.properties}
+        self._sketches[name] = _Sketch(component, properties, is_new=True)
+        self.added[name] = component
+
+    def _add_resource(self, step: Step) -> None:
+        name = step.target
+        self._check_name(step)
+        model = self._fragment(step, "resources")
+        resource = model.resources[name]
+        with self._runtime.loading() as loader:
+            with suppress(MauveError):  # which the checks tell in their words
+                loader.require_type(resource.type)
+            self._take_bytes(name, bytes_of_resource(resource, loader.registry))  # before there is any of it
+            if problems := Checks(model, loader).problems():
+                raise ArchitectureFileError(model.path, problems)
+            add_resource_step(self.transaction, model, name, loader.registry)
+            if resource.topic is not None or resource.service is not None:
+                self.bound.added[name] = resource
+                self.bound.described[name] = describe_resource(resource, loader.registry)
+        self._resources.add(name)
+
+    def _remove_resource(self, step: Step) -> None:
+        self.transaction.remove_resource(step.target)
+        self._resources.discard(step.target)
+        self.taken.pop(step.target, None)
+        if self.bound.added.pop(step.target, None) is None:
+            self.bound.removed.add(step.target)
+
+    def _take_bytes(self, name: str, wanted: int) -> None:
+        self._limits.check_bytes(name, wanted, sum(self.taken.values()))
+        self.taken[name] = wanted
+
+    def _check_name(self, step: Step) -> None:
+        if step.target in self._sketches or step.target in self._resources:
+            what = "component" if step.target in self._sketches else "resource"
+            text = (
+                f"there is a {what} '{step.target}' already; take another name, or remove it in a step before"
+            )
+            raise RefusalError(Code.INVALID, text)
+
+    def _fragment(self, step: Step, section: str) -> ArchitectureModel:
+        return fragment(self._runtime.model, step.value, section=section, name=step.target)
+
+
+def _sketch_of(part: ComponentDescription, model: ComponentModel) -> _Sketch:
+    return _Sketch(model, {item.name: item for item in part.properties})
+
+
+def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -> RefusalError:
+    takes = f"component '{step.target}' takes {', '.join(allowed)}"
+    if not installed:
+        return RefusalError(Code.UNKNOWN_CORE, f"{kind} {shown(step.name)} is not installed; {takes}")
+    text = f"{kind} '{step.name}' is installed, but not declared: {takes}"
+    return RefusalError(Code.UNDECLARED_CORE, f"{text}; name it among its alternatives in the file")
+
+
+def _check_structs(shell: ShellDescription) -> None:
+    """Refuse a shell in which a C++ struct is not the ROS message whose name it bears."""
+    for port in shell.ports:
+        for found in mismatches(port.messages):
+            text = f"shell '{shell.name}', port '{port.name}': {found.what}"
+            facts = f"expected {found.expected}, found {found.found}; {REMEDY}"
+            raise RefusalError(Code.PREPARE_FAILED, f"{text}: {facts}")
+
+
+def _words(error: MauveError) -> str:
+    """An error without the place in a file, where it is about a step's own text."""
+    if isinstance(error, ArchitectureFileError):
+        told = [problem.text() for problem in error.problems[:_TOLD_PROBLEMS]]
+        more = len(error.problems) - len(told)
+        return "; ".join([*told, f"and {more:,} more"] if more else told)
+    return str(error)
+
+
+def _yaml(step: Step, subject: str) -> object:
+    try:
+        return read_yaml(step.value)
+    except YamlError:
+        raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
+
+
+def _service(step: Step) -> tuple[str, str]:
+    subject = f"port '{step.name}' of component '{step.target}'"
+    value = _yaml(step, subject)
+    resource, dot, service = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if not (resource and dot and service):
+        text = f"{subject}: expected resource.service as the value, found {shown(step.value)}"
+        raise RefusalError(Code.INVALID, text)
+    return resource, service
+
+
+def _property_value(step: Step, component: _Sketch) -> PropertyValue:
+    known = component.properties
+    subject = f"property '{step.name}' of component '{step.target}'"
+    if step.name not in known:
+        text = f"component '{step.target}' has no property {shown(step.name)}"
+        raise RefusalError(Code.INVALID, f"{text}; {did_you_mean(step.name, known)}")
+    value = _yaml(step, subject)
+    if not isinstance(value, bool | int | float | str):
+        expected = "expected true, false, a number or text in YAML"
+        raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+    if facts := property_mismatch(known[step.name], value):
+        text = f"{subject}: expected {facts['expected']}, found {facts['found']}"
+        raise RefusalError(Code.INVALID, text)
+    return value

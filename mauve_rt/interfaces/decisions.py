@@ -1,0 +1,55 @@
+"""What a supervisor hears and says, between its engine's values and messages of mauve_msgs."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from mauve_msgs.msg import ComponentInfo, SupervisorDecision
+from mauve_rt.supervision.engine import Decision
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.rule import ArchitectureView, ComponentView
+
+STATES = {
+    getattr(ComponentInfo, name): name
+    for name in ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")
+}
+
+
+def architecture_view(state: Any) -> ArchitectureView:
+    """Of a mauve_msgs/msg/ArchitectureState."""
+    components = {
+        status.name: ComponentView(STATES.get(status.state, str(status.state)), status.core)
+        for status in state.components
+    }
+    return ArchitectureView(state.instance_id, state.revision, components)
+
+
+def inventory(instance_id: str, components: Iterable[Any], resources: Iterable[Any]) -> Inventory:
+    """Of mauve_msgs/msg/ComponentInfo and ResourceInfo, as ~/list_components lists them."""
+    listed = {info.name: _listed_component(info) for info in components}
+    return Inventory(instance_id, listed, {info.name for info in resources})
+
+
+def _listed_component(info: Any) -> ListedComponent:
+    return ListedComponent(
+        state=STATES.get(info.state, str(info.state)),
+        shell=info.shell,
+        core=info.core,
+        fsm=info.fsm,
+        properties=dict(text.split("=", 1) for text in info.properties if "=" in text),
+        connections={
+            port.name: f"{port.resource}.{port.service}" if port.resource else "" for port in info.ports
+        },
+    )
+
+
+def decision_message(decision: Decision, stamp: Any) -> Any:
+    """mauve_msgs/msg/SupervisorDecision."""
+    return SupervisorDecision(
+        stamp=stamp,
+        rule=decision.rule,
+        decision=decision.decision,
+        reason=decision.reason,
+        silence_s=decision.silence_s,
+        revision=decision.revision,
+        message=decision.message,
+    )

@@ -1,0 +1,172 @@
+"""The executor's values as messages of mauve_msgs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mauve_msgs.msg import (
+    ArchitectureState,
+    ComponentInfo,
+    ComponentStatus,
+    PortInfo,
+    RealtimeStatus,
+    ReconfigurationEvent,
+    ResourceInfo,
+    StepReport,
+    TraceArchitecture,
+)
+from mauve_rt._kernel import ComponentDescription, PortDescription
+from mauve_rt.control.checks import MAX_TEXT
+from mauve_rt.control.requests import Outcome, Report, Request
+from mauve_rt.control.runtime import Observed, Runtime
+from mauve_rt.model.schema import PropertyValue
+from mauve_rt.model.words import cut, shown
+
+_PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
+_MAX_PRIORITY = 255
+
+
+def component_info(component: ComponentDescription, *, alternatives: list[str]) -> Any:
+    """ComponentInfo; `alternatives` are the cores it takes beside the present one."""
+    return ComponentInfo(
+        name=component.name,
+        shell=component.shell,
+        core=component.core,
+        fsm=component.fsm,
+        state=getattr(ComponentInfo, component.state),
+        clock_ns=component.clock_ns,
+        period_ns=component.period_ns,
+        offset_ns=component.offset_ns,
+        policy=component.policy,
+        priority=min(max(component.priority, 0), _MAX_PRIORITY),
+        cpus=list(component.cpus),
+        alternatives=alternatives,
+        reconfigurable=component.reconfigurable,
+        ports=[_port_info(port) for port in component.ports],
+        properties=[f"{item.name}={_yaml(item.value)}" for item in component.properties],
+        fault=component.fault,
+        releases=component.releases,
+        overruns=component.overruns,
+        skipped=component.skipped,
+        **_state_age(component),
+        structural=[item.name for item in component.properties if item.structural],
+    )
+
+
+def _state_age(component: ComponentDescription) -> dict[str, Any]:
+    """What ComponentInfo and ComponentStatus tell alike."""
+    return {
+        "current_state": component.current_state,
+        "state_age_ns": component.state_age_ns,
+        "state_bound_ns": component.state_bound_ns,
+        "hung_after_ns": component.hung_after_ns,
+        "hung": component.hung,
+        "waiting": component.waiting,
+    }
+
+
+def component_infos(runtime: Runtime) -> list[Any]:
+    """ComponentInfo of every component."""
+    return [component_info(part, alternatives=runtime.cores_of(part)) for part in runtime.components()]
+
+
+def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, str]]) -> list[Any]:
+    """ResourceInfo of every resource; `bindings`: ROS names by resource and field."""
+    return [
+        ResourceInfo(
+            name=resource.name, kind=resource.kind, type=resource.type, **bindings.get(resource.name, {})
+        )
+        for resource in runtime.described_resources()
+    ]
+
+
+def trace_architecture(runtime: Runtime, observed: Observed) -> Any:
+    """TraceArchitecture as it was observed."""
+    return TraceArchitecture(
+        epoch_ns=runtime.deployment_epoch_ns(),
+        components=[
+            component_info(part, alternatives=runtime.cores_of(part)) for part in observed.components
+        ],
+    )
+
+
+def realtime_status(runtime: Runtime) -> Any:
+    """RealtimeStatus; nothing granted while unconfigured."""
+    status = runtime.realtime_status()
+    if status is None:
+        return RealtimeStatus()
+    return RealtimeStatus(granted=status.granted, missing=list(status.missing))
+
+
+def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, error: str = "") -> Any:
+    """ArchitectureState as it was observed; `error`: why the last lifecycle transition failed."""
+    return ArchitectureState(
+        stamp=stamp,
+        instance_id=runtime.instance_id,
+        revision=observed.revision,
+        deployment_epoch_ns=runtime.deployment_epoch_ns(),
+        components=[
+            ComponentStatus(
+                name=component.name,
+                state=getattr(ComponentInfo, component.state),
+                core=component.core,
+                fault=component.fault,
+                **_state_age(component),
+            )
+            for component in observed.components
+        ],
+        realtime=realtime_status(runtime),
+        error=error,
+    )
+
+
+def step_reports(outcome: Outcome) -> list[Any]:
+    """StepReport of every step."""
+    return [_step_report(report) for report in outcome.report]
+
+
+def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:
+    """ReconfigurationEvent of a request and what came of it."""
+    return ReconfigurationEvent(
+        stamp=stamp,
+        instance_id=instance_id,
+        revision=outcome.revision,
+        requested_by=cut(request.requested_by, MAX_TEXT),
+        request_id=cut(request.request_id, MAX_TEXT),
+        request=str(request),
+        cause=cut(request.cause, MAX_TEXT),
+        success=outcome.success,
+        code=int(outcome.code),
+        message=outcome.message,
+        from_core=outcome.from_core,
+        to_core=outcome.to_core,
+        report=step_reports(outcome),
+    )
+
+
+def _step_report(report: Report) -> Any:
+    return StepReport(
+        step=report.step,
+        component=report.component,
+        prepare_ns=report.prepare_ns,
+        blackout_ns=report.blackout_ns,
+        missed_releases=report.missed_releases,
+        phase_nominal_ns=report.phase_nominal_ns,
+        phase_actual_ns=report.phase_actual_ns,
+        from_core=report.from_core,
+        to_core=report.to_core,
+        remark=report.remark,
+    )
+
+
+def _port_info(port: PortDescription) -> Any:
+    return PortInfo(
+        name=port.name,
+        kind=_PORT_KINDS[port.kind],
+        type=port.type,
+        resource=port.resource,
+        service=port.service,
+    )
+
+
+def _yaml(value: PropertyValue) -> str:
+    return f"'{value}'" if isinstance(value, str) else shown(value)

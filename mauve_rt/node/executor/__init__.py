@@ -1,0 +1,1 @@
+"""The node `executor`: an architecture on ROS 2."""

@@ -1,0 +1,222 @@
+"""Resources bound to ROS topics and services. All data goes by the native bridge; this opens it.
+
+Who binds a resource while the executor runs does it in two steps around the commit that adds it: open()
+before, where everything can still be refused, attach() after.
+"""
+
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from rclpy.lifecycle import LifecycleNode
+
+from mauve_rt._bridge import Bridge, CallReport, TopicReport
+from mauve_rt._kernel import Architecture, ResourceDescription
+from mauve_rt.errors import MauveError, TopicError
+from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
+from mauve_rt.model import ArchitectureModel
+from mauve_rt.model.qos_remarks import qos_remarks, remark_text
+from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
+from mauve_rt.trace.bag.recorded import SentMessage, TopicQos
+
+
+@dataclass(frozen=True)
+class _BoundTopic:
+    resource: str
+    direction: str
+    topic: str
+    type_name: str
+    qos: TopicQos
+
+    def message(self, time_ns: int, data: bytes) -> SentMessage:
+        """A message on it."""
+        return SentMessage(self.topic, self.type_name, data, time_ns, self.qos)
+
+
+class BoundResources:
+    """Publishers, subscriptions, clients and services of one architecture, from configure() to close().
+
+    | member      | written by                          | read by             | guarded by |
+    | ----------- | ----------------------------------- | ------------------- | ---------- |
+    | `_bridge`   | configure(), close()                | any                 | `_lock`    |
+    | `_numbers`  | open(), discard(), remove() ...     | the same            | `_lock`    |
+    | `_topics`   | open(), close(): grows, else emptied | recorder, any       | each dict operation is one |
+    """
+
+    def __init__(self, node: LifecycleNode) -> None:
+        self._node = node
+        self._lock = threading.RLock()
+        self._bridge: Bridge | None = None
+        self._numbers: dict[str, list[int]] = {}  # of what is open, by resource
+        self._topics: dict[int, _BoundTopic] = {}  # by their numbers in the bridge, also of those closed
+
+    def configure(self, model: ArchitectureModel, architecture: Architecture) -> None:
+        """Open and attach whatever the file binds; nothing flows before start().
+
+        Raises:
+            MauveError: a type is not installed, or the middleware refuses; nothing is open then.
+        """
+        with self._lock:
+            sender = model.sender
+            self._bridge = Bridge(
+                self._node.handle.pointer,
+                architecture.pointer,
+                priority=sender.priority,
+                cpus=sender.cpus or (),
+            )
+            try:
+                described = {resource.name: resource for resource in architecture.resources()}
+                self.attach(self.open(model.resources, described))
+            except MauveError:
+                self.close()
+                raise
+
+    def open(
+        self, resources: Mapping[str, ResourceModel], described: Mapping[str, ResourceDescription]
+    ) -> dict[str, list[int]]:
+        """Open the topics and services of these resources, which need not be there yet; for attach().
+
+        Raises:
+            MauveError: as configure(); none of them is open then.
+        """
+        opened: dict[str, list[int]] = {}
+        if not resources:
+            return opened
+        with self._lock:
+            bridge = self._require_bridge()
+            try:
+                for name, resource in resources.items():
+                    numbers = opened.setdefault(name, [])
+                    if resource.topic is not None:
+                        numbers.append(self._open_topic(bridge, name, resource, resource.topic))
+                    if resource.service is not None:
+                        numbers.append(_open_service(bridge, name, described[name], resource.service))
+            except MauveError:
+                self.discard(opened)
+                raise
+        return {name: numbers for name, numbers in opened.items() if numbers}
+
+    def _open_topic(self, bridge: Bridge, name: str, resource: ResourceModel, topic: TopicModel) -> int:
+        full_name = self._node.resolve_topic_name(topic.name)
+        known = dict(self._node.get_topic_names_and_types()).get(full_name, ())
+        if others := _others(known, resource.topic_type):
+            raise TopicError(full_name, name, expected=resource.topic_type, found=" and ".join(others))
+        for remark in qos_remarks(topic):
+            self._node.get_logger().warning(remark_text(name, topic, remark))
+        qos = qos_profile(topic.qos, capacity=resource.capacity or 0)
+        bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
+        number = bind(name, topic.name, resource.topic_type, native_qos(qos))
+        self._topics[number] = _BoundTopic(
+            name, topic.direction, full_name, resource.topic_type, recorded_qos(qos)
+        )
+        return number
+
+    def attach(self, opened: Mapping[str, list[int]]) -> None:
+        """Let what was opened serve its resources, which are in the architecture now.
+
+        Raises:
+            MauveError: one of them is none to serve.
+        """
+        if opened:
+            with self._lock:
+                self._require_bridge().attach([number for numbers in opened.values() for number in numbers])
+                self._numbers.update(opened)
+
+    def discard(self, opened: Mapping[str, list[int]]) -> None:
+        """Close what was opened for resources that did not come to be."""
+        if opened:
+            with self._lock:
+                self._require_bridge().close([number for numbers in opened.values() for number in numbers])
+
+    def remove(self, resources: Iterable[str]) -> None:
+        """Close the topics and services of resources that are gone; what they were told before is sent."""
+        with self._lock:
+            self.discard({name: self._numbers.pop(name) for name in resources if name in self._numbers})
+
+    def start(self) -> None:
+        """Let messages and calls flow, both ways."""
+        with self._lock:
+            if self._bridge is not None:
+                self._bridge.start()
+
+    def stop(self) -> None:
+        """End the flow; returns when what was written before is sent. May be called again."""
+        with self._lock:
+            if self._bridge is not None:
+                self._bridge.stop()
+
+    def close(self) -> None:
+        """Close everything. May be called again."""
+        with self._lock:
+            bridge, self._bridge = self._bridge, None
+            if bridge is not None:
+                bridge.close()
+            self._numbers.clear()
+            self._topics.clear()
+
+    def _require_bridge(self) -> Bridge:
+        if self._bridge is None:
+            raise MauveError("the executor is not configured: nothing can be bound to ROS")
+        return self._bridge
+
+    # ---- for those who ask
+
+    def bindings(self) -> dict[str, dict[str, str]]:
+        """The ROS names of each bound resource, expanded and remapped, as ResourceInfo's fields."""
+        # `_topics` keeps those closed too: of a resource that was added again the last one counts.
+        directions = {bound.resource: bound.direction for bound in list(self._topics.values())}
+        found: dict[str, dict[str, str]] = {}
+        for topic in self.topics():
+            side = "publishes" if directions.get(topic.resource) == "publish" else "subscribes"
+            found.setdefault(topic.resource, {})[side] = topic.topic
+        for call in self.calls():
+            side = "offers" if call.is_offered else "calls"
+            found.setdefault(call.resource, {})[side] = call.service
+        return found
+
+    def topics(self) -> list[TopicReport]:
+        """How each bound topic fares."""
+        bridge = self._bridge
+        return bridge.topics() if bridge is not None else []
+
+    def calls(self) -> list[CallReport]:
+        """How each ROS service that is called or offered fares."""
+        bridge = self._bridge
+        return bridge.calls() if bridge is not None else []
+
+    def other_types(self) -> dict[str, list[str]]:
+        """Types that other nodes use on the bound topics: by the graph, as the middleware need not tell."""
+        known = dict(self._node.get_topic_names_and_types())
+        bound = list(self._topics.values())
+        found = {each.topic: _others(known.get(each.topic, ()), each.type_name) for each in bound}
+        return {topic: others for topic, others in found.items() if others}
+
+    # ---- as a MessageSource of the recorder, which is stopped before close()
+
+    def keep_messages(self, *, on: bool) -> None:
+        """Keep every message from now on until take_messages(), or none any more."""
+        bridge = self._bridge
+        if bridge is not None:
+            bridge.log(on=on)
+            if not on:
+                bridge.take_log()
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        """What was sent or received since the last call."""
+        taken = self._bridge.take_log() if self._bridge is not None else []
+        return [self._topics[number].message(time_ns, data) for number, time_ns, data in taken]
+
+    def dropped_messages(self) -> int:
+        """Messages that found no room to wait."""
+        return self._bridge.log_dropped if self._bridge is not None else 0
+
+
+def _open_service(bridge: Bridge, name: str, resource: ResourceDescription, service: ServiceModel) -> int:
+    if service.offers is None:
+        return bridge.call(name, service.name, resource.type)
+    offered = next(each for each in resource.services if each.name == service.offers)
+    return bridge.offer(name, service.name, offered.type, service.offers)
+
+
+def _others(types: Sequence[str], type_name: str) -> list[str]:
+    return [name for name in types if name != type_name]

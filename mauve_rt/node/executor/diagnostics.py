@@ -1,0 +1,220 @@
+"""What the executor tells of its health: /diagnostics at 1 Hz."""
+
+import resource
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSPolicyKind, QoSProfile
+
+from mauve_rt._bridge import CallReport, TopicReport
+from mauve_rt._kernel import ComponentDescription, RecentMaxima, allocation_counting
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.state_age import in_words
+from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
+from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.recording import Recording, RecordingStatus
+
+_ONE = ThresholdModel(warn=1)
+_DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
+_PYTHON_DEFAULTS = DiagnosticsModel(overruns=_ONE)  # the interpreter allocates as it runs
+
+
+class Diagnostics:
+    """/diagnostics: a status per component, bound topic and service, the bag, the process. On the timer."""
+
+    def __init__(
+        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, recording: Recording
+    ) -> None:
+        self._node = node
+        self._runtime = runtime
+        self._bound = bound
+        self._recording = recording
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
+        self._told: dict[tuple[str, str], int] = {}
+        self._allocation_counting = allocation_counting()
+
+    def publish(self, *, error: str = "") -> None:
+        """Publish once; `error`: why the last lifecycle transition failed."""
+        maxima = {recent.component: recent for recent in self._runtime.take_recent_maxima()}
+        parts = [part for part in self._runtime.components() if part.name in maxima]
+        array = DiagnosticArray(status=[self._component(part, maxima[part.name]) for part in parts])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        others = self._bound.other_types()
+        array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
+        array.status += [self._call(report) for report in self._bound.calls()]
+        if (recording := self._recording.status()) is not None:
+            array.status.append(self._bag(recording))
+        array.status.append(self._process(error))
+        self._publisher.publish(array)
+
+    def _component(self, part: ComponentDescription, recent: RecentMaxima) -> Any:
+        remarks = [*self._remarks(part, recent)]
+        if part.state == "FAULTED":
+            remarks = [(DiagnosticStatus.ERROR, part.fault)]
+        elif part.fell_back:
+            text = f"fallback core {part.core} runs after a fault: {part.fault}"
+            remarks.insert(0, (DiagnosticStatus.WARN, text))
+        if part.hung:
+            text = f"hung: {in_words(part)}"
+            remarks.insert(0, (DiagnosticStatus.ERROR, text))
+        level = max((level for level, _ in remarks), default=DiagnosticStatus.OK)
+        message = "; ".join(text for _, text in remarks) or part.state.lower()
+        values: dict[str, object] = {
+            "core": part.core,
+            "state": part.current_state,
+            "state_age_ns": part.state_age_ns,
+            "state_bound_ns": part.state_bound_ns,
+            "period_ns": part.period_ns,
+            "hung_after_ns": part.hung_after_ns,
+            "releases": part.releases,
+            "overruns": part.overruns,
+            "skipped": part.skipped,
+            "wakeup_p50_ns": part.wakeup_p50_ns,
+            "wakeup_p99_ns": part.wakeup_p99_ns,
+            "wakeup_max_ns": part.wakeup_max_ns,
+            "wakeup_recent_max_ns": recent.wakeup_ns,
+            "allocations": part.allocations,
+            "page_faults": part.page_faults,
+        }
+        for time in part.execution_times:
+            values[f"execution_mean_ns[{time.state}]"] = time.mean_ns
+            values[f"execution_max_ns[{time.state}]"] = time.max_ns
+            values[f"execution_recent_max_ns[{time.state}]"] = recent.execution_ns.get(time.state, 0)
+        return self._status(part.name, level, message, values)
+
+    def _remarks(self, part: ComponentDescription, recent: RecentMaxima) -> Iterator[tuple[bytes, str]]:
+        """What reached a threshold since the last status: level; measured beside allowed figure."""
+        thresholds = self._thresholds(part)
+        figures = [
+            ("wakeup_max_us", "", recent.wakeup_ns / 1000),
+            *(
+                ("execution_max_us", f" in state {state}", time_ns / 1000)
+                for state, time_ns in recent.execution_ns.items()
+            ),
+            *(
+                (count, "", self._more(part.name, count, getattr(part, count)))
+                for count in ("overruns", "skipped", "allocations", "page_faults")
+            ),
+        ]
+        for key, where, measured in figures:
+            threshold: ThresholdModel | None = getattr(thresholds, key)
+            if threshold is None:
+                continue
+            for level, word, limit in (
+                (DiagnosticStatus.ERROR, "error", threshold.error),
+                (DiagnosticStatus.WARN, "warning", threshold.warn),
+            ):
+                if limit is not None and measured >= limit:
+                    yield level, f"{key}{where} {measured:.10g}, {word} from {limit:.10g} on"
+                    break
+
+    def _thresholds(self, part: ComponentDescription) -> DiagnosticsModel:
+        defaults = _PYTHON_DEFAULTS if self._has_python_parts(part) else _DEFAULTS
+        return defaults.overridden_by(self._runtime.diagnostics(part.name))
+
+    def _topic(self, report: TopicReport, other_types: Sequence[str] | None) -> Any:
+        troubles = report.troubles
+        counts = {
+            "messages refused": report.refused,
+            "deadlines missed": troubles.deadlines_missed,
+            "publishers lost": troubles.liveliness_lost,
+        }
+        name = f"topic {report.topic} ({report.resource})"  # several resources may be bound to one
+        remarks = self._grown(name, counts)
+        if other_types:
+            remarks.append(f"other nodes use {' and '.join(other_types)} on it, with whom it does not talk")
+        if troubles.incompatible_qos:
+            policy = QoSPolicyKind(troubles.policy).name.lower()
+            remarks.append(f"another node's quality of service does not fit, in {policy}: they do not talk")
+        values: dict[str, object] = {
+            "resource": report.resource,
+            "messages": report.passed,
+            "refused": report.refused,
+            "deadlines_missed": troubles.deadlines_missed,
+            "liveliness_lost": troubles.liveliness_lost,
+            "incompatible_qos": troubles.incompatible_qos,
+        }
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+
+    def _call(self, report: CallReport) -> Any:
+        counts = report.counts
+        failures = {"calls refused": counts.other}
+        if not report.is_offered:
+            failures |= {"calls without a server": counts.no_server, "calls timed out": counts.timed_out}
+        name = f"service {report.service} ({report.resource})"
+        remarks = self._grown(name, failures)
+        values: dict[str, object] = {
+            "resource": report.resource,
+            "side": "server" if report.is_offered else "client",
+            "answered": counts.answered,
+            "longest_ns": counts.longest_ns,
+            "no_server": counts.no_server,
+            "timed_out": counts.timed_out,
+            "refused": counts.other,
+        }
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+
+    def _bag(self, status: RecordingStatus) -> Any:
+        remarks = self._grown("recording", {"messages dropped": status.dropped})
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        message = "; ".join(remarks) or ("recording" if status.recording else "stopped")
+        if status.error:
+            level, message = DiagnosticStatus.ERROR, status.error
+        values: dict[str, object] = {
+            "bag": status.bag,
+            "messages": status.messages,
+            "dropped_messages": status.dropped,
+        }
+        return self._status("recording", level, message, values)
+
+    def _grown(self, name: str, counts: Mapping[str, int]) -> list[str]:
+        """Those of these counts that grew since the last status, in words."""
+        grown = {what: self._more(name, what, count) for what, count in counts.items()}
+        return [f"{more} {what} since the last status" for what, more in grown.items() if more > 0]
+
+    def _more(self, component: str, what: str, count: int) -> int:
+        """How much it grew since it was told last; a start of the component counts anew."""
+        before = self._told.get((component, what), 0)
+        self._told[component, what] = count
+        return count - before if count >= before else count
+
+    def _has_python_parts(self, part: ComponentDescription) -> bool:
+        find = self._runtime.index.find
+        plugins = [find("shell", part.shell), find("core", part.core), find("fsm", part.fsm)]
+        return any(plugin is not None and plugin.is_python for plugin in plugins)
+
+    def _process(self, error: str) -> Any:
+        status = self._runtime.realtime_status()
+        missing = list(status.missing) if status is not None else []
+        usage = resource.getrusage(resource.RUSAGE_SELF)
+        level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
+        message = "without real-time rights" if missing else "real-time rights granted"
+        if left_behind := self._runtime.threads_left_behind():
+            level, message = (
+                DiagnosticStatus.WARN,
+                f"{left_behind} threads of removed components still execute",
+            )
+        if error:
+            level, message = DiagnosticStatus.ERROR, error
+        values = {
+            "revision": self._runtime.revision,
+            "missing": "; ".join(missing),
+            "threads_left_behind": left_behind,
+            "page_faults_major": usage.ru_majflt,
+            "page_faults_minor": usage.ru_minflt,
+            "allocation_counting": self._allocation_counting,
+        }
+        return self._status("process", level, message, values)
+
+    def _status(self, name: str, level: bytes, message: str, values: dict[str, object]) -> Any:
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self._node.get_fully_qualified_name()}: {name}",
+            message=message,
+            hardware_id=self._node.get_namespace(),
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )

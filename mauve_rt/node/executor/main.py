@@ -1,0 +1,137 @@
+"""The executor process: runs the architecture of a file.
+
+    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-r __ns:=/robot_1] [-p bag:=DIR]
+        [-p autostart:=false] [-p require_realtime:=true] [-p trace:=false] [-p peers:=[robot_2]]
+        [-p COMPONENT.PROPERTY:=VALUE]
+        [-p record_topics:="['supervisor/decisions:mauve_msgs/msg/SupervisorDecision:transient_local']"]
+
+Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.
+"""
+
+import gc
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.process import (
+    BAD_INPUT,
+    FAILED,
+    Stop,
+    asks_for_help,
+    complain,
+    leave_now,
+    run_until_signalled,
+)
+
+SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
+_SPIN_S = 0.2  # how long a stop may go unnoticed
+_ANSWER_S = 0.5  # for requests to come to their answers by themselves, everything being stopped
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run until signalled, then end the process.
+
+    It ends without the interpreter's own tidying up: all that has to be ended in order is ended by then,
+    destroying objects while a component's state still executes is not safe, and libraries' exit handlers were
+    seen to hang.
+    """
+    words = list(sys.argv if arguments is None else arguments)
+    if asks_for_help(words):
+        from mauve_rt.node.executor.settings import help_text  # noqa: PLC0415 - takes its time to load
+
+        sys.stdout.write(help_text())
+        leave_now(0)
+    discovery = limit_discovery()
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work
+    leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
+
+
+def _work(words: list[str], stop: Stop, discovery: str) -> int:
+    # Imported here so that a signal while modules load is handled; what takes long comes before begin().
+    import mauve_rt.node.executor.node  # noqa: F401, PLC0415
+    from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
+    from mauve_rt.node.executor.settings import Settings  # noqa: PLC0415
+
+    stop.begin()
+    try:
+        settings = Settings.of(words)
+        runtime = settings.runtime()
+        if settings.autostart:
+            runtime.configure()  # before ROS: a bad file starts nothing
+    except MauveError as error:
+        complain(f"executor: {error}")
+        return FAILED if error_code(error) == "realtime_denied" else BAD_INPUT
+    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop, discovery)
+
+
+def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str) -> int:
+    import rclpy  # noqa: PLC0415
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+    from rclpy.utilities import try_shutdown  # noqa: PLC0415
+
+    from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
+
+    node = None
+    try:
+        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+        namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
+        node = ExecutorNode(runtime, namespace=namespace)
+    except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
+        complain(f"executor: {error}")
+    if node is None:
+        gc.collect()  # what there is of the node holds itself alone, and the DDS participant with it
+        try_shutdown()
+        return BAD_INPUT
+    if discovery:
+        node.get_logger().info(discovery)
+    for remark in settings.remarks:
+        node.get_logger().warning(remark)
+    status = FAILED
+    try:
+        gc.freeze()  # nor need it be looked at while Python components run and wait for the interpreter
+        gc.enable()
+        status = _autostart(node, stop) if settings.autostart else 0
+        if status == 0:
+            status = _spin(node, stop)
+    finally:
+        node.close()
+        try_shutdown()
+    return status
+
+
+def _autostart(node: Any, stop: threading.Event) -> int:
+    from rclpy.lifecycle import TransitionCallbackReturn  # noqa: PLC0415
+
+    for transition, status in ((node.trigger_configure, BAD_INPUT), (node.trigger_activate, FAILED)):
+        result = TransitionCallbackReturn.SUCCESS if stop.is_set() else transition()
+        if result != TransitionCallbackReturn.SUCCESS:
+            return FAILED if result == TransitionCallbackReturn.ERROR else status
+    return 0
+
+
+def _spin(node: Any, stop: threading.Event) -> int:
+    from mauve_rt.node.executor.services import is_change  # noqa: PLC0415
+    from mauve_rt.node.shared.service_thread import OtherGroupsExecutor, ServiceThreads  # noqa: PLC0415
+
+    requests = ServiceThreads(node, node.control_group, node.watch, is_change=is_change, sign=node.sign)
+    requests.start()
+    executor = OtherGroupsExecutor(node.control_group, num_threads=node.THREADS)
+    executor.add_node(node)
+    while not stop.is_set() and not node.watch.broken.is_set():
+        try:
+            executor.spin_once(timeout_sec=_SPIN_S)
+        except BaseException as error:  # noqa: BLE001 - a malformed request must not end the process
+            node.watch.tell("taking a message or request", error)
+    node.quiesce()  # ends what a request may be waiting for
+    requests.stop(wait_s=_ANSWER_S, message="the executor ends; what was not in force by then never will be")
+    # Jazzy's executor leaves its pool running; a callback that comes later would find the node destroyed.
+    executor._executor.shutdown(wait=True, cancel_futures=True)  # noqa: SLF001
+    executor.shutdown(timeout_sec=0)
+    return FAILED if node.watch.broken.is_set() else 0
+
+
+if __name__ == "__main__":
+    main()

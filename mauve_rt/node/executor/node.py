@@ -1,0 +1,290 @@
+"""The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from mauve_rt.control.control import Control
+from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
+from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.console import NameWatch, TopicWatch, number_of
+from mauve_rt.node.executor.diagnostics import Diagnostics
+from mauve_rt.node.executor.parameter_services import ParameterServices
+from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.recording import Recording, RecordingOrders
+from mauve_rt.node.executor.services import Services
+from mauve_rt.node.executor.settings import PARAMETERS
+from mauve_rt.node.executor.state import StatePublisher
+from mauve_rt.node.shared.service_thread import refused_reply
+from mauve_rt.node.shared.setting_parameters import declare_settings
+from mauve_rt.node.shared.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
+from mauve_rt.node.shared.watch import Watch
+from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.errors import TraceError
+
+NODE_NAME = "executor"
+
+
+class ExecutorNode(LifecycleNode):
+    """Services, topics and states of one `Runtime`.
+
+    Requests to change, stop and start, lifecycle transitions, listing and recorded topics have a callback
+    group each, so that none delays the others. Requests, in `control_group`, are for `ServiceThreads`, the
+    others for an executor with a thread for each: `THREADS`. Messages and calls of bound resources do not
+    come by here: they have threads of their own, in C++.
+    """
+
+    THREADS = 3
+
+    def __init__(self, runtime: Runtime, *, namespace: str) -> None:
+        """Create the node; the runtime may be configured already.
+
+        Raises:
+            ParameterError: a parameter of the wrong type, or `use_sim_time`.
+        """
+        # Transitions are in the node's default group.
+        self.watch = Watch(lambda text: self.get_logger().error(text))
+        super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
+        self._answer_every_transition()
+        self.control_group = control_group = MutuallyExclusiveCallbackGroup()
+        query_group = MutuallyExclusiveCallbackGroup()
+        self._runtime = runtime
+        # A signal may come while a transition starts or ends threads: nobody else may do that then.
+        self._starting_or_ending = threading.Lock()
+        self._settings = self._declared()
+        self._bound = BoundResources(self)
+        self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
+        self._state = StatePublisher(self, runtime, self._recording, self.watch)
+        self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording)
+        self._properties = Parameters(self, runtime)
+        self._topic_watch = TopicWatch(self.get_logger())
+        self._name_watch = NameWatch(self)
+        control = Control(
+            runtime,
+            phase_timeout_s=self._settings["report_phase_timeout_s"],
+            outside=self._bound,
+            recordings=RecordingOrders(self._recording, runtime, folder=Path(self._settings["bags"])),
+            limits=_limits(self._settings),
+        )
+        services = Services(
+            self,
+            runtime,
+            control=control,
+            bound=self._bound,
+            state=self._state,
+            parameters=self._properties,
+            watch=self.watch,
+            warnings=self._name_watch.warnings,
+            control_group=control_group,
+            query_group=query_group,
+        )
+        ParameterServices(
+            self,
+            self._properties,
+            services.handle,
+            refusal=self._refusal,
+            control_group=control_group,
+            query_group=query_group,
+        )
+        self.create_timer(1.0, self._tell_health, callback_group=query_group)
+
+    # ---- callbacks, none of which may raise: rclpy would leave the others of its group waiting for ever
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any, **options: Any) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded(f"the handler of {srv_name}", callback, otherwise=refused_reply)
+        return super().create_service(srv_type, srv_name, guarded, **options)
+
+    def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded("a timer's work", callback)
+        return super().create_timer(timer_period_sec, guarded, *more, **options)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Any, *more: Any, **options: Any
+    ) -> Any:
+        """As rclpy's."""
+        guarded = self.watch.guarded(f"receiving from {topic}", callback)
+        return super().create_subscription(msg_type, topic, guarded, *more, **options)
+
+    def sign(self, response: Any) -> None:
+        """Put into a reply who replies, and at which revision, where it has words for that."""
+        if hasattr(response, "instance_id"):
+            response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+
+    # ---- transitions
+    #
+    # What a user can correct (a bad file, rights that are missing) is a FAILURE: everything is as before, and
+    # can be tried again. Whatever else goes wrong is an ERROR: on_error() releases all. ~/state says why.
+
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Load and check the file, build the architecture, open topics and bag."""
+        return self._transition(self._configure, undo=self._release)
+
+    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Deploy: all components start on one grid."""
+        return self._transition(self._activate, undo=self.quiesce)
+
+    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Write safe outputs, park the components, the last one first, end the threads."""
+        return self._transition(self.quiesce)
+
+    def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Seal the bag, release the architecture; refused while a component's state still executes."""
+        return self._transition(self._clean_up)
+
+    def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """As deactivate and cleanup."""
+        return self._transition(self._end)
+
+    def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Release everything: back to unconfigured, or finalized where a component's state still executes."""
+        return self._transition(self._end, error=self._state.error)
+
+    def _configure(self) -> None:
+        self._runtime.configure()
+        self._properties.follow()
+        self._bound.configure(self._runtime.model, self._runtime.architecture)
+        with self._properties.lock:
+            names = ("bag", "record_topics", "bag_split_s", "bag_split_bytes")
+            bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
+        if bag:
+            self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
+        self._log_realtime()
+        parts = number_of(self._runtime.components(), "component")
+        resources = number_of(self._runtime.described_resources(), "resource")
+        recorded = f", recording to {bag}" if bag else ""
+        self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
+
+    def _activate(self) -> None:
+        with self._starting_or_ending:
+            self._runtime.activate()
+            self._bound.start()
+            self._state.start(self._runtime.host)
+        self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
+
+    def _clean_up(self) -> None:
+        self._release()
+        self.get_logger().info("cleaned up: nothing is configured")
+
+    def _end(self) -> None:
+        self.quiesce()
+        self._release()
+
+    def _transition(
+        self, work: Callable[[], None], *, undo: Callable[[], None] | None = None, error: str = ""
+    ) -> TransitionCallbackReturn:
+        """What came of a transition's work, told in ~/state; `error`: what led to it."""
+        result, reason = TransitionCallbackReturn.SUCCESS, error
+        try:
+            try:
+                work()
+            except (MauveError, TraceError) as failure:
+                result, reason = TransitionCallbackReturn.FAILURE, str(failure)
+                if undo is not None:
+                    undo()
+        except BaseException as failure:  # noqa: BLE001 - rclpy would swallow it without a word
+            result = TransitionCallbackReturn.ERROR
+            reason = exception_text(failure)
+        if result != TransitionCallbackReturn.SUCCESS:
+            reason = one_line(f"{reason}; after {error}" if error else reason)
+            self.get_logger().error(reason)
+        self._state.error = reason
+        self._state.refresh(again=True)
+        return result
+
+    def _answer_every_transition(self) -> None:
+        """Say no to a transition that the present state does not have: rclpy would say nothing."""
+        service = self._service_change_state
+        change_state = service.callback
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change_state(request, response)
+            except BaseException as error:  # noqa: BLE001 - RCLError, of which rclpy publishes no name
+                self.get_logger().warning(one_line(f"transition refused: {error}"))
+                response.success = False
+                return response
+
+        service.callback = answer
+
+    def quiesce(self) -> None:
+        """Outputs safe, components parked, last words published, threads joined. May be called again."""
+        with self._starting_or_ending:
+            if self._runtime.active:
+                self._runtime.deactivate()
+                self.watch.guarded("~/state", self._state.refresh)()
+                self.get_logger().info("deactivated: outputs are safe, components parked")
+            self._state.stop()
+            self._bound.stop()
+
+    def close(self) -> None:
+        """End everything this node holds, in order: components, threads, bag, node.
+
+        A component whose state still executes keeps its memory until the process ends.
+        """
+        try:
+            self.quiesce()
+            try:
+                self._release()
+            except MauveError as error:
+                self.get_logger().error(str(error))
+                self._recording.stop()
+                self._bound.close()
+        finally:
+            self._state.close()
+            self.destroy_node()
+
+    def destroy_node(self) -> None:
+        """As rclpy's, which forgets the state machine: that would keep the node, and so the DDS participant.
+
+        A participant that is not disposed of stays in others' graphs for its lease of 20 s, and its shared
+        memory in /dev/shm for ever.
+        """
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
+    def _release(self) -> None:
+        self._runtime.require_parked()
+        self._state.flush()
+        self._recording.stop()
+        self._bound.close()
+        self._runtime.cleanup()
+        self._properties.follow()
+
+    def _tell_health(self) -> None:
+        self._state.look_for_hung()
+        self._diagnostics.publish(error=self._state.error)
+        self._topic_watch.look(self._bound.topics(), self._bound.other_types())
+        self._name_watch.look()
+
+    def _log_realtime(self) -> None:
+        status = self._runtime.realtime_status()
+        for missing in status.missing if status is not None else ():
+            self.get_logger().warning(f"no real time: {missing}")
+
+    # ---- parameters
+
+    def _declared(self) -> dict[str, Any]:
+        try:
+            settings = declare_settings(self, PARAMETERS)
+        except Exception as error:  # rclpy has an exception class of its own for each mistake
+            raise ParameterError(one_line(f"bad parameter: {error}")) from error
+        if self.get_parameter("use_sim_time").value:
+            raise ParameterError(f"use_sim_time: {NO_SIMULATED_TIME}")
+        return settings
+
+    def _refusal(self, parameter: str) -> str:
+        setting = PARAMETERS.get(parameter) or OF_RCLPY.get(parameter)
+        return "" if setting is None else refusal(parameter, setting, configured=self._runtime.configured)
+
+
+def _limits(settings: Mapping[str, Any]) -> RequestLimits:
+    return RequestLimits(**{item.name: settings[item.name] for item in fields(RequestLimits)})

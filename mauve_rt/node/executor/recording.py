@@ -1,0 +1,256 @@
+"""The bags of an executor: its trace, messages it sends and receives, topics it is asked to record."""
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+
+from mauve_rt._kernel import monotonic_ns
+from mauve_rt.control.requests import Code, RecordingOrder, RefusalError
+from mauve_rt.control.runtime import Observed, Runtime
+from mauve_rt.errors import ParameterError, one_line
+from mauve_rt.interfaces.descriptions import trace_architecture
+from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.model import message_class
+from mauve_rt.model.schema import QOS_NAMES
+from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.errors import TraceError
+
+if TYPE_CHECKING:
+    from mauve_rt.trace.recording.recorder import Recorder
+
+_DEPTH = 100  # of the topics recorded beside the executor's own
+_BEST_EFFORT = "best_effort"
+
+
+class ChosenTopic(NamedTuple):
+    """A topic to record beside the executor's own."""
+
+    name: str
+    """As it was given; the node resolves it."""
+    type_name: str
+    message: type
+    qos: str
+    """One of QOS_NAMES."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingStatus:
+    """How the recording fares, the present or the last one."""
+
+    bag: str
+    recording: bool
+    messages: int
+    """In the bag, the trace's own among them."""
+    dropped: int
+    error: str
+    """Why it ended by itself; empty when it did not."""
+
+
+class Recording:
+    """Records into one bag at a time, from a start to a stop. From any thread.
+
+    | member           | written by       | guarded by      |
+    | ---------------- | ---------------- | --------------- |
+    | `_recorder`      | start(), stop()  | exchanged whole |
+    | `_subscriptions` | start(), stop()  | `_lock`         |
+    | `_last`          | stop()           | exchanged whole |
+    """
+
+    def __init__(
+        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, *, data_group: CallbackGroup
+    ) -> None:
+        """Take the node whose trace it is; chosen topics are received in `data_group`."""
+        self._node = node
+        self._runtime = runtime
+        self._bound = bound
+        self._data_group = data_group
+        self._lock = threading.RLock()
+        self._recorder: Recorder | None = None
+        self._last: RecordingStatus | None = None
+        self._subscriptions: list[Any] = []
+
+    def start(self, bag: Path, topics: Sequence[str], *, split: Split) -> Path:
+        """Create the bag and record from now on; returns its folder, absolute. Another recording ends.
+
+        Args:
+            bag: the folder, which must not exist yet.
+            topics: further ones, each as `name`, `name:package/msg/Type` or `name:package/msg/Type:qos`. Best
+                effort, the default, hears every publisher; transient_local also hears what was said before.
+            split: when to go on in a new file.
+
+        Raises:
+            ParameterError: a topic is written otherwise, nobody knows its type, or that is not installed.
+            TraceError: the folder exists already or cannot be written.
+
+        """
+        from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415 - a start without a bag needs none
+
+        chosen = [self._chosen(topic) for topic in topics]
+        with self._lock:
+            self.stop()
+            recorder = Recorder(
+                self._runtime.host,
+                bag.absolute(),
+                node_name=self._node.get_fully_qualified_name(),
+                split=split,
+                on_error=self._node.get_logger().error,
+                messages=self._bound,
+            )
+            recorder.tell_architecture(self._architecture(self._runtime.observe()))
+            recorder.start(discard=self._runtime.active)
+            self._recorder = recorder
+            try:
+                for topic in chosen:
+                    self._subscribe(topic)
+            except Exception:
+                self.stop()
+                raise
+            return recorder.directory
+
+    def stop(self) -> RecordingStatus | None:
+        """Seal the bag; returns how it went, None when nothing was recorded. May be called again."""
+        with self._lock:
+            recorder = self._recorder
+            for subscription in self._subscriptions:
+                self._node.destroy_subscription(subscription)
+            self._subscriptions.clear()
+            if recorder is not None:
+                recorder.stop()
+                self._last = self.status()
+                self._recorder = None
+            return self._last if recorder is not None else None
+
+    @property
+    def recording(self) -> bool:
+        """Whether a bag is being written."""
+        recorder = self._recorder
+        return recorder is not None and recorder.recording
+
+    def status(self) -> RecordingStatus | None:
+        """How the present recording fares, or the last one did; None when there was none."""
+        recorder = self._recorder
+        if recorder is None:
+            return self._last
+        return RecordingStatus(
+            bag=str(recorder.directory),
+            recording=recorder.recording,
+            messages=recorder.message_count,
+            dropped=recorder.dropped_messages,
+            error=recorder.error,
+        )
+
+    def record(self, topic: str, type_name: str, data: bytes, *, qos: QoSProfile | None = None) -> None:
+        """Record a serialized message that was sent or received now."""
+        recorder = self._recorder
+        if recorder is not None:
+            offered = None if qos is None else recorded_qos(qos)
+            recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
+
+    def tell_architecture(self, observed: Observed) -> None:
+        """Record what runs now."""
+        recorder = self._recorder
+        if recorder is not None:
+            recorder.tell_architecture(self._architecture(observed))
+
+    def _architecture(self, observed: Observed) -> bytes:
+        return bytes(serialize_message(trace_architecture(self._runtime, observed)))
+
+    def _chosen(self, topic: str) -> ChosenTopic:
+        name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]
+        try:
+            full_name = self._node.resolve_topic_name(name)
+        except Exception as error:  # rclpy has an exception class of its own for each mistake
+            expected = f"expected a name, found '{name}': {one_line(str(error))}"
+            raise ParameterError(f"topic to record: {expected}") from error
+        if not type_name:
+            known = dict(self._node.get_topic_names_and_types()).get(full_name, [])
+            if len(known) != 1:
+                found = f"used with the types {' and '.join(known)}" if known else "used by nobody now"
+                raise ParameterError(
+                    f"topic {full_name} to record: {found}; give its type, {name}:package/msg/Type"
+                )
+            type_name = known[0]
+        message = message_class(type_name)
+        if message is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
+            expected = "name, name:package/msg/Type of an installed message, and perhaps one of"
+            expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
+            raise ParameterError(f"topic to record: expected {expected}; found '{topic}'")
+        return ChosenTopic(name, type_name, message, qos or _BEST_EFFORT)
+
+    def _subscribe(self, topic: ChosenTopic) -> None:
+        full_name = self._node.resolve_topic_name(topic.name)
+        profile = qos_profile(topic.qos, capacity=_DEPTH)
+        # Not by its full name: resolved twice, it might be another.
+        subscription = self._node.create_subscription(
+            topic.message,
+            topic.name,
+            self._callback(full_name, topic.type_name, profile),
+            profile,
+            raw=True,
+            callback_group=self._data_group,
+        )
+        self._subscriptions.append(subscription)
+
+    def _callback(self, topic: str, type_name: str, qos: QoSProfile) -> Callable[[bytes], None]:
+        return lambda data: self.record(topic, type_name, data, qos=qos)
+
+
+class RecordingOrders:
+    """Carries out orders to start and stop recordings. They name folders below one, and only there."""
+
+    def __init__(self, recording: Recording, runtime: Runtime, *, folder: Path) -> None:
+        """Take the folder that bags are below."""
+        self._recording = recording
+        self._runtime = runtime
+        self._folder = folder.absolute()
+
+    def carry_out(self, order: RecordingOrder) -> tuple[str, str]:
+        """Start or stop; returns what was done, in words, and the bag's folder.
+
+        Raises:
+            RefusalError: and nothing was started or stopped.
+
+        """
+        return self._start(order) if order.start else self._stop()
+
+    def _start(self, order: RecordingOrder) -> tuple[str, str]:
+        if not self._runtime.configured:
+            raise RefusalError(
+                Code.NOT_ACTIVE, "the executor is not configured; configure it first (lifecycle)"
+            )
+        if self._recording.recording:
+            raise RefusalError(Code.ALREADY_RUNNING, "it records already; stop that first")
+        bag = self._folder / (order.bag or f"mauve_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}")
+        if self._folder.resolve() not in bag.resolve().parents:
+            text = (
+                f"bag '{order.bag}': expected a folder below {self._folder} (the executor's parameter bags)"
+            )
+            raise RefusalError(Code.INVALID, text)
+        try:
+            split = Split(after_s=order.split_s or Split().after_s, after_bytes=order.split_bytes)
+            directory = self._recording.start(bag, order.topics, split=split)
+        except ParameterError as error:
+            raise RefusalError(Code.INVALID, str(error)) from error
+        except TraceError as error:
+            raise RefusalError(Code.PREPARE_FAILED, str(error)) from error
+        return f"recording into {directory}", str(directory)
+
+    def _stop(self) -> tuple[str, str]:
+        status = self._recording.stop()
+        if status is None:
+            raise RefusalError(Code.NOT_RUNNING, "nothing is being recorded")
+        words = f"{status.messages:,} messages are in {status.bag}"
+        if status.dropped:
+            words += f"; {status.dropped:,} were dropped"
+        if status.error:
+            words += f"; it had ended by itself: {status.error}"
+        return words, status.bag

@@ -1,0 +1,197 @@
+"""An executor's services, such as ~/list_components and ~/replace_core: `executor_control`'s ROS face."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.lifecycle import LifecycleNode
+
+from mauve_msgs.srv import (
+    ListComponents,
+    Reconfigure,
+    ReplaceCore,
+    Start,
+    StartRecording,
+    Stop,
+    StopRecording,
+)
+from mauve_rt.control.control import Control
+from mauve_rt.control.requests import Outcome, RecordingOrder, Request, Step
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
+from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.console import log_request
+from mauve_rt.node.executor.events import Event
+from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.state import StatePublisher
+from mauve_rt.node.shared.watch import Watch
+
+_CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "replace_shell"}
+
+
+class Services:
+    """The services of a node.
+
+    Requests for changes wait for each other (`is_change`); those to stop or start wait for nobody. They are
+    in `control_group`, lists in `query_group`. Who asked is answered first; then another thread tells of it
+    on ~/state and ~/events.
+
+    | member    | written by                | guarded by                      |
+    | --------- | ------------------------- | ------------------------------- |
+    | `_untold` | who carries out a request | each thread has one of its own  |
+    """
+
+    def __init__(
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        *,
+        control: Control,
+        bound: BoundResources,
+        state: StatePublisher,
+        parameters: Parameters,
+        warnings: Callable[[], list[str]],
+        watch: Watch,
+        control_group: CallbackGroup,
+        query_group: CallbackGroup,
+    ) -> None:
+        self._warnings = warnings
+        self._runtime = runtime
+        self._control = control
+        self._bound = bound
+        self._state = state
+        self._logger = node.get_logger()
+        # The change is made by then: what is wrong here is told, and no refusal of it.
+        self._follow = watch.guarded("the parameters", parameters.follow)
+        self._untold = _Untold()
+        node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
+        for service, name, translate in (
+            (Stop, "~/stop", _stop),
+            (Start, "~/start", _start),
+            (ReplaceCore, "~/replace_core", _replace_core),
+            (Reconfigure, "~/reconfigure", _reconfigure),
+            (StartRecording, "~/start_recording", _start_recording),
+            (StopRecording, "~/stop_recording", _stop_recording),
+        ):
+            handler = self._handler(translate)
+            self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
+
+    def handle(self, request: Request) -> Outcome:
+        """Carry out a request, and tell of it."""
+        outcome = self._carry_out(request)
+        self._tell()
+        return outcome
+
+    def _carry_out(self, request: Request) -> Outcome:
+        if request.recording is not None and not request.recording.start:
+            self._state.flush()  # the bag that ends tells of all that was in it
+        outcome = self._control.handle(request)
+        if not outcome.replayed:
+            self._untold.events.append(self._state.take_down(request, outcome))
+            if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
+                self._follow()
+        return outcome
+
+    def _tell_after(self, service: Any) -> None:
+        """Let a service tell when it has sent its reply."""
+        send_response = service.send_response
+
+        def send_and_tell(response: Any, header: Any) -> None:
+            try:
+                send_response(response, header)
+            finally:
+                self._tell()
+
+        service.send_response = send_and_tell
+
+    def _tell(self) -> None:
+        while self._untold.events:
+            event = self._untold.events.popleft()
+            self._state.tell(event)
+            log_request(self._logger, event.request, event.outcome)
+
+    def _list(self, _request: Any, response: Any) -> Any:
+        response.instance_id = self._runtime.instance_id
+        response.revision = self._runtime.revision
+        response.components = component_infos(self._runtime)
+        response.realtime = realtime_status(self._runtime)
+        response.resources = resource_infos(self._runtime, self._bound.bindings())
+        response.warnings = self._warnings()
+        return response
+
+    def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
+        def handle(ros_request: Any, response: Any) -> Any:
+            outcome = self._carry_out(translate(ros_request))
+            response.success = outcome.success
+            response.code = int(outcome.code)
+            response.message = outcome.message
+            response.instance_id = self._runtime.instance_id
+            response.revision = outcome.revision
+            response.report = step_reports(outcome)
+            if hasattr(response, "bag"):
+                response.bag = outcome.bag
+            return response
+
+        return handle
+
+
+class _Untold(threading.local):
+    """What this thread carried out and has not told of yet."""
+
+    def __init__(self) -> None:
+        self.events: deque[Event] = deque()
+
+
+def is_change(ros: Any) -> bool:
+    """Whether a request waits for those before it: all but a stop or a start by itself."""
+    if isinstance(ros, Reconfigure.Request):
+        return not _reconfigure(ros).is_direct
+    return not isinstance(ros, Stop.Request | Start.Request)
+
+
+def _stop(ros: Any) -> Request:
+    return Request(steps=(Step("stop", ros.component),), timeout_s=ros.timeout_s, **_common(ros))
+
+
+def _start(ros: Any) -> Request:
+    return Request(steps=(Step("start", ros.component),), clock_ns=ros.clock_ns, **_common(ros))
+
+
+def _replace_core(ros: Any) -> Request:
+    step = Step("replace_core", ros.component, ros.core)
+    return Request(steps=(step,), **_commit(ros), **_common(ros))
+
+
+def _reconfigure(ros: Any) -> Request:
+    steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
+    return Request(steps=steps, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
+
+
+def _start_recording(ros: Any) -> Request:
+    order = RecordingOrder(
+        start=True,
+        bag=ros.bag,
+        topics=tuple(ros.topics),
+        split_s=ros.split_s,
+        split_bytes=ros.split_bytes,
+    )
+    return Request(recording=order, **_common(ros))
+
+
+def _stop_recording(ros: Any) -> Request:
+    return Request(recording=RecordingOrder(start=False), **_common(ros))
+
+
+def _commit(ros: Any) -> dict[str, Any]:
+    return {"timeout_s": ros.commit_timeout_s, "max_missed": ros.max_missed}
+
+
+def _common(ros: Any) -> dict[str, Any]:
+    return {
+        "request_id": ros.request_id,
+        "expected_revision": ros.expected_revision,
+        "requested_by": ros.requested_by,
+        "cause": ros.cause,
+    }

@@ -1,0 +1,155 @@
+"""What the command line says to an executor before there is a node."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import MauveError, ParameterError
+from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
+from mauve_rt.model.schema import MAX_PRIORITY
+from mauve_rt.model.words import shown
+from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
+from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage
+
+_LIMITS = RequestLimits()
+MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
+_CONFIGURED: Any = "when configured"
+
+PARAMETERS: dict[str, Setting] = {
+    "architecture": Setting("", "architecture file"),
+    "bag": Setting(
+        "", "folder of the bag to record from the start, which must not exist yet; empty: none", _CONFIGURED
+    ),
+    "bags": Setting("", "folder below which ~/start_recording makes bags; empty: the working directory"),
+    "record_topics": Setting(
+        [], "topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
+    ),
+    "bag_split_s": Setting(
+        60.0, "a recording goes on in a new file after so long; 0: never", _CONFIGURED, minimum=0
+    ),
+    "bag_split_bytes": Setting(
+        0, "a recording goes on in a new file when one is so large; 0: never", _CONFIGURED, minimum=0
+    ),
+    "autostart": Setting(default=True, description="configure and activate at the start"),
+    "require_realtime": Setting(default=False, description="refuse to start without real-time rights"),
+    "trace": Setting(default=True, description="component threads write traces"),
+    "report_phase_timeout_s": Setting(
+        1.0,
+        "how long an event may wait to tell the next release after a commit",
+        minimum=0,
+        maximum=MAX_PHASE_TIMEOUT_S,
+    ),
+    "max_request_bytes": Setting(
+        _LIMITS.max_request_bytes, "size of one request, all its texts together", minimum=1
+    ),
+    "max_requested_bytes": Setting(
+        _LIMITS.max_requested_bytes,
+        "memory of all that requests added: stacks, traces, buffers",
+        minimum=1,
+    ),
+    "max_requested_priority": Setting(
+        _LIMITS.max_requested_priority,
+        "highest priority that a request may give a component",
+        minimum=1,
+        maximum=MAX_PRIORITY,
+    ),
+}
+# Not declared: without a value the file's peers count, which are no default that could be told.
+PEERS = Setting([], "the other robots' names; overrides the file's")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The executor's parameters; those of the node with the same names are for people to look at."""
+
+    architecture: str = ""
+    autostart: bool = True
+    require_realtime: bool = False
+    trace: bool = True
+    overrides: Overrides = Overrides()  # noqa: RUF009 - immutable
+    remarks: tuple[str, ...] = ()  # to be told; nothing is refused for them
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> Self:
+        """The settings of a command line.
+
+        Raises:
+            ParameterError: a value of the wrong type, `use_sim_time`, or a name that no parameter has.
+        """
+        arguments = parse_ros_arguments(words, node="executor")
+        namespace = _namespace(arguments)
+        given = arguments.within(namespace)
+        settings = {**PARAMETERS, "peers": PEERS}
+        check_given(arguments, settings, namespace=namespace)
+        peers = given.get("peers")
+        if peers is not None and not (
+            isinstance(peers, list) and all(isinstance(peer, str) for peer in peers)
+        ):
+            raise ParameterError(
+                f"parameter peers: expected a list of names such as [robot_2], found {peers}"
+            )
+        properties = {}
+        for name, value in given.items():
+            component, dot, property_name = name.partition(".")
+            if not dot or component == "qos_overrides":  # told to nodes of any name
+                continue
+            if not isinstance(value, bool | int | float | str):
+                expected = f"expected true, false, a number or text, found {shown(value)}"
+                raise ParameterError(f"parameter {name}: {expected}", element=name)
+            properties[component, property_name] = value
+        return cls(
+            architecture=_typed(given, "architecture", str, ""),
+            autostart=_typed(given, "autostart", bool, default=True),
+            require_realtime=_typed(given, "require_realtime", bool, default=False),
+            trace=_typed(given, "trace", bool, default=True),
+            overrides=Overrides(namespace=arguments.namespace, peers=peers, properties=properties),
+            remarks=near_misses(arguments, settings, namespace=namespace),
+        )
+
+    def runtime(self) -> Runtime:
+        """The runtime of the named file, nothing loaded yet."""
+        return Runtime(self._load, require_realtime=self.require_realtime, trace=self.trace)
+
+    def node_namespace(self) -> str:
+        """The namespace of the node before remapping.
+
+        Raises:
+            MauveError: the file cannot be read.
+        """
+        return self._load().namespace if self.architecture else "/"
+
+    def _load(self) -> ArchitectureModel:
+        if not self.architecture:
+            usage = "ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
+            raise ParameterError(f"parameter 'architecture' is missing: {usage}")
+        return load_architecture(Path(self.architecture), overrides=self.overrides)
+
+
+def help_text() -> str:
+    """What `executor --help` says."""
+    more = [
+        ("peers:=string_array", f"{PEERS.description} (default: as in the architecture file)"),
+        ("COMPONENT.PROPERTY:=VALUE", "a component's property (default: as in the architecture file)"),
+    ]
+    return usage("ros2 run mauve_rt executor", PARAMETERS, more=more)
+
+
+def _namespace(arguments: RosArguments) -> str:
+    """That of the node: remapped, or the one its architecture file has. A bad file is another's business."""
+    if arguments.namespace or not arguments.names_namespaces:
+        return "/" + arguments.namespace.strip("/")
+    try:
+        return load_architecture(str(arguments.parameters.get("architecture", ""))).namespace
+    except MauveError:
+        return "/"
+
+
+def _typed(given: dict[str, Any], name: str, kind: type, default: Any = None) -> Any:
+    value = given.get(name, default)
+    if not isinstance(value, kind):
+        words = {bool: "true or false", str: "text"}[kind]
+        raise ParameterError(f"parameter {name}: expected {words}, found {value}")
+    return value

@@ -1,0 +1,1 @@
+"""The node `supervisor`: watches and asks for changes by rules."""

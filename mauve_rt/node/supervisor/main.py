@@ -1,0 +1,36 @@
+"""The supervisor process: watches an executor by the rules of a file.
+
+    ros2 run mauve_rt supervisor --ros-args -r __ns:=/robot_1 -p rules:=FILE
+
+Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr).
+"""
+
+import sys
+from collections.abc import Sequence
+
+from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.process import Stop, asks_for_help, run_until_signalled
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node until signalled; returns the exit status."""
+    words = sys.argv if arguments is None else arguments
+    if asks_for_help(words):
+        from mauve_rt.node.supervisor.settings import help_text  # noqa: PLC0415 - takes its time to load
+
+        sys.stdout.write(help_text())
+        return 0
+    limit_discovery()
+    return run_until_signalled(lambda stop: _work(words, stop))
+
+
+def _work(arguments: Sequence[str], stop: Stop) -> int:
+    # Imported here: a signal while modules load is handled already, and threads they start block signals too.
+    from mauve_rt.node.supervisor.node import run_node  # noqa: PLC0415
+
+    stop.begin()
+    return run_node(arguments, stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

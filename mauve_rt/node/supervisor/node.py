@@ -1,0 +1,209 @@
+"""The supervisor node: reconfigures one executor by the rules of a file, and tells every decision.
+
+It listens to the executor's ~/state and to the topics of its rules (raw: nothing is deserialised), checks the
+rules at 50 Hz on the steady clock, asks by ~/reconfigure and publishes ~/decisions. One thread.
+"""
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
+from mauve_msgs.srv import ListComponents, Reconfigure
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
+from mauve_rt.node.shared.process import BAD_INPUT, complain
+from mauve_rt.node.shared.setting_parameters import declare_settings
+from mauve_rt.node.shared.watch import Watch
+from mauve_rt.node.supervisor.settings import PARAMETERS, check_arguments
+from mauve_rt.supervision.conditions import Condition, SilenceCondition
+from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.requests import Outcome, Request
+from mauve_rt.supervision.rule_types import heard_type
+from mauve_rt.supervision.rules import Rule, RulesFile
+
+NODE_NAME = "supervisor"
+CHECK_PERIOD_S = 0.02
+_SPIN_S = 0.2  # how long a stop may go unnoticed
+KEPT_DECISIONS = 100
+
+
+class Supervisor:
+    """The rules of a file at work on a node. Every method runs on the thread that spins the node."""
+
+    def __init__(self, node: Node, rules_file: RulesFile) -> None:
+        """Create subscriptions, client and publisher.
+
+        Raises:
+            ArchitectureFileError: a rule names a message type that is not installed.
+        """
+        self._node = node
+        self.watch = watch = Watch(node.get_logger().error)
+        self._pending: dict[Any, Any] = {}  # by client (changes, dry runs): the last call
+        rules = rules_file.rules
+        conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
+        self._engine = RuleEngine(
+            list(zip(rules.rules, conditions, strict=True)),
+            act=self._act,
+            decide=self._decide,
+            look=self._look,
+        )
+        latched = DurabilityPolicy.TRANSIENT_LOCAL
+        self._decisions = node.create_publisher(
+            SupervisorDecision, "~/decisions", QoSProfile(depth=KEPT_DECISIONS, durability=latched)
+        )
+        executor = node.resolve_topic_name(rules.executor)  # so `-r executor:=boss` names another one
+        self._service = node.resolve_service_name(f"{executor}/reconfigure")
+        self._change = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._try = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._list = node.create_client(ListComponents, f"{executor}/list_components")
+        node.create_subscription(
+            ArchitectureState,
+            f"{executor}/state",
+            watch.guarded("~/state", self._on_state),
+            QoSProfile(depth=1, durability=latched),
+        )
+        node.create_timer(CHECK_PERIOD_S, watch.guarded("the rules", self._tick))
+
+    def _condition(self, rules_file: RulesFile, index: int) -> Condition:
+        rule: Rule = rules_file.rules.rules[index]
+        silence = rule.when.silence
+        message = heard_type(rules_file, index)
+        topic = self._node.resolve_topic_name(
+            silence.topic
+        )  # to be told; resolved twice, it might be another
+        condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
+        # Best effort hears reliable writers too; only that something came counts.
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._node.create_subscription(message, silence.topic, _hearer(condition), qos, raw=True)
+        return condition
+
+    def _tick(self) -> None:
+        self._engine.tick(time.monotonic())
+
+    def _on_state(self, state: Any) -> None:
+        self._engine.on_state(time.monotonic(), architecture_view(state))
+
+    def _look(self) -> None:
+        if self._list.service_is_ready():  # if not, the engine looks again
+            on_list = self.watch.guarded("the executor's list", self._on_list)
+            self._call(self._list, ListComponents.Request()).add_done_callback(on_list)
+
+    def _on_list(self, future: Any) -> None:
+        if future.exception() is None:
+            reply = future.result()
+            listed = inventory(reply.instance_id, reply.components, reply.resources)
+            self._engine.on_inventory(time.monotonic(), listed)
+
+    def _act(self, request: Request) -> None:
+        client = self._try if request.dry_run else self._change
+        if not client.service_is_ready():
+            text = f"service {self._service} is not there"
+            missing = Outcome(success=False, message=text, answered=False)
+            self._engine.on_outcome(time.monotonic(), request.number, missing)
+            return
+        message = Reconfigure.Request(
+            request_id=str(uuid.uuid4()),
+            expected_revision=request.expected_revision,
+            requested_by=self._node.get_fully_qualified_name(),
+            cause=request.cause,
+            steps=[
+                ReconfigurationStep(kind=step.kind, target=step.target, name=step.name, value=step.value)
+                for step in request.steps
+            ],
+            dry_run=request.dry_run,
+            max_missed=request.max_missed,
+        )
+        on_reply = self.watch.guarded("the executor's reply", self._on_reply)
+        self._call(client, message).add_done_callback(lambda future: on_reply(request.number, future))
+
+    def _call(self, client: Any, message: Any) -> Any:
+        """Ask; a call before it that got no answer is given up."""
+        pending = self._pending.get(client)
+        if pending is not None and not pending.done():
+            client.remove_pending_request(pending)
+        future = self._pending[client] = client.call_async(message)
+        return future
+
+    def _on_reply(self, number: int, future: Any) -> None:
+        if future.exception() is not None:
+            outcome = Outcome(success=False, message=str(future.exception()), answered=False)
+        else:
+            reply = future.result()
+            outcome = Outcome(
+                success=reply.success,
+                message=reply.message,
+                revision=reply.revision,
+                wrong_revision=reply.code == Reconfigure.Response.WRONG_REVISION,
+                inactive=reply.code == Reconfigure.Response.NOT_ACTIVE,
+            )
+        self._engine.on_outcome(time.monotonic(), number, outcome)
+
+    def _decide(self, decision: Decision) -> None:
+        reply = f" ({decision.message})" if decision.message else ""
+        text = f"{decision.rule}: {decision.decision}: {decision.reason}{reply}"
+        if decision.decision == "refused":
+            self._node.get_logger().error(text)
+        else:
+            self._node.get_logger().info(text)
+        self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
+
+
+def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
+    """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
+    try:
+        remarks = check_arguments(arguments)
+        rclpy.init(
+            args=list(arguments),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        node = Node(NODE_NAME)
+    except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
+        complain(f"supervisor: {error}")
+        try_shutdown()
+        return BAD_INPUT
+    executor = SingleThreadedExecutor()
+    try:
+        supervisor = Supervisor(node, RulesFile(_rules_path(node)))
+        executor.add_node(node)
+        for remark in remarks:
+            node.get_logger().warning(remark)
+        while not stop.is_set():
+            try:
+                executor.spin_once(timeout_sec=_SPIN_S)
+            except BaseException as error:  # noqa: BLE001 - a malformed message must not end the watch
+                supervisor.watch.tell("taking a message", error)
+    except ArchitectureFileError as error:
+        complain(str(error))
+        return BAD_INPUT
+    except ValueError as error:
+        complain(f"supervisor: {error}")
+        return BAD_INPUT
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        try_shutdown()
+    return 0
+
+
+def _rules_path(node: Node) -> str:
+    try:
+        path = str(declare_settings(node, PARAMETERS)["rules"])
+    except rclpy.exceptions.InvalidParameterTypeException:
+        path = ""
+    if not path:
+        raise ValueError("parameter 'rules' is missing: --ros-args -p rules:=FILE")
+    return path
+
+
+def _hearer(condition: SilenceCondition) -> Callable[[bytes], None]:
+    return lambda _sample: condition.hear(time.monotonic())

@@ -1,0 +1,1 @@
+"""How parts are written in Python: shells, cores, fsms, resources, ports, messages."""

@@ -1,0 +1,77 @@
+"""How a shell in Python declares its ports and properties, with the names and options of C++.
+
+    class HoverShell(Shell):
+        pose = read_port(Pose)
+        target = write_port(Point, on_commit="hold", on_stop="set_zero")
+        advice = read_port(Point, optional=True)    # all others are to be connected
+        height = property(1.0, unit="m", minimum=0.0)
+
+A type is a class of ROS messages, or a name such as "geometry_msgs/msg/Point".
+"""
+
+from collections.abc import Callable, Collection
+from typing import Any, Concatenate, ParamSpec, TypeVar, overload
+
+from mauve_rt.parts.ports import CallPort, EventPort, OutputPolicy, PartName, Property, ReadPort, WritePort
+from mauve_rt.parts.resources import service_type
+
+__all__ = ["call_port", "event_port", "property", "read_port", "write_port"]
+
+T = TypeVar("T")
+V = TypeVar("V", bound=bool | int | float | str)
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def read_port(type: type[T] | str, default: T | None = None, *, optional: bool = False) -> ReadPort[T]:  # noqa: A002
+    """A port to read from; `default` is what it yields before anything was written, or unconnected."""
+    return ReadPort(type, default, optional=optional)
+
+
+def write_port(
+    type: type[T] | str,  # noqa: A002
+    *,
+    on_commit: OutputPolicy = "hold",
+    on_stop: OutputPolicy = "set_zero",
+    optional: bool = False,
+) -> WritePort[T]:
+    """A port to write to, and what the kernel writes while the component is replaced or does not run."""
+    return WritePort(type, on_commit=on_commit, on_stop=on_stop, optional=optional)
+
+
+@overload
+def call_port(service: Callable[Concatenate[Any, P], R]) -> CallPort[P, R]: ...
+@overload
+def call_port(service: str) -> CallPort[..., Any]: ...
+def call_port(service: Callable[..., Any] | str) -> CallPort[..., Any]:
+    """A port that calls a service of a resource in Python: the service's type, or the method that is one."""
+    return CallPort(service if isinstance(service, str) else service_type(service))
+
+
+def event_port(*, optional: bool = False) -> EventPort:
+    """A port that raises an event."""
+    return EventPort(optional=optional)
+
+
+def property(  # noqa: A001 - its name in C++
+    initial: V,
+    *,
+    unit: str = "",
+    description: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    structural: PartName | Collection[PartName] = (),
+) -> Property[V]:
+    """A property: bool, int, float or str, by its initial value.
+
+    `structural`: the parts, "shell", "core" or "fsm", that read it in configure or define, such as the length
+    of a wait or a size. Once the component is configured it is set only beside their replacement.
+    """
+    return Property(
+        initial,
+        unit=unit,
+        description=description,
+        minimum=minimum,
+        maximum=maximum,
+        structural=structural,
+    )

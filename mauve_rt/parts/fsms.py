@@ -1,0 +1,121 @@
+"""State machines written in Python, declared with the words of C++.
+
+    class HoverFsm(Fsm[HoverShell, HoverCore]):
+        def define(self) -> None:
+            follow = self.execution("Follow", HoverCore.follow)
+            rest = self.wait("Rest", ms_to_ns(20))
+            self.set_initial(follow)
+            self.next(follow, rest)
+            self.next(rest, follow)
+
+The machine is run by the kernel, on the component's grid; only actions and guards are in Python. Methods are
+found in the core by name, which a core in C++ does not offer: an fsm in Python needs a core in Python.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic
+
+from mauve_rt._kernel import FsmBuilder, PartFactory, ShellView
+from mauve_rt.parts.cores import Core, ShellT
+from mauve_rt.parts.part import Configurable, implementation_name
+from mauve_rt.parts.ports import ReadPort
+from mauve_rt.parts.shells import shell_of
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    CoreT = TypeVar("CoreT", bound=Core[Any], default=Any)
+else:
+    from typing import TypeVar
+
+    CoreT = TypeVar("CoreT")
+
+__all__ = ["Fsm", "State"]
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of a machine."""
+
+    name: str
+
+
+class Fsm(Configurable, Generic[ShellT, CoreT]):
+    """Base of state machines written in Python. All but define() and the hooks is called in define()."""
+
+    _builder: FsmBuilder | None = None
+
+    def __init__(self, shell: ShellT) -> None:
+        self.shell = shell
+
+    def define(self) -> None:
+        """Declare states and transitions; the shell's properties are set by then."""
+        raise NotImplementedError(f"{type(self).__qualname__} lacks define()")
+
+    def execution(
+        self, name: str, method: str | Callable[[CoreT], object], *, max_execution_ns: int = 0
+    ) -> State:
+        """A state that runs a method of the core, given by its name or as `HoverCore.follow`."""
+        self._machine.execution(name, _method_name(method), max_execution_ns)
+        return State(name)
+
+    def wait(self, name: str, duration_ns: int) -> State:
+        """A state that advances the component's clock by a duration > 0 and sleeps until then.
+
+        `FOREVER`: until the component is stopped; such a state leads nowhere, and needs no next().
+        """
+        self._machine.wait(name, duration_ns)
+        return State(name)
+
+    def wait_event(
+        self, name: str, port: ReadPort[Any] | str, timeout_ns: int, min_interarrival_ns: int
+    ) -> State:
+        """A state that waits for a write to the resource that a read port is connected to.
+
+        The clock goes on to the event's time, but by `min_interarrival_ns` at least; or by the timeout when
+        no event comes. Both > 0. A machine with such a state is sporadic: it has no period.
+        """
+        port_name = port if isinstance(port, str) else port.name
+        self._machine.wait_event(name, port_name, timeout_ns, min_interarrival_ns)
+        return State(name)
+
+    def set_initial(self, state: State) -> None:
+        """Where the component starts, on its grid."""
+        self._machine.set_initial(state.name)
+
+    def next(self, state: State, to: State) -> None:
+        """Where a state goes when no transition's guard holds. Every state needs one."""
+        self._machine.next(state.name, to.name)
+
+    def transition(self, state: State, guard: str | Callable[[CoreT], bool], to: State) -> None:
+        """Go to `to` when the guard holds after the state, of a wait when it has ended.
+
+        Guards are asked in the order of declaration.
+        """
+        self._machine.transition(state.name, _method_name(guard), to.name)
+
+    @property
+    def _machine(self) -> FsmBuilder:
+        if self._builder is None:
+            raise RuntimeError("states are declared in define() only")
+        return self._builder
+
+    def _define(self, builder: FsmBuilder) -> None:
+        self._builder = builder
+        try:
+            self.define()
+        finally:
+            self._builder = None
+
+    @classmethod
+    def _part(cls) -> PartFactory:
+        return PartFactory("fsm", implementation_name(cls), cls._make)
+
+    @classmethod
+    def _make(cls, view: ShellView) -> "Fsm[Any, Any]":
+        return cls(shell_of(view))
+
+
+def _method_name(method: str | Callable[..., object]) -> str:
+    return method if isinstance(method, str) else method.__name__

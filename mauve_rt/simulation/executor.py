@@ -1,0 +1,167 @@
+"""An executor in virtual time: topics, ~/state, ~/events, requests and the bag, without node and threads."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from mauve_rt._kernel import ComponentDescription, Simulation
+from mauve_rt.control.control import Control
+from mauve_rt.control.faults import FaultWatch
+from mauve_rt.control.requests import Outcome, Request
+from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.interfaces.descriptions import (
+    architecture_state,
+    component_infos,
+    reconfiguration_event,
+    resource_infos,
+    trace_architecture,
+)
+from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.model import load_architecture
+from mauve_rt.model.schema import ResourceModel, TopicModel
+from mauve_rt.simulation.messages import serialize
+from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
+from mauve_rt.trace.bag.recorded import SentMessage
+from mauve_rt.trace.recording.trace_bag import TraceBag
+
+_STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_EVENT_QOS = QoSProfile(depth=100)
+
+
+class _Outgoing(NamedTuple):
+    topic: str
+    type_name: str
+    qos: QoSProfile
+
+
+class SimulatedExecutor:
+    """One architecture file at work. Whoever drives the simulation calls carry(), refresh() and record()."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        topics: SimulatedTopics,
+        architecture: Path,
+        bag: Path,
+        *,
+        complain: Callable[[str], None],
+    ) -> None:
+        """Configure the architecture; it joins the simulation, which is not deployed yet.
+
+        Raises:
+            ArchitectureFileError: the file cannot be used.
+            TraceError: the bag cannot be created.
+        """
+        self._simulation = simulation
+        self._topics = topics
+        self._runtime = SimulatedRuntime(simulation, lambda: load_architecture(architecture))
+        self._runtime.configure()
+        model = self._runtime.model
+        self.namespace = model.namespace
+        self.name = resolved("executor", model.namespace)
+        self._control = Control(self._runtime)
+        self._outgoing: dict[str, _Outgoing] = {}
+        for resource, described in model.resources.items():
+            if described.topic is not None:
+                self._bind(resource, described, described.topic)
+        self._published_revision = -1
+        self._faults = FaultWatch()
+        self._waiting: list[SentMessage] = []
+        self._refused = 0
+        self._architecture = b""
+        self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
+        for topic in (f"{self.name}/state", f"{self.name}/events"):
+            self.record_topic(topic)
+
+    def _bind(self, resource: str, described: ResourceModel, bound: TopicModel) -> None:
+        topic = resolved(bound.name, self.namespace)
+        if bound.direction == "publish":
+            qos = qos_profile(bound.qos, capacity=described.capacity or 0)
+            self._outgoing[resource] = _Outgoing(topic, described.topic_type, qos)
+            return
+
+        def receive(sample: Sample) -> None:
+            self._runtime.host.write_resource(resource, sample.data)
+
+        self._topics.listen(topic, receive)
+        self.record_topic(topic)
+
+    def record_topic(self, topic: str) -> None:
+        """Record what is published on a topic."""
+        self._topics.listen(topic, self._keep)
+
+    def activate(self) -> None:
+        """Start, with the others of the simulation."""
+        self._runtime.activate()
+        self.refresh()
+
+    def components(self) -> list[ComponentDescription]:
+        """Every component as it is now."""
+        return self._runtime.components()
+
+    def listed(self) -> tuple[str, list[Any], list[Any]]:
+        """As ~/list_components: instance, ComponentInfo and ResourceInfo of all, without ROS names."""
+        return self._runtime.instance_id, component_infos(self._runtime), resource_infos(self._runtime, {})
+
+    def handle(self, request: Request) -> Outcome:
+        """Do what is asked, or nothing at all, now; ~/state and ~/events tell of it."""
+        outcome = self._control.handle(request)
+        self.refresh()
+        self._event(request, outcome)
+        return outcome
+
+    def _event(self, request: Request, outcome: Outcome) -> None:
+        now = stamp(self._simulation.now_ns())
+        event = reconfiguration_event(request, outcome, stamp=now, instance_id=self._runtime.instance_id)
+        self._say("events", "mauve_msgs/msg/ReconfigurationEvent", event, _EVENT_QOS)
+
+    def refresh(self) -> None:
+        """Publish the state if it has changed, and that a fallback core took over."""
+        observed = self._runtime.observe()
+        if observed.revision != self._published_revision:
+            state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
+            self._published_revision = state.revision
+            self._architecture = serialize(trace_architecture(self._runtime, observed))
+            self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
+        for fault in self._faults.look(observed.components):
+            if fault.part.fell_back:
+                self._event(*fault.event(observed.revision))
+
+    def carry(self) -> None:
+        """Publish what was written to the resources that are bound to topics."""
+        for resource, data, time_ns in self._runtime.host.wait_published(0):
+            topic, type_name, qos = self._outgoing[resource]
+            sample = Sample(topic, type_name, data, time_ns, qos)
+            self._keep(sample)
+            self._topics.publish(sample)
+
+    def record(self) -> None:
+        """Move the trace and the messages since the last call into the bag."""
+        waiting, self._waiting = self._waiting, []
+        drain = self._runtime.host.drain_trace()
+        if self._architecture:
+            self._bag.tell_architecture(self._architecture, drain)
+        self._refused += self._bag.write(drain, waiting, whole=True)
+        self._bag.tell_dropped(self._refused)
+
+    def flush(self) -> None:
+        """Make the bag a finished one of what was recorded; waits for the disk."""
+        self._bag.flush()
+
+    def close(self) -> None:
+        """Stop the components, send and record what they wrote last, seal the bag."""
+        self._runtime.deactivate()
+        self.carry()
+        self.refresh()
+        self.record()
+        self._bag.close()
+
+    def _keep(self, sample: Sample) -> None:
+        qos = recorded_qos(sample.qos)
+        self._waiting.append(SentMessage(sample.topic, sample.type_name, sample.data, sample.time_ns, qos))
+
+    def _say(self, name: str, type_name: str, message: Any, qos: QoSProfile) -> None:
+        now_ns = self._simulation.now_ns()
+        self._topics.say(f"{self.name}/{name}", type_name, message, time_ns=now_ns, qos=qos)

@@ -1,0 +1,99 @@
+"""A supervisor in virtual time: the rules of a file at work on an executor of the same simulation."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from mauve_rt._kernel import Simulation
+from mauve_rt.control.requests import Code
+from mauve_rt.control.requests import Request as ExecutorRequest
+from mauve_rt.control.requests import Step as ExecutorStep
+from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
+from mauve_rt.simulation.executor import SimulatedExecutor
+from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
+from mauve_rt.supervision.conditions import SilenceCondition
+from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.requests import Outcome, Request
+from mauve_rt.supervision.rules import Rule, RulesFile
+
+_DECISIONS_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class SimulatedSupervisor:
+    """In the namespace of its executor. Whoever drives the simulation calls tick() at 20 Hz or more."""
+
+    def __init__(
+        self, simulation: Simulation, topics: SimulatedTopics, executor: SimulatedExecutor, rules: Path
+    ) -> None:
+        """Listen to the topics of the rules; the executor must not have been activated yet.
+
+        Raises:
+            ArchitectureFileError: the rules cannot be used.
+        """
+        self._simulation = simulation
+        self._topics = topics
+        self._executor = executor
+        self.name = resolved("supervisor", executor.namespace)
+        self.decisions = f"{self.name}/decisions"
+        listed = RulesFile(rules).rules.rules
+        pairs = [(rule, self._condition(rule)) for rule in listed]
+        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look)
+        self._ended = False
+        topics.listen(f"{executor.name}/state", self._on_state)
+
+    def tick(self) -> None:
+        """Check the rules."""
+        self._engine.tick(self._now_s())
+
+    def close(self) -> None:
+        """Look no longer: that the executor stops is no business of the rules."""
+        self._ended = True
+
+    def _on_state(self, sample: Sample) -> None:
+        if not self._ended:
+            self._engine.on_state(self._now_s(), architecture_view(sample.message()))
+
+    def _now_s(self) -> float:
+        return self._simulation.now_ns() / 1e9
+
+    def _condition(self, rule: Rule) -> SilenceCondition:
+        silence = rule.when.silence
+        topic = resolved(silence.topic, self._executor.namespace)
+        condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
+        self._topics.listen(topic, self._hearer(condition))
+        return condition
+
+    def _hearer(self, condition: SilenceCondition) -> Callable[[Sample], None]:
+        return lambda _sample: condition.hear(self._now_s())
+
+    def _look(self) -> None:
+        self._engine.on_inventory(self._now_s(), inventory(*self._executor.listed()))
+
+    def _act(self, request: Request) -> None:
+        steps = tuple(ExecutorStep(step.kind, step.target, step.name, step.value) for step in request.steps)
+        done = self._executor.handle(
+            ExecutorRequest(
+                steps=steps,
+                request_id=f"{self.name}/{request.number}",
+                expected_revision=request.expected_revision,
+                requested_by=self.name,
+                cause=request.cause,
+                dry_run=request.dry_run,
+                max_missed=request.max_missed,
+            )
+        )
+        outcome = Outcome(
+            success=done.success,
+            message=done.message,
+            revision=done.revision,
+            wrong_revision=done.code is Code.WRONG_REVISION,
+            inactive=done.code is Code.NOT_ACTIVE,
+        )
+        self._engine.on_outcome(self._now_s(), request.number, outcome)
+
+    def _decide(self, decision: Decision) -> None:
+        now_ns = self._simulation.now_ns()
+        message = decision_message(decision, stamp(now_ns))
+        type_name = "mauve_msgs/msg/SupervisorDecision"
+        self._topics.say(self.decisions, type_name, message, time_ns=now_ns, qos=_DECISIONS_QOS)

@@ -1,0 +1,1 @@
+"""Rules: their file, their check, their engine, their rehearsal. Knows no ROS."""

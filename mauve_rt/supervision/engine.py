@@ -1,0 +1,223 @@
+"""The rule engine of a supervisor, without ROS and with injected time: one action in flight.
+
+The node calls `tick` at 20 Hz or more, `on_state` with every ~/state, `on_outcome` with the reply to a
+request and `on_inventory` with that of ~/list_components, all from one thread. What the engine wants goes to
+three callables.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from mauve_rt.supervision.arming import Arming
+from mauve_rt.supervision.conditions import Condition
+from mauve_rt.supervision.inventory import Inventory
+from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, Outcome, Request
+from mauve_rt.supervision.rule import PRESENT, ArchitectureView, Kind, RuleLife
+from mauve_rt.supervision.rules import Rule
+
+STATE_TIMEOUT_S = 2.0
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Fields as mauve_msgs/msg/SupervisorDecision."""
+
+    rule: str
+    decision: str
+    reason: str
+    silence_s: float
+    revision: int
+    message: str = ""
+
+
+@dataclass
+class _Flight:
+    life: RuleLife
+    kind: Kind
+    request: Request
+    deadline_s: float
+    outcome: Outcome | None = field(default=None)
+
+
+class RuleEngine:
+    """Rules, their conditions (by position) and what is in flight."""
+
+    def __init__(
+        self,
+        rules: Sequence[tuple[Rule, Condition]],
+        *,
+        act: Callable[[Request], None],
+        decide: Callable[[Decision], None],
+        look: Callable[[], None],
+    ) -> None:
+        """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells."""
+        self._lives = [RuleLife(rule, condition) for rule, condition in rules]
+        self._act = act
+        self._decide = decide
+        self._view: ArchitectureView | None = None
+        self._flight: _Flight | None = None
+        self._requests = 0
+        self._arming = Arming(look=look, act=act, number=self._number, tell=self._say)
+
+    def tick(self, now_s: float) -> None:
+        """Check every condition and act on what is due."""
+        self._check_flight(now_s)
+        for life in self._lives:
+            if not life.armed:
+                continue
+            if life.watch(now_s):
+                edge = "condition_true" if life.last_look.holds else "condition_false"
+                self._say(life, edge, life.last_look.reason)
+            kind = life.wants(now_s)
+            if kind is not None:
+                self._consider(life, kind, now_s)
+        self._arming.tick(now_s)
+
+    def on_state(self, now_s: float, view: ArchitectureView) -> None:
+        """~/state changed."""
+        restarted = self._view is not None and self._view.instance_id != view.instance_id
+        self._view = view
+        if restarted:
+            if self._flight is not None:
+                self._fail(self._flight, "the executor was started anew meanwhile", now_s)
+            for life in self._lives:
+                life.forget()
+            self._arming.forget()
+        self._arming.on_state()
+        self._verify(now_s)
+        for life in self._lives:
+            self._follow(life, view, now_s)
+
+    def on_outcome(self, now_s: float, number: int, outcome: Outcome) -> None:
+        """The reply to a request; one that is not in flight any more is ignored."""
+        if self._arming.on_outcome(now_s, number, outcome):
+            return
+        flight = self._flight
+        if flight is None or flight.request.number != number or flight.outcome is not None:
+            return
+        flight.life.revision_floor = outcome.revision
+        if not outcome.success:
+            self._fail(flight, "refused" if outcome.answered else "not sent", now_s, outcome)
+            return
+        flight.outcome = outcome
+        flight.deadline_s = now_s + STATE_TIMEOUT_S
+        self._verify(now_s)
+
+    def on_inventory(self, now_s: float, inventory: Inventory) -> None:
+        """What ~/list_components says; of another start of the executor than ~/state it is ignored."""
+        if self._view is not None and inventory.instance_id == self._view.instance_id:
+            self._arming.on_inventory(now_s, inventory)
+
+    # ---- arming and following the state
+
+    def _follow(self, life: RuleLife, view: ArchitectureView, now_s: float) -> None:
+        if self._in_flight(life):
+            return
+        absent = sorted(name for name in life.rule.targets() if self._state_of(view, name) not in PRESENT)
+        if absent and life.armed:
+            life.armed = False
+            state = self._state_of(view, absent[0])
+            self._say(life, "suppressed", f"{absent[0]} is {state}: watching again once it runs")
+        elif not absent and not life.armed:
+            life.arm(now_s)
+            running = ", ".join(f"{name} is RUNNING" for name in sorted(life.rule.targets()))
+            self._say(life, "armed", running or "the executor is there")
+            self._arming.begin(life, now_s)
+        elif life.in_effect and not view.shows(life.rule.do, unknown=True):
+            life.in_effect = False
+            life.left_alone = True
+            present = view.describe(life.rule.do)
+            self._say(life, "suppressed", f"{present} by another hand: left alone until the condition ends")
+
+    @staticmethod
+    def _state_of(view: ArchitectureView, name: str) -> str:
+        component = view.components.get(name)
+        return component.state if component is not None else "not in the architecture"
+
+    # ---- acting
+
+    def _consider(self, life: RuleLife, kind: Kind, now_s: float) -> None:
+        view = self._view
+        if view is None or view.revision < life.revision_floor or self._in_flight(life):
+            return
+        steps = life.steps(kind)
+        if view.shows(steps, unknown=False):
+            present = view.describe(steps)
+            reason = f"nothing to {kind}: {present} already; {life.last_look.reason}"
+            self._say(life, "suppressed", reason)
+            life.settle(kind, now_s)
+        elif now_s < life.not_before_s:
+            if life.failures == 0:
+                self._excuse(life, kind, f"{kind} waits {life.not_before_s - now_s:.2f} s: cooldown")
+        elif self._flight is not None:
+            other = self._flight.life.rule.name
+            self._excuse(life, kind, f"{kind} waits: the action of rule {other} is in flight")
+        else:
+            self._send(life, kind, now_s, view)
+
+    def _send(self, life: RuleLife, kind: Kind, now_s: float, view: ArchitectureView) -> None:
+        cause = life.cause(kind, now_s)
+        request = Request(
+            self._number(),
+            tuple(life.steps(kind)),
+            view.revision,
+            cause,
+            max_missed=life.max_missed(kind),
+        )
+        life.untouched = False
+        self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
+        self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))
+        self._act(request)
+
+    def _number(self) -> int:
+        self._requests += 1
+        return self._requests
+
+    def _excuse(self, life: RuleLife, kind: Kind, reason: str) -> None:
+        if life.excused != kind:
+            life.excused = kind
+            self._say(life, "suppressed", reason)
+
+    # ---- outcomes
+
+    def _in_flight(self, life: RuleLife) -> bool:
+        return self._flight is not None and self._flight.life is life
+
+    def _check_flight(self, now_s: float) -> None:
+        flight = self._flight
+        if flight is None or now_s < flight.deadline_s:
+            return
+        if flight.outcome is None:
+            self._fail(flight, f"no answer within {ANSWER_TIMEOUT_S:.0f} s", now_s)
+        else:
+            reason = f"~/state did not confirm within {STATE_TIMEOUT_S:.0f} s"
+            self._fail(flight, reason, now_s, flight.outcome)
+
+    def _verify(self, now_s: float) -> None:
+        flight, view = self._flight, self._view
+        if (
+            flight is None
+            or view is None
+            or flight.outcome is None
+            or view.revision < flight.outcome.revision
+        ):
+            return
+        present = view.describe(flight.request.steps)
+        # At a later revision somebody else may have changed it again: that is no failure of ours.
+        if view.revision == flight.outcome.revision and not view.shows(flight.request.steps, unknown=True):
+            self._fail(flight, f"~/state shows otherwise: {present}", now_s, flight.outcome)
+            return
+        self._flight = None
+        flight.life.settle(flight.kind, now_s)
+        self._say(flight.life, "done", f"{flight.kind}: {present}", flight.outcome.message)
+        self._follow(flight.life, view, now_s)
+
+    def _fail(self, flight: _Flight, reason: str, now_s: float, outcome: Outcome | None = None) -> None:
+        self._flight = None
+        delay_s = flight.life.fail(now_s, wrong_revision=outcome is not None and outcome.wrong_revision)
+        reason = f"{flight.kind} failed: {reason}; next try in {delay_s:.2f} s if still needed"
+        self._say(flight.life, "failed", reason, outcome.message if outcome else "")
+
+    def _say(self, life: RuleLife, decision: str, reason: str, message: str = "") -> None:
+        revision = self._view.revision if self._view is not None else 0
+        self._decide(Decision(life.rule.name, decision, reason, life.last_look.silence_s, revision, message))

@@ -1,0 +1,119 @@
+"""Transactions tried on an architecture in virtual time, in which nothing runs. Knows no ROS."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mauve_rt._kernel import Simulation
+from mauve_rt.control import requests
+from mauve_rt.control.control import Control
+from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model import ArchitectureModel
+from mauve_rt.model.steps import Change, Step, place_of_step
+from mauve_rt.model.yaml_file import YamlFile
+from mauve_rt.supervision.rules import RulesFile
+
+
+class RefusedStepError(Exception):
+    """A transaction that the executor would refuse; `index` is that of the step, from 0."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        number = re.match(r"step (\d+) \(", message)  # told where there are several
+        self.index = int(number[1]) - 1 if number else 0
+
+
+class Rehearsal:
+    """An executor's answers to transactions, by its own checks, before there is an executor."""
+
+    def __init__(self, runtime: SimulatedRuntime) -> None:
+        self._control = Control(runtime, outside=_NoRos())
+
+    def carry_out(self, steps: Sequence[Step], *, dry_run: bool = False) -> None:
+        """Ask for a transaction.
+
+        Raises:
+            RefusedStepError: it was refused.
+        """
+        asked = tuple(requests.Step(step.kind, step.target, step.name, step.value) for step in steps)
+        outcome = self._control.handle(requests.Request(steps=asked, dry_run=dry_run))
+        if not outcome.success:
+            raise RefusedStepError(outcome.message)
+
+
+@contextmanager
+def rehearsal(model: ArchitectureModel) -> Iterator[Rehearsal]:
+    """A rehearsal on an architecture as it is at its start.
+
+    Raises:
+        ArchitectureFileError: it cannot be built or configured.
+    """
+    simulation = Simulation(trace=False)
+    runtime = SimulatedRuntime(simulation, lambda: model)
+    runtime.configure()
+    try:
+        runtime.activate()
+        yield Rehearsal(runtime)
+    finally:
+        simulation.shutdown()
+
+
+def try_change(path: Path, change: Change, model: ArchitectureModel) -> None:
+    """Whether the executor of `model` would take the transaction of a file at its start.
+
+    Raises:
+        ArchitectureFileError: at the step that it would refuse.
+    """
+    with rehearsal(model) as executor:
+        try:
+            executor.carry_out(change.steps, dry_run=True)
+        except RefusedStepError as error:
+            file = YamlFile(path)
+            problem = file.problem(place_of_step(file, error.index), str(error))
+            raise ArchitectureFileError(path, [problem]) from None
+
+
+def try_rule(file: RulesFile, index: int, model: ArchitectureModel) -> None:
+    """Whether the executor of `model` would take what a rule does, and then what undoes it.
+
+    A core may refuse to adopt another one's state that early: then `undo` is not tried.
+
+    Raises:
+        ArchitectureFileError: at the step that it would refuse.
+    """
+    rule = file.rules.rules[index]
+    with rehearsal(model) as executor:
+        try:
+            executor.carry_out(rule.do, dry_run=True)
+        except RefusedStepError as error:
+            raise file.error(("rules", index, "do", error.index), str(error)) from None
+        if rule.undo is None:
+            return
+        try:
+            executor.carry_out(rule.do)
+        except RefusedStepError:
+            return
+        try:
+            executor.carry_out(rule.undo.do, dry_run=True)
+        except RefusedStepError as error:
+            raise file.error(("rules", index, "undo", "do", error.index), str(error)) from None
+
+
+class _NoRos:
+    """Topics and services of what is added: whether the middleware takes them only an executor can tell."""
+
+    def open(self, resources: Mapping[str, Any], described: Mapping[str, Any]) -> dict[str, list[int]]:
+        del resources, described
+        return {}
+
+    def attach(self, opened: Mapping[str, list[int]]) -> None:
+        del opened
+
+    def discard(self, opened: Mapping[str, list[int]]) -> None:
+        del opened
+
+    def remove(self, resources: Iterable[str]) -> None:
+        del resources

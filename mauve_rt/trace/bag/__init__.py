@@ -1,0 +1,1 @@
+"""Bags as files: written, checked, repaired."""

@@ -1,0 +1,244 @@
+"""An MCAP file that is a finished one after every flush.
+
+On disk, always:
+
+    magic, Header | Chunk, MessageIndex..., Chunk, MessageIndex..., | DataEnd, summary, summary offsets,
+    Footer, magic
+                                                                      '------------------- the tail
+                                                                      ----------------'
+
+A flush turns the waiting messages into one chunk and writes it, followed by the new tail, over the old
+tail, in one pwrite. The file is complete before and after it; a process killed between two flushes leaves
+all that was flushed. (A kill that hits the inside of that one system call, some tens of microseconds, can
+leave it half done: the kernel gives up a write between two pages when a fatal signal is pending. Power loss
+is another matter: nothing here waits for the disk.)
+
+The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
+the file. Format: https://mcap.dev/spec.
+"""
+
+import os
+import struct
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
+from mauve_rt.trace.format.mcap_records import (
+    Channel,
+    DataEnd,
+    Footer,
+    Header,
+    Opcode,
+    Schema,
+    Statistics,
+    SummaryOffset,
+    serialized,
+)
+
+MAGIC = b"\x89MCAP0\r\n"
+
+
+class McapFile:
+    """Writes one MCAP file. For one thread at a time."""
+
+    def __init__(self, path: Path, *, profile: str, library: str) -> None:
+        """Create the file, which is a complete empty one when this returns.
+
+        Raises:
+            TraceError: it exists already or cannot be written.
+
+        """
+        self.path = path
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._chunk = self._written = PendingChunk()
+        self._chunk_indexes = bytearray()
+        start = MAGIC + serialized(Header(profile, library))
+        self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
+        self._before = self._now
+        self._descriptor = -1
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            try:
+                write_all(self._descriptor, start + self._now.tail, 0)
+            except OSError:
+                path.unlink()
+                raise
+        except OSError as error:
+            self.abort()
+            msg = f"bag file {path}: cannot be created ({error.strerror})"
+            raise TraceError(msg) from error
+
+    @property
+    def size(self) -> int:
+        """Bytes on disk."""
+        return self._now.data_end + len(self._now.tail)
+
+    @property
+    def flushed(self) -> Counts:
+        """What the file on disk holds now."""
+        return self._now.counts
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether there are messages for the next flush."""
+        return bool(self._chunk.counts.messages)
+
+    def add_schema(self, name: str, *, encoding: str, data: bytes) -> int:
+        """Declare a schema; returns its id."""
+        schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
+        self._schemas.append(schema)
+        self._chunk.records += serialized(schema)
+        return schema.id
+
+    def add_channel(self, topic: str, *, schema_id: int, encoding: str, metadata: dict[str, str]) -> int:
+        """Declare a channel; returns its id."""
+        channel = Channel(
+            id=len(self._channels) + 1,
+            topic=topic,
+            message_encoding=encoding,
+            metadata=metadata,
+            schema_id=schema_id,
+        )
+        self._channels.append(channel)
+        self._chunk.records += serialized(channel)
+        return channel.id
+
+    def add_message(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
+        """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
+        self._chunk.add(channel_id, log_time_ns, data, publish_time_ns=publish_time_ns)
+
+    def flush(self) -> None:
+        """Write what waits; the file is complete before and after.
+
+        Schemas and channels wait for a message: a chunk without one has no message index, and where the first
+        chunk has none, libmcap (rosbag2's reader) gives up the whole file.
+
+        Raises:
+            TraceError: the system refused, e.g. the disk is full. What was flushed before is still there
+            and complete.
+
+        """
+        chunk, before = self._written, self._before = self._chunk, self._now
+        if not self.is_waiting:
+            return
+        block, index = chunk.build(before.data_end)
+        self._chunk_indexes += index
+        self._now = self._finished(
+            before.counts.plus(chunk.counts),
+            before.chunk_count + 1,
+            before.data_end + len(block),
+            zlib.crc32(block, before.data_crc),
+        )
+        try:
+            write_all(self._descriptor, block + self._now.tail, before.data_end)
+        except OSError as error:
+            msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
+            raise TraceError(msg) from error
+        self._chunk = PendingChunk()
+
+    def undo_flush(self) -> str:
+        """Make the file what it was before the last flush, or attempt at one; says what came of it.
+
+        What was flushed waits again. It needs no room on the disk: the old end's blocks are there already.
+        """
+        self._now, self._chunk = self._before, self._written
+        del self._chunk_indexes[self._now.index_bytes :]
+        try:
+            write_all(self._descriptor, self._now.tail, self._now.data_end)
+            os.ftruncate(self._descriptor, self.size)
+        except OSError as error:
+            return f"the old end could not be put back either ({error.strerror}): the file needs repair"
+        return f"the file is complete up to the flush before, {self.flushed.messages} messages"
+
+    def close(self) -> None:
+        """Flush and close.
+
+        Raises:
+            TraceError: as flush; the file is closed all the same.
+
+        """
+        try:
+            self.flush()
+        finally:
+            self.abort()
+
+    def abort(self) -> None:
+        """Close without writing what waits; the file stays as the last flush left it. May be called again."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
+
+    def _finished(self, counts: Counts, chunk_count: int, data_end: int, data_crc: int) -> "_Finished":
+        summary = Summary(self._schemas, self._channels, counts, chunk_count, bytes(self._chunk_indexes))
+        tail = build_tail(summary, data_end=data_end, data_crc=data_crc)
+        return _Finished(counts, chunk_count, data_end, data_crc, len(self._chunk_indexes), tail)
+
+
+class _Finished(NamedTuple):
+    """The file as a flush left it."""
+
+    counts: Counts
+    chunk_count: int
+    data_end: int
+    data_crc: int
+    index_bytes: int
+    """Of `_chunk_indexes`."""
+    tail: bytes
+
+
+class Summary(NamedTuple):
+    """What the end of a file tells of its data section."""
+
+    schemas: Sequence[Schema]
+    channels: Sequence[Channel]
+    counts: Counts
+    chunk_count: int
+    chunk_indexes: bytes
+    """ChunkIndex records, one behind the other."""
+    attachment_count: int = 0
+    metadata_count: int = 0
+
+
+def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
+    """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known."""
+    end = serialized(DataEnd(data_crc))
+    statistics = Statistics(
+        attachment_count=summary.attachment_count,
+        channel_count=len(summary.channels),
+        channel_message_counts=summary.counts.by_channel,
+        chunk_count=summary.chunk_count,
+        message_count=summary.counts.messages,
+        message_end_time=summary.counts.end_ns,
+        message_start_time=summary.counts.start_ns,
+        metadata_count=summary.metadata_count,
+        schema_count=len(summary.schemas),
+    )
+    groups = (
+        (Opcode.SCHEMA, serialized(*summary.schemas)),
+        (Opcode.CHANNEL, serialized(*summary.channels)),
+        (Opcode.STATISTICS, serialized(statistics)),
+        (Opcode.CHUNK_INDEX, summary.chunk_indexes),
+    )
+    at = summary_start = data_end + len(end)
+    offsets = []
+    for opcode, group in groups:
+        if group:
+            offsets.append(SummaryOffset(group_opcode=opcode, group_start=at, group_length=len(group)))
+        at += len(group)
+    body = b"".join(group for _, group in groups) + serialized(*offsets)
+    footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
+    crc = zlib.crc32(footer, zlib.crc32(body))
+    return b"".join((end, body, footer, struct.pack("<I", crc), MAGIC))
+
+
+def write_all(descriptor: int, data: bytes, offset: int) -> None:
+    """One pwrite; more only where the system took less (a full disk, which then says so, or over 2 GB)."""
+    rest = memoryview(data)
+    while rest:
+        written = os.pwrite(descriptor, rest, offset)
+        rest = rest[written:]
+        offset += written

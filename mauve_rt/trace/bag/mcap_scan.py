@@ -1,0 +1,282 @@
+"""Reads an MCAP file from its begin to where it is whole; needs neither its end nor its summary.
+
+So the bag of a process that was killed in the middle of a write, or that is still writing, is read up to
+its last whole chunk.
+"""
+
+import os
+import time
+import zlib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from mauve_rt.trace.bag.mcap_file import MAGIC
+from mauve_rt.trace.bag.mcap_limits import McapLimits
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.mcap_records import (
+    HEAD,
+    READ_OPCODES,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapError,
+    Message,
+    Opcode,
+    OtherRecord,
+    Record,
+    Schema,
+    Statistics,
+    read_record,
+    split_records,
+)
+
+_FOOTER_BYTES = HEAD.size + 20
+_ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
+_UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError)
+_DEFINITIONS = (int(Opcode.SCHEMA), int(Opcode.CHANNEL))
+_MESSAGE = int(Opcode.MESSAGE)  # an enum is compared more slowly, and there are many
+
+
+class Found(NamedTuple):
+    """A record of the data section, and where it is."""
+
+    offset: int
+    end: int
+    record: Record
+    inside: list[Record]
+    """The records of a chunk, or the record itself."""
+    unpacked: bytes = b""
+    """The bytes of the records in a chunk."""
+
+
+@dataclass
+class Told:
+    """What the summary tells, by which other readers find their way."""
+
+    damage: str = ""
+    """Why it cannot be read; empty when it can."""
+    statistics: Statistics | None = None
+    chunk_indexes: list[ChunkIndex] = field(default_factory=list)
+
+
+class McapScan:
+    """One pass over a file. `header`, `schemas` and `channels` fill up as it goes."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file.
+
+        Raises:
+            TraceError: it cannot be read, or is no MCAP file.
+
+        """
+        self.path = path
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.whole_bytes = 0
+        """The file is whole up to here: behind the last whole record of the data section."""
+        self.data_end: DataEnd | None = None
+        """The record that ends the data, once the pass has come to it."""
+        self.damage = ""
+        """Why the pass ended early; empty when it did not."""
+        try:
+            self._file = path.open("rb")
+        except OSError as error:
+            msg = f"bag file {path}: cannot be read ({error.strerror})"
+            raise TraceError(msg) from error
+        self._limits = McapLimits(f"bag file {path}", self.size)
+        try:
+            self.header = self._read_header()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Return the pass itself: the file is open from its construction."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self._file.close()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file now."""
+        return os.fstat(self._file.fileno()).st_size
+
+    def found(self) -> Iterator[Found]:
+        """Yield the records of the data section up to its end or the first damage; chunks fit their CRC.
+
+        Raises:
+            TraceError: what comes next would take more memory than its bytes justify, or than there is.
+
+        """
+        while self.data_end is None:
+            offset = self.whole_bytes
+            try:
+                found = self._next(offset)
+            except _UNREADABLE as error:
+                self.damage = f"byte {offset:,}: {_reason(error)}"
+                return
+            except MemoryError as error:
+                msg = f"bag file {self.path}: byte {offset:,}: there is not enough memory for what comes here"
+                raise TraceError(msg) from error
+            self.whole_bytes = found.end
+            if isinstance(found.record, DataEnd):
+                self.data_end = found.record
+                self.whole_bytes = found.offset
+            for one in found.inside:
+                if isinstance(one, Schema):
+                    self.schemas[one.id] = one
+                elif isinstance(one, Channel):
+                    self.channels[one.id] = one
+            yield found
+
+    def messages(self) -> Iterator[tuple[Channel, Message]]:
+        """Yield all messages in the order of the file.
+
+        Raises:
+            TraceError: as found().
+
+        """
+        for found in self.found():
+            for record in found.inside:
+                if isinstance(record, Message):
+                    yield self.channels[record.channel_id], record
+
+    def type_of(self, channel: Channel) -> str:
+        """Type of a channel's messages, package/msg/Name."""
+        schema = self.schemas.get(channel.schema_id)
+        return "" if schema is None else schema.name
+
+    def summary(self) -> Told:
+        """Read what stands behind the data section."""
+        if self.data_end is None:
+            return Told("the end is missing")
+        size = self.size
+        try:
+            tail = os.pread(self._file.fileno(), size - self.whole_bytes, self.whole_bytes)
+            if not tail.endswith(MAGIC):
+                return Told("the closing magic bytes are missing")
+            at = len(tail) - len(MAGIC) - _FOOTER_BYTES
+            if tail[at] != Opcode.FOOTER:
+                return Told("the footer is missing")
+            footer = Footer.from_bytes(tail[at + HEAD.size : -len(MAGIC)])
+            begin = footer.summary_start - self.whole_bytes if footer.summary_start else at
+            crc = zlib.crc32(tail[begin : at + _FOOTER_BYTES - 4])
+            if footer.summary_crc not in (0, crc):
+                return Told("the summary's CRC does not fit")
+            return _told(tail[begin:at])
+        except (*_UNREADABLE, OSError, MemoryError) as error:
+            return Told(f"the summary cannot be read ({_reason(error)})")
+
+    def _read_header(self) -> Header:
+        if self._file.read(len(MAGIC)) != MAGIC:
+            msg = f"bag file {self.path}: not an MCAP file (it does not begin with the magic bytes of one)"
+            raise TraceError(msg)
+        try:
+            found = self._once(len(MAGIC))
+        except _UNREADABLE as error:
+            msg = f"bag file {self.path}: the MCAP header cannot be read ({_reason(error)})"
+            raise TraceError(msg) from error
+        if not isinstance(found.record, Header):
+            msg = f"bag file {self.path}: expected an MCAP header, found a {type(found.record).__name__}"
+            raise TraceError(msg)
+        self.whole_bytes = found.end
+        return found.record
+
+    def _next(self, offset: int) -> Found:
+        """Read the record there; again when it is not whole, for a recorder may be just writing it."""
+        for _ in range(_ATTEMPTS - 1):
+            try:
+                return self._once(offset)
+            except _UNREADABLE:
+                time.sleep(_PAUSE_S)
+        return self._once(offset)
+
+    def _once(self, offset: int) -> Found:
+        self._file.seek(offset)
+        head = self._file.read(HEAD.size)
+        if len(head) < HEAD.size:
+            msg = "the file ends in the middle of a record"
+            raise EOFError(msg)
+        opcode, length = HEAD.unpack(head)
+        end = offset + HEAD.size + length
+        if end > self.size:
+            msg = f"a record of {length:,} bytes does not fit into the file's {self.size:,}"
+            raise EOFError(msg)
+        if opcode == 0:
+            msg = "no record begins here"
+            raise ValueError(msg)
+        if opcode not in READ_OPCODES:  # nobody asks what is in it
+            return Found(offset, end, OtherRecord(opcode), [])
+        data = self._file.read(length)
+        if len(data) < length:
+            msg = "the file became shorter"
+            raise EOFError(msg)
+        if opcode in _DEFINITIONS:
+            self._limits.define(opcode, data, length)
+        record = read_record(opcode, data)
+        if isinstance(record, Chunk):
+            return self._chunk(offset, end, record)
+        if isinstance(record, Message):
+            self._check_channel(record.channel_id, self.channels)
+        return Found(offset, end, record, [record])
+
+    def _chunk(self, offset: int, end: int, chunk: Chunk) -> Found:
+        """See that a chunk is what its head promises.
+
+        Raises:
+            ValueError: it is not.
+
+        """
+        unpacked = self._limits.unpacked(chunk)
+        crc = zlib.crc32(unpacked)
+        if chunk.uncompressed_crc not in (0, crc):
+            msg = f"a chunk's CRC does not fit: expected {chunk.uncompressed_crc:08x}, found {crc:08x}"
+            raise ValueError(msg)
+        data = memoryview(unpacked)
+        inside: list[Record] = []
+        channels = set(self.channels)
+        count, most = 0, self._limits.records_left(chunk)
+        for count, (opcode, _, begin, stop) in enumerate(split_records(data), start=1):
+            if count > most:
+                self._limits.refuse_records()
+            if opcode == _MESSAGE:
+                message = Message.from_bytes(data[begin:stop])
+                if message.channel_id not in channels:
+                    self._check_channel(message.channel_id, channels)
+                inside.append(message)
+            elif opcode in _DEFINITIONS:  # nothing else belongs here
+                self._limits.define(opcode, data[begin:stop], stop - begin)
+                record = read_record(opcode, data[begin:stop])
+                if isinstance(record, Channel):
+                    channels.add(record.id)
+                inside.append(record)
+        self._limits.count(chunk, count)
+        return Found(offset, end, chunk, inside, unpacked)
+
+    @staticmethod
+    def _check_channel(channel_id: int, channels: Collection[int]) -> None:
+        if channel_id not in channels:
+            msg = f"a message of channel {channel_id}, of which the file has not told before"
+            raise McapError(msg)
+
+
+def _told(summary: bytes) -> Told:
+    told = Told()
+    for opcode, _, body, end in split_records(summary):
+        record = read_record(opcode, summary[body:end])
+        if isinstance(record, Statistics):
+            told.statistics = record
+        elif isinstance(record, ChunkIndex):
+            told.chunk_indexes.append(record)
+    return told
+
+
+def _reason(error: BaseException) -> str:
+    return str(error) or type(error).__name__

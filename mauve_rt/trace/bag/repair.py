@@ -1,0 +1,195 @@
+"""Whole bags: what is wrong with one, and making it right."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mauve_rt.trace.bag.files import bag_files
+from mauve_rt.trace.bag.mcap_repair import FileState, examine
+from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.progress import Progress, part, silent
+from mauve_rt.yaml.text import YamlError, read_yaml
+
+_INFORMATION = "rosbag2_bagfile_information"
+_MAX_METADATA_BYTES = 64_000_000  # of hundreds of thousands of files
+
+
+@dataclass(frozen=True)
+class BagState:
+    """What a pass over all files of a bag found."""
+
+    path: Path
+    files: tuple[FileState, ...]
+    metadata_damage: str
+    """What is wrong with metadata.yaml; empty when nothing is, or when a single file was asked about."""
+    custom_data: Mapping[str, str]
+    """What metadata.yaml tells beside."""
+    unreadable: Mapping[Path, str]
+    """Files of which nothing can be read, beside others, and why."""
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether every reader opens it."""
+        files_are = all(file.is_finished for file in self.files)
+        return files_are and not self.metadata_damage and not self.unreadable
+
+    def damages(self) -> list[str]:
+        """What is wrong, a line for each file."""
+        lines = [_damage(file) for file in self.files if not file.is_finished]
+        lines += [f"{path.name}: nothing of it can be read ({why})" for path, why in self.unreadable.items()]
+        return [*lines, *([f"{METADATA}: {self.metadata_damage}"] if self.metadata_damage else [])]
+
+
+def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
+    """Read a whole bag (a folder, or one MCAP file), and tell what is wrong with it.
+
+    Raises:
+        TraceError: it is no bag, or cannot be read.
+
+    """
+    files = bag_files(path)
+    states, unreadable = [], {}
+    for index, file in enumerate(files):
+        progress_here = part(progress, index / len(files), (index + 1) / len(files))
+        try:
+            states.append(examine(file, progress=progress_here))
+        except TraceError as error:
+            if len(files) == 1:
+                raise
+            unreadable[file] = str(error).removeprefix(f"bag file {file}: ")
+    if not path.is_dir():
+        return BagState(path, tuple(states), "", {}, {})
+    try:
+        custom_data = _custom_data(_read_metadata(path))
+    except TraceError:
+        custom_data = {}
+    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable)
+
+
+def repair_bag(state: BagState) -> None:
+    """Make a finished bag of it: what is whole stays, what a kill left half-written is cut off.
+
+    A file of which nothing can be read gets another ending, so that no reader takes it for one of the bag.
+
+    Raises:
+        TraceError: it cannot be written.
+
+    """
+    for file in state.files:
+        if not file.is_finished:
+            file.repair()
+    try:
+        for path in state.unreadable:
+            path.rename(path.with_name(f"{path.name}.unreadable"))
+    except OSError as error:
+        msg = f"bag {state.path}: a file cannot be renamed ({error.strerror})"
+        raise TraceError(msg) from error
+    if not state.is_finished and state.path.is_dir():
+        _write_metadata(state)
+
+
+def _damage(file: FileState) -> str:
+    found = f"{file.path.name}: {'' if file.is_closed else 'no finished MCAP file: '}{file.damage}"
+    if file.is_data_whole:
+        return f"{found}; all of its {file.counts.messages:,} messages are whole"
+    whole = f"its first {file.whole_bytes:,} bytes are whole, with {file.counts.messages:,} messages"
+    return f"{found}; {whole}, not the {file.left_out_bytes:,} bytes after them"
+
+
+def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
+    """Tell where metadata.yaml promises other than the files hold."""
+    try:
+        told = _read_metadata(path)
+    except TraceError as error:
+        return str(error)
+    listed = told.get("relative_file_paths")
+    names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
+    found = [file.name for file in _named(files)]
+    if names != found:
+        return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"
+    messages = sum(file.counts.messages for file in files)
+    if told.get("message_count") != messages:
+        return f"tells of {told.get('message_count')} messages, there are {messages}"
+    return ""
+
+
+def _named(files: Sequence[FileState]) -> Sequence[BagFileCounts]:
+    return named_files([BagFileCounts(file.path.name, file.counts) for file in files])
+
+
+def _read_metadata(path: Path) -> Mapping[str, Any]:
+    """Return what rosbag2 wrote.
+
+    Raises:
+        TraceError: it is not there, or is something else; says only that.
+
+    """
+    try:
+        with (path / METADATA).open("rb") as file:
+            raw = file.read(_MAX_METADATA_BYTES + 1)
+        read = read_yaml(raw.decode("utf-8"), max_bytes=_MAX_METADATA_BYTES)
+    except FileNotFoundError as error:
+        msg = "not there"
+        raise TraceError(msg) from error
+    except (OSError, UnicodeDecodeError, YamlError) as error:
+        msg = f"cannot be read ({str(error).splitlines()[0]})"
+        raise TraceError(msg) from error
+    told = read.get(_INFORMATION) if isinstance(read, dict) else None
+    if not isinstance(told, dict):
+        msg = f"has no {_INFORMATION}"
+        raise TraceError(msg)
+    return told
+
+
+def _write_metadata(state: BagState) -> None:
+    try:
+        before = _read_metadata(state.path)
+    except TraceError:
+        before = {}
+    try:
+        write_metadata(
+            state.path,
+            _named(state.files),
+            _topics(state.files),
+            custom_data=state.custom_data,
+            ros_distro=str(before.get("ros_distro") or "jazzy"),
+        )
+    except OSError as error:
+        msg = f"bag {state.path}: {METADATA} cannot be written ({error.strerror})"
+        raise TraceError(msg) from error
+
+
+def _custom_data(metadata: Mapping[str, Any]) -> dict[str, str]:
+    told = metadata.get("custom_data")
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
+
+
+def _topics(files: Sequence[FileState]) -> list[BagTopic]:
+    found: dict[str, BagTopic] = {}
+    for file in files:
+        types = {schema.id: schema.name for schema in file.schemas}
+        for channel in file.channels:
+            count = file.counts.by_channel.get(channel.id, 0)
+            before = found.get(channel.topic)
+            found[channel.topic] = BagTopic(
+                channel.topic,
+                types.get(channel.schema_id, ""),
+                _one_line(channel.metadata.get("offered_qos_profiles", "")),
+                channel.metadata.get("topic_type_hash", ""),
+                count + (before.messages if before else 0),
+            )
+    return list(found.values())
+
+
+def _one_line(yaml: str) -> str:
+    """Return the profiles as flow YAML on one line, as they go into metadata.yaml."""
+    try:
+        read = read_yaml(yaml)
+    except YamlError:  # whoever wrote it did not mean it to be read
+        return "[]"
+    if "\n" not in yaml.strip():
+        return yaml.strip() or "[]"
+    return json.dumps(read)  # JSON is flow YAML

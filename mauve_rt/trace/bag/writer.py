@@ -1,0 +1,239 @@
+"""A rosbag2 directory around MCAP files: metadata.yaml, message definitions, topics."""
+
+import os
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mauve_rt import __version__
+from mauve_rt.trace.bag.mcap_file import McapFile
+from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
+from mauve_rt.trace.bag.recorded import TopicQos
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.definitions import Definition, find_definition
+
+
+@dataclass(frozen=True)
+class _Topic:
+    name: str
+    definition: Definition
+    qos: str
+    channel_id: int
+
+
+class BagWriter:
+    """A bag that is a finished one at every flush, in one file or, by split(), in several.
+
+    The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the files (a
+    kill between the two) promises less than they hold, and readers open both. Where it cannot be replaced (a
+    full disk), the file goes back to what it tells. For one thread at a time.
+
+    Chunks are in order of log time: a message that waited elsewhere while an earlier flush took later ones
+    gets the log time of that flush. Its publish time stays its own.
+    """
+
+    def __init__(self, directory: Path, *, ros_distro: str = "jazzy") -> None:
+        """Create the folder (and its parents) with an empty, finished bag in it.
+
+        Raises:
+            TraceError: the folder exists already, or cannot be written.
+
+        """
+        self.directory = Path(directory)
+        self._ros_distro = ros_distro
+        self._custom_data: dict[str, str] = {}
+        self._schemas: dict[str, tuple[int, Definition]] = {}
+        self._topics: dict[str, _Topic] = {}
+        self._complete: list[BagFileCounts] = []  # files that were split off
+        self._stale = True  # metadata.yaml does not tell what the files hold
+        self._told: set[str] = set()  # the files that metadata.yaml names
+        self._flushed_ns = 0  # latest log time of all that was flushed
+        # Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it.
+        unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
+        try:
+            exists = self.directory.exists()
+            if not exists:
+                unfinished.mkdir(parents=True)
+        except OSError as error:
+            msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
+            raise TraceError(msg) from error
+        if exists:
+            msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
+            raise TraceError(msg)
+        try:
+            self._file = self._new_file(unfinished)
+            self._write_metadata(unfinished)
+            unfinished.rename(self.directory)
+        except TraceError:
+            shutil.rmtree(unfinished, ignore_errors=True)
+            raise
+        except OSError as error:
+            self._file.abort()
+            shutil.rmtree(unfinished, ignore_errors=True)
+            msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
+            raise TraceError(msg) from error
+        self._file.path = self.directory / self._file.path.name
+
+    @property
+    def message_count(self) -> int:
+        """Messages flushed so far."""
+        return sum(file.counts.messages for file in self._files())
+
+    @property
+    def file_bytes(self) -> int:
+        """Bytes of the present file."""
+        return self._file.size
+
+    @property
+    def file_start_ns(self) -> int:
+        """Log time of the present file's first flushed message; 0 when there is none."""
+        return self._file.flushed.start_ns
+
+    def add_topic(self, name: str, type_name: str, *, qos: TopicQos | None = None) -> None:
+        """Declare a topic by absolute name and type (package/msg/Name); doing so again does nothing.
+
+        Raises:
+            TraceError: the name is relative, the topic has another type already, or the type is not
+            installed.
+
+        """
+        known = self._topics.get(name)
+        if known is not None:
+            if known.definition.type_name != type_name:
+                msg = f"topic {name}: is {known.definition.type_name} in this bag, not {type_name}"
+                raise TraceError(msg)
+            return
+        if not name.startswith("/"):
+            msg = f"topic {name}: expected an absolute name, e.g. /robot_1/{name}"
+            raise TraceError(msg)
+        if type_name not in self._schemas:
+            definition = find_definition(type_name)
+            self._schemas[type_name] = (_declare_schema(self._file, definition), definition)
+        schema_id, definition = self._schemas[type_name]
+        topic = _Topic(name, definition, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
+        _declare_channel(self._file, topic, schema_id)
+        self._topics[name] = topic
+        self._stale = True
+
+    def write(self, topic: str, log_time_ns: int, data: bytes, *, publish_time_ns: int | None = None) -> None:
+        """Keep a message (CDR with its header) for the next flush; times in ns of CLOCK_REALTIME.
+
+        Raises:
+            TraceError: the topic was not declared.
+
+        """
+        known = self._topics.get(topic)
+        if known is None:
+            msg = f"topic {topic}: not declared in this bag; call add_topic first"
+            raise TraceError(msg)
+        published_ns = log_time_ns if publish_time_ns is None else publish_time_ns
+        log_time_ns = max(log_time_ns, self._flushed_ns)
+        self._file.add_message(known.channel_id, log_time_ns, data, publish_time_ns=published_ns)
+
+    def set_custom_data(self, key: str, value: str) -> None:
+        """Put a word about the recording into metadata.yaml at the next flush."""
+        if self._custom_data.get(key) != value:
+            self._custom_data[key] = value
+            self._stale = True
+
+    def split(self) -> None:
+        """Go on in a new file, which declares the same topics. What waits is flushed before.
+
+        Raises:
+            TraceError: as flush; or the new file cannot be created.
+
+        """
+        self.flush()
+        self._complete.append(BagFileCounts(self._file.path.name, self._file.flushed))
+        self._file.close()
+        self._file = self._new_file(self.directory)
+        for _, definition in self._schemas.values():  # in the same order: they get the same numbers
+            _declare_schema(self._file, definition)
+        for topic in self._topics.values():
+            _declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
+        self._stale = True
+
+    def flush(self) -> None:
+        """Make the bag on disk hold everything written so far.
+
+        Raises:
+            TraceError: the system refused; the bag stays as the flush before left it. Call abort() then.
+
+        """
+        if self._file.is_waiting:
+            self._stale = True
+        self._file.flush()
+        if self._stale:
+            try:
+                self._write_metadata(self.directory)
+            except OSError as error:
+                kept = self._file.undo_flush()
+                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror}); {kept}"
+                raise TraceError(msg) from error
+            self._stale = False
+        self._flushed_ns = max(self._flushed_ns, self._file.flushed.end_ns)
+
+    def close(self) -> None:
+        """Flush and close.
+
+        Raises:
+            TraceError: as flush; the bag is closed all the same.
+
+        """
+        try:
+            self.flush()
+        finally:
+            self.abort()
+
+    def abort(self) -> None:
+        """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
+        self._file.abort()
+        if self._complete and self._file.path.name not in self._told:  # new and empty
+            self._file.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        """Return the writer itself: the bag is open from its construction."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close, or abort when an exception passes through."""
+        if kind is None:
+            self.close()
+        else:
+            self.abort()
+
+    def _files(self) -> Sequence[BagFileCounts]:
+        return named_files([*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)])
+
+    def _new_file(self, directory: Path) -> McapFile:
+        path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
+        return McapFile(path, profile="ros2", library=f"mauve_rt {__version__}")
+
+    def _write_metadata(self, directory: Path) -> None:
+        topics = [_counted(topic, self._files()) for topic in self._topics.values()]
+        write_metadata(
+            directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
+        )
+        self._told = {file.name for file in self._files()}
+
+
+def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:
+    messages = sum(file.counts.by_channel.get(topic.channel_id, 0) for file in files)
+    return BagTopic(topic.name, topic.definition.type_name, topic.qos, topic.definition.type_hash, messages)
+
+
+def _declare_schema(file: McapFile, definition: Definition) -> int:
+    return file.add_schema(definition.type_name, encoding="ros2msg", data=definition.text.encode())
+
+
+def _declare_channel(file: McapFile, topic: _Topic, schema_id: int) -> None:
+    metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.definition.type_hash}
+    file.add_channel(topic.name, schema_id=schema_id, encoding="cdr", metadata=metadata)

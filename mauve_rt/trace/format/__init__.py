@@ -1,0 +1,1 @@
+"""What is written where in a bag: records, messages, MCAP."""

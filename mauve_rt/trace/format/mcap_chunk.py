@@ -1,0 +1,92 @@
+"""Messages on their way into an MCAP file: the chunk that the next flush writes."""
+
+import struct
+import zlib
+from dataclasses import dataclass, field
+
+from mauve_rt.trace.format.mcap_records import HEAD, ChunkIndex, Opcode
+
+_MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+_MESSAGE_FIXED_BYTES = 22
+_CHUNK_HEAD = struct.Struct("<QQQIIQ")  # first, last log time, size, CRC, no compression (0), size
+_INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
+_INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
+
+
+@dataclass
+class Counts:
+    """How many messages, and when."""
+
+    by_channel: dict[int, int] = field(default_factory=dict)
+    start_ns: int = 0
+    """Log time of the earliest message; 0 when there is none."""
+    end_ns: int = 0
+
+    @property
+    def messages(self) -> int:
+        """All messages."""
+        return sum(self.by_channel.values())
+
+    def add(self, channel_id: int, log_time_ns: int) -> None:
+        """Count one message."""
+        self.start_ns = min(self.start_ns, log_time_ns) if self.by_channel else log_time_ns
+        self.end_ns = max(self.end_ns, log_time_ns)
+        self.by_channel[channel_id] = self.by_channel.get(channel_id, 0) + 1
+
+    def plus(self, other: "Counts") -> "Counts":
+        """Return the counts of both together; neither is changed."""
+        if not self.by_channel or not other.by_channel:
+            return other if other.by_channel else self
+        channels = [*self.by_channel, *other.by_channel]
+        by_channel = {key: self.by_channel.get(key, 0) + other.by_channel.get(key, 0) for key in channels}
+        return Counts(by_channel, min(self.start_ns, other.start_ns), max(self.end_ns, other.end_ns))
+
+
+class PendingChunk:
+    """Messages that wait for a flush, already as records."""
+
+    def __init__(self) -> None:
+        self.records = bytearray()
+        self.counts = Counts()
+        self._indexes: dict[int, bytearray] = {}
+
+    def add(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
+        """Append a message."""
+        entry = _INDEX_ENTRY.pack(log_time_ns, len(self.records))
+        self.records += _MESSAGE_HEAD.pack(
+            Opcode.MESSAGE, _MESSAGE_FIXED_BYTES + len(data), channel_id, 0, log_time_ns, publish_time_ns
+        )
+        self.records += data
+        self.counts.add(channel_id, log_time_ns)
+        self._indexes.setdefault(channel_id, bytearray()).extend(entry)
+
+    def build(self, offset: int) -> tuple[bytes, bytes]:
+        """Return the chunk and its message indexes for this place in the file, and the chunk index."""
+        size = len(self.records)
+        head = _CHUNK_HEAD.pack(
+            self.counts.start_ns, self.counts.end_ns, size, zlib.crc32(self.records), 0, size
+        )
+        parts: list[bytes | bytearray] = [
+            HEAD.pack(Opcode.CHUNK, len(head) + size),
+            head,
+            self.records,
+        ]
+        chunk_length = at = sum(map(len, parts))
+        index_offsets: dict[int, int] = {}
+        for channel_id, entries in self._indexes.items():
+            index_offsets[channel_id] = offset + at
+            index_head = _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries))
+            parts += [index_head, entries]
+            at += len(index_head) + len(entries)
+        index = ChunkIndex(
+            chunk_length=chunk_length,
+            chunk_start_offset=offset,
+            compression="",
+            compressed_size=size,
+            message_end_time=self.counts.end_ns,
+            message_index_length=at - chunk_length,
+            message_index_offsets=index_offsets,
+            message_start_time=self.counts.start_ns,
+            uncompressed_size=size,
+        )
+        return b"".join(parts), index.to_bytes()

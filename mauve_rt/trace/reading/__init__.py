@@ -1,0 +1,1 @@
+"""From a bag to records, frames, reconfigurations, statistics."""

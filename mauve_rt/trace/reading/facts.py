@@ -1,0 +1,69 @@
+"""What a bag tells besides records: grids, losses, files, messages of other topics."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+
+class Deployment(NamedTuple):
+    """The grid of a component's instants from time_ns on: epoch_ns + offset_ns + k * period_ns."""
+
+    time_ns: int
+    epoch_ns: int
+    offset_ns: int
+    period_ns: int
+    """g; 0 for a sporadic component, which has no grid."""
+
+    def phase_ns(self, instant_ns: int) -> int:
+        """Instant minus the nearest instant of the grid: in [-g/2, g/2), 0 without a grid."""
+        if self.period_ns <= 0:
+            return 0
+        half = self.period_ns // 2
+        return (instant_ns - self.epoch_ns - self.offset_ns + half) % self.period_ns - half
+
+
+class Loss(NamedTuple):
+    """What is known about records that are not in the bag."""
+
+    written: int
+    """Records the component offered since the bag began, by the last batch."""
+    received: int
+    dropped: int
+    """Of the written ones, lost because the ring was full, by the last batch."""
+    gaps: int
+    """Sequence numbers missing before the last one received."""
+
+    @property
+    def lost(self) -> int:
+        """Records known to be lost."""
+        return max(self.dropped, self.gaps)
+
+    def plus(self, other: "Loss") -> "Loss":
+        """Return both together, field by field."""
+        return Loss(*(mine + others for mine, others in zip(self, other, strict=True)))
+
+
+class BagFile(NamedTuple):
+    """A file that a trace was read from."""
+
+    path: Path
+    library: str
+    """What wrote it, by its own words."""
+    whole_bytes: int
+    """How much of it could be read."""
+    damage: str
+    """Why not all; empty when it could."""
+
+
+class Message(NamedTuple):
+    """A message of another topic than the trace itself."""
+
+    topic: str
+    log_time_ns: int
+    """CLOCK_REALTIME"""
+    monotonic_ns: int
+    """The same instant on the records' clock, by the clock pair of its flush."""
+    msg: Any
+
+
+MessageSource = Callable[[tuple[str, ...]], Iterator[Message]]

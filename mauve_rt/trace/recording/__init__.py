@@ -1,0 +1,1 @@
+"""From a host's rings into a bag. Does without numpy."""

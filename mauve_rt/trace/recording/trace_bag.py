@@ -1,0 +1,237 @@
+"""The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
+
+BATCHES = "trace/batches"
+NAMES = "trace/names"
+ARCHITECTURE = "trace/architecture"
+DROPPED_MESSAGES = "mauve_dropped_messages"
+"""Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
+_BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
+_NAMES_TYPE = "mauve_msgs/msg/TraceNames"
+_ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
+_LATCHED = TopicQos(depth=1, transient_local=True)
+
+
+class Drain(Protocol):
+    """What one drain of the kernel's rings yields (`mauve_rt._kernel.TraceDrain`)."""
+
+    @property
+    def records(self) -> bytes:
+        """Records, 48 bytes each."""
+
+    @property
+    def written(self) -> list[int]:
+        """Per component: records ever offered."""
+
+    @property
+    def dropped(self) -> list[int]:
+        """Per component: of these, lost because the ring was full."""
+
+    @property
+    def monotonic_ns(self) -> int:
+        """Time of the drain, CLOCK_MONOTONIC."""
+
+    @property
+    def realtime_ns(self) -> int:
+        """The same instant, CLOCK_REALTIME."""
+
+
+class Drained(NamedTuple):
+    """A drain as a value."""
+
+    records: bytes
+    written: list[int]
+    dropped: list[int]
+    monotonic_ns: int
+    realtime_ns: int
+
+
+class TraceWords(Protocol):
+    """What the numbers in records stand for; all that a bag asks for itself."""
+
+    def trace_components(self) -> list[str]:
+        """Words that `component` of a record refers to."""
+
+    def trace_names(self) -> list[str]:
+        """Words that `name` of a record refers to."""
+
+
+class TraceSource(TraceWords, Protocol):
+    """The part of `mauve_rt._kernel.Host` that the recorder uses."""
+
+    def collect_trace(self, period_ns: int) -> None:
+        """Empty the rings so often, by a thread without the interpreter, for drain_trace(); 0: no longer."""
+
+    def drain_trace(self) -> Drain:
+        """Take everything out of the rings, and what was collected."""
+
+
+class MessageSource(Protocol):
+    """Messages kept elsewhere until the recorder takes them."""
+
+    def keep_messages(self, *, on: bool) -> None:
+        """Keep them from now on, or no longer."""
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        """What was sent or received since the last call."""
+
+    def dropped_messages(self) -> int:
+        """Messages that found no room to wait, ever."""
+
+
+class TraceBag:
+    """Writes what a trace source yields, and messages on the same time base.
+
+    Publish times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. Log times
+    are the same, but never run backwards: after that clock was set back they stay ahead of it by as much,
+    since readers play a bag by its log times. Each file begins with the words, the architecture, and a batch
+    without records where there were records before it: so it can be read alone.
+    """
+
+    def __init__(
+        self,
+        words: TraceWords,
+        directory: Path,
+        *,
+        node_name: str,
+        on_error: Callable[[str], None],
+        split: Split | None = None,
+    ) -> None:
+        """Create the bag; nothing is drained yet.
+
+        Args:
+            words: a host's.
+            directory: the bag's folder, which must not exist yet.
+            node_name: absolute name of the executor's node; the trace is below it.
+            on_error: called at most once for each type that cannot be recorded, with one line.
+            split: when it goes on in a new file; after a minute unless said otherwise.
+
+        Raises:
+            TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
+
+        """
+        self._words = words
+        self._split = split or Split()
+        self._node_name = node_name.rstrip("/")
+        self._on_error = on_error
+        self._bag = BagWriter(directory)
+        try:
+            self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
+            self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
+            self._bag.add_topic(self._topic(ARCHITECTURE), _ARCHITECTURE_TYPE, qos=_LATCHED)
+            self._bag.flush()  # metadata.yaml names them; the file does when it has a message
+        except TraceError:
+            self._bag.abort()
+            raise
+        self._names: tuple[Sequence[str], Sequence[str]] | None = None
+        self._latched: dict[str, bytes] = {}  # each file begins with these
+        self._last: Drain | None = None
+        self._ahead_ns: int | None = None  # log time - monotonic time
+        self._refused_types: set[tuple[str, str]] = set()
+
+    @property
+    def directory(self) -> Path:
+        """The bag's folder."""
+        return self._bag.directory
+
+    @property
+    def message_count(self) -> int:
+        """Messages in it, the trace's own among them."""
+        return self._bag.message_count
+
+    def write(self, drain: Drain, messages: Sequence[SentMessage], *, whole: bool) -> int:
+        """Move what was drained, and messages from before, into the buffer; returns how many were refused.
+
+        A batch without records (it tells of losses) is written if `whole`.
+        """
+        self._last = drain
+        self._write_names(drain)
+        if drain.records or messages or whole:
+            self._write_batch(drain, drain.records)
+        return sum(not self._write_message(message, drain) for message in messages)
+
+    def discard(self, drain: Drain) -> None:
+        """Leave out what was recorded before this bag; only how much it was gets into it."""
+        self._last = drain
+        self._write_names(drain)
+        self._write_batch(drain, b"")
+
+    def tell_architecture(self, data: bytes, drain: Drain) -> None:
+        """Write a serialized mauve_msgs/msg/TraceArchitecture, unless it is the last one again."""
+        self._write_latched(ARCHITECTURE, data, drain)
+
+    def tell_dropped(self, messages: int) -> None:
+        """Note with the next flush how many messages did not get into the bag."""
+        self._bag.set_custom_data(DROPPED_MESSAGES, str(messages))
+
+    def flush(self) -> None:
+        """Make the bag a finished one of all that was written; go on in a new file when it is time."""
+        self._bag.flush()
+        last = self._last
+        if last is not None and self._is_time_to_split(self._log_time_ns(last, last.monotonic_ns)):
+            self._bag.split()
+            for topic, data in self._latched.items():
+                self._write(self._topic(topic), data, last, last.monotonic_ns)
+            self._write_batch(last, b"")
+
+    def close(self) -> None:
+        """Flush a last time."""
+        self._bag.close()
+
+    def abort(self) -> None:
+        """Leave the bag as the last flush left it."""
+        self._bag.abort()
+
+    def _is_time_to_split(self, now_ns: int) -> bool:
+        age_s = (now_ns - (self._bag.file_start_ns or now_ns)) / 1e9
+        return 0 < self._split.after_s <= age_s or 0 < self._split.after_bytes <= self._bag.file_bytes
+
+    def _write_batch(self, drain: Drain, records: bytes) -> None:
+        batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, records)
+        self._write(self._topic(BATCHES), encode_batch(batch), drain, drain.monotonic_ns)
+
+    def _write_names(self, drain: Drain) -> None:
+        """Write the words ahead of the records that use them (asked for after the drain: never too few)."""
+        words = (self._words.trace_components(), self._words.trace_names())
+        if words != self._names:
+            self._names = words
+            self._write_latched(NAMES, encode_names(*words), drain)
+
+    def _write_latched(self, topic: str, data: bytes, drain: Drain) -> None:
+        if self._latched.get(topic) != data:
+            self._latched[topic] = data
+            self._write(self._topic(topic), data, drain, drain.monotonic_ns)
+
+    def _write_message(self, message: SentMessage, drain: Drain) -> bool:
+        try:
+            self._bag.add_topic(message.topic, message.type_name, qos=message.qos)
+        except TraceError as error:
+            refused = (message.topic, message.type_name)
+            if refused not in self._refused_types:
+                self._refused_types.add(refused)
+                self._on_error(f"topic {message.topic} is not recorded: {error}")
+            return False
+        self._write(message.topic, message.data, drain, message.monotonic_ns)
+        return True
+
+    def _write(self, topic: str, data: bytes, drain: Drain, monotonic_ns: int) -> None:
+        """Write what was sent at a time, mapped by a drain's clock pair."""
+        published_ns = monotonic_ns + drain.realtime_ns - drain.monotonic_ns
+        log_time_ns = self._log_time_ns(drain, monotonic_ns)
+        self._bag.write(topic, log_time_ns, data, publish_time_ns=published_ns)
+
+    def _log_time_ns(self, drain: Drain, monotonic_ns: int) -> int:
+        ahead_ns = drain.realtime_ns - drain.monotonic_ns
+        self._ahead_ns = ahead_ns if self._ahead_ns is None else max(ahead_ns, self._ahead_ns)
+        return monotonic_ns + self._ahead_ns
+
+    def _topic(self, name: str) -> str:
+        return f"{self._node_name}/{name}"
