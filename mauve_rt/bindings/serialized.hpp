@@ -26,9 +26,9 @@ class SerializedWriteService : public ServiceBase {
       : ServiceBase("write", PortKind::write, std::move(type)) {}
   std::string_view representation() const noexcept override { return kSerializedRepresentation; }
   /// Takes a copy; false when there was no room, or more bytes than declared. [rt]
-  virtual bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+  virtual bool write(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT = 0;
   /// The same without waiting for a lock. [rt]
-  virtual TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+  virtual TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT = 0;
 };
 
 /// What a resource of serialized messages holds.

@@ -10,8 +10,8 @@ struct Place {
   Message message;
   time_ns_t time_ns{0};
 
-  void set(std::span<const std::byte> bytes, time_ns_t time) noexcept {
-    message.assign(bytes.begin(), bytes.end());  // within what was reserved: allocates nothing
+  void set(std::span<const std::byte> bytes, time_ns_t time) MAUVE_RT {
+    MAUVE_RT_TRUSTED(message.assign(bytes.begin(), bytes.end()));  // within what was reserved: allocates nothing
     time_ns = time;
   }
 };
@@ -46,7 +46,7 @@ class SerializedResource : public Resource {
 
  protected:
   virtual DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept = 0;
-  virtual bool put_in(std::span<const std::byte> message, time_ns_t time_ns) noexcept = 0;
+  virtual bool put_in(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT = 0;
 
   DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) {
     message.reserve(options_.max_bytes);  // not under the lock

@@ -26,12 +26,12 @@ class CoreBase : public Configurable {
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
   /// Moves the old core's state over; cannot fail. [rt] as far as the core is.
   virtual void take(CoreBase& /*old*/) noexcept {}
-  /// The time adopt and take need together, held against them. [non-rt] An adopt that takes longer refuses the change, after a
+  /// The time adopt and take need together, held against them. [rt] An adopt that takes longer refuses the change, after a
   /// longer take the component is FAULTED. A commit with less left before a release waits for the one after.
   /// 0: none declared.
-  virtual time_ns_t budget_ns() const noexcept { return 0; }
-  /// What is reckoned with where none is declared. [non-rt]
-  virtual time_ns_t reckoned_budget_ns() const noexcept { return us_to_ns(200); }
+  virtual time_ns_t budget_ns() const MAUVE_RT { return 0; }
+  /// What is reckoned with where none is declared. [rt]
+  virtual time_ns_t reckoned_budget_ns() const MAUVE_RT { return us_to_ns(200); }
 
   /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }
