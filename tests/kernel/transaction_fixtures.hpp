@@ -11,7 +11,7 @@ namespace mauve::testing {
 /// Carries the number of runs over.
 struct CountingCore : TestCore {
   bool adopt(const CoreBase& old) override { return dynamic_cast<const TestCore*>(&old) != nullptr; }
-  void take(CoreBase& old) noexcept override { runs = static_cast<TestCore&>(old).runs.load(); }
+  void take(CoreBase& old) MAUVE_RT override { runs = static_cast<TestCore&>(old).runs.load(); }
 };
 struct RefusingCore : TestCore {
   bool adopt(const CoreBase& /*old*/) override { return false; }

@@ -120,7 +120,7 @@ class HygieneOfTheKernel : public Hygiene {
 
  private:
   static void let_work(TestCore& core) {
-    core.work = [&core] {
+    core.work = [&core]() MAUVE_RT {
       TestShell& shell = core.exposed_shell();
       shell.output.write({shell.input.read().value.value + shell.gain});
       shell.held.write({1.0});

@@ -19,6 +19,7 @@ int trusting(Counter& counter) MAUVE_RT { return MAUVE_RT_TRUSTED(counter.count(
 
 TEST(Rt, TrustedExpressionIsEvaluatedOnceAndHasItsValue) {
   Counter counter;
+  EXPECT_EQ(twice(1), 2);
   EXPECT_EQ(trusting(counter), 2);
   EXPECT_EQ(counter.calls, 1);
 }

@@ -21,7 +21,7 @@ int operations() {
 
 /// Writes every time, and wakes who waits for it.
 struct WritingCore : TestCore {
-  void act() override {
+  void act() MAUVE_RT override {
     TestCore::act();
     exposed_shell().output.write({.value = static_cast<double>(runs.load(std::memory_order_relaxed))});
   }
