@@ -234,7 +234,8 @@ void Commit::borrow_priority() noexcept {
 
 void Commit::repay_priority() noexcept {
   if (own_priority_ == 0) return;
-  pthread_setschedprio(pthread_self(), own_priority_);
+  MAUVE_RT_TRUSTED(
+      pthread_setschedprio(pthread_self(), own_priority_));  // once a change of several components
   own_priority_ = 0;
 }
 

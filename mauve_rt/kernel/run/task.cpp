@@ -87,7 +87,7 @@ void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
 void Task::swap_fault(FaultNote& note) noexcept {
   const std::lock_guard lock(fault_mutex_);
-  std::swap(fault_, note);
+  MAUVE_RT_TRUSTED(std::swap(fault_, note));  // moves: nothing is allocated, nothing freed
 }
 
 void Task::clear_fault() noexcept {

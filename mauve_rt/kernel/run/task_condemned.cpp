@@ -19,7 +19,9 @@ time_ns_t Task::earliest_excess_ns() const noexcept {
 bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
   const auto execution = execution_.look();
   if (!execution || !execution->is_over(now_ns) || !execution_.condemn(*execution)) return false;
-  carry_out_sentence({.bound_ns = execution->limit_ns, .when_ns = now_ns});
+  verdict_.bound_ns = execution->limit_ns;
+  verdict_.when_ns = now_ns;
+  carry_out_sentence();
   return true;
 }
 
@@ -28,19 +30,21 @@ bool Task::condemn(std::string what, time_ns_t now_ns) {
   if (!execution) return false;
   auto text = std::make_shared<const std::string>(std::move(what));
   if (!execution_.condemn(*execution)) return false;
-  carry_out_sentence({.what = std::move(text), .when_ns = now_ns});
+  verdict_.what = std::move(text);
+  verdict_.when_ns = now_ns;
+  carry_out_sentence();
   return true;
 }
 
 /// FAULTED first, so that whoever has to act can; then the processor for the others; then the outputs.
-void Task::carry_out_sentence(FaultNote note) noexcept {
-  note.where = current_.load(std::memory_order_relaxed);
-  swap_fault(note);
+void Task::carry_out_sentence() noexcept {
+  verdict_.where = current_.load(std::memory_order_relaxed);
+  swap_fault(verdict_);  // the fault before this one stays there: a watchdog frees nothing
   publish_state(ComponentState::faulted);
   withdraw_commit();  // it cannot come to the gate any more
   if (has_thread_.load(std::memory_order_acquire)) {
     const sched_param ordinary{};
-    pthread_setschedparam(thread_, SCHED_OTHER, &ordinary);
+    MAUVE_RT_TRUSTED(pthread_setschedparam(thread_, SCHED_OTHER, &ordinary));  // what a fault costs
     demoted_ = true;
   }
   bool all_written = true;
@@ -79,6 +83,7 @@ void Task::abandon() noexcept {
 /// The thread's way out of a condemned execution.
 void Task::park_condemned() noexcept {
   if (execution_.come_back()) {
+    verdict_ = {};
     take_back_outputs();
     return end_in_fault();
   }

@@ -83,13 +83,13 @@ void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool
   }
 }
 
-Task* Task::of_this_thread() noexcept { return task_of_this_thread; }
+Task* Task::of_this_thread() noexcept { return MAUVE_RT_TRUSTED(task_of_this_thread); }
 
 const Task* Task::executing_here() noexcept {
-  return task_of_this_thread != nullptr ? task_of_this_thread : task_simulated_here;
+  return MAUVE_RT_TRUSTED(task_of_this_thread != nullptr ? task_of_this_thread : task_simulated_here);
 }
 
-void Task::set_simulated_here(const Task* task) noexcept { task_simulated_here = task; }
+void Task::set_simulated_here(const Task* task) noexcept { MAUVE_RT_TRUSTED(task_simulated_here = task); }
 
 void* Task::thread_entry(void* self) noexcept {
   static_cast<Task*>(self)->thread_main();

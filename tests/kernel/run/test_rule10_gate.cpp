@@ -463,7 +463,7 @@ TEST_F(Rule10Gate, StopsStartsAndCommitsAtRandomPhasesAllEnd) {
   std::vector<std::thread> clients;
   for (const char* name : {"fast", "slow"}) {
     clients.emplace_back([this, name] {
-      std::minstd_rand random(name[0]);
+      std::minstd_rand random(static_cast<unsigned char>(name[0]));
       for (int i = 0; i < kRounds; ++i) {
         std::this_thread::sleep_for(std::chrono::microseconds(random() % 3000));
         try {

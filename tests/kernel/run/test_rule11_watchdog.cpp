@@ -93,6 +93,24 @@ TEST_F(Rule11Watchdog, AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd) {
   EXPECT_EQ(3, late.runs);
 }
 
+// With RealtimeSanitizer also that its thread frees nothing of what the fault before was.
+TEST_F(Rule11Watchdog, AFallbackIsWatchedTooAndItsFaultIsTheOneTold) {
+  Component& component = add_bounded("c");
+  core(component).work = [] { throw std::runtime_error("a text too long to be kept in place"); };
+  auto spare = std::make_unique<TestCore>();
+  spare->work = [this] {
+    is_hanging = true;
+    while (!go_on) std::this_thread::yield();
+  };
+  component.set_fallback(std::move(spare));
+  deploy();
+  wait_until([&] { return is_hanging.load(); }, "the fallback");
+  wait_faulted(component);
+  EXPECT_EQ("the state ran longer than its declared 20000 us", component.task().fault().what.substr(0, 47));
+  go_on = true;
+  wait_parked(component);
+}
+
 TEST_F(Rule11Watchdog, AnAddedComponentIsWatchedToo) {
   add("c", 1);
   deploy();

@@ -22,16 +22,16 @@ class Task;
 class CommitAction {
  public:
   virtual ~CommitAction() = default;
-  /// May refuse by returning false or throwing; changes nothing. [rt]
+  /// May refuse by returning false or throwing; changes nothing. [rt] as far as the part is.
   virtual bool adopt() { return true; }
-  /// Makes the change; cannot fail. [rt]
+  /// Makes the change; cannot fail. [rt] as far as the part is.
   virtual void take() noexcept = 0;
   /// The time adopt and take need together, declared or reckoned. [rt]
-  virtual time_ns_t budget_ns() const noexcept { return us_to_ns(5); }
+  virtual time_ns_t budget_ns() const MAUVE_RT { return us_to_ns(5); }
   /// What of it was declared and is held against them; 0: it is only reckoned. [rt]
-  virtual time_ns_t declared_ns() const noexcept { return 0; }
+  virtual time_ns_t declared_ns() const MAUVE_RT { return 0; }
   /// What the trace calls it. [rt]
-  virtual std::uint32_t trace_id() const noexcept { return 0; }
+  virtual std::uint32_t trace_id() const MAUVE_RT { return 0; }
 
   const Task* task{nullptr};  // of the component that it changes, whose trace tells of it
   time_ns_t adopt_ns{0};      // measured
@@ -154,9 +154,9 @@ class Commit {
   const std::vector<Participant*>& in_order() const noexcept { return order_; }
   const std::vector<CommitAction*>& actions() const noexcept { return actions_; }
   /// Time needed for all actions. [rt]
-  time_ns_t budget_ns() const noexcept { return budget_ns_; }
+  time_ns_t budget_ns() const MAUVE_RT { return budget_ns_; }
   /// What of it was declared. [rt]
-  time_ns_t declared_ns() const noexcept { return declared_ns_; }
+  time_ns_t declared_ns() const MAUVE_RT { return declared_ns_; }
   /// How many releases each participant may be held past, all in all. [non-rt], before it is posted.
   void set_max_missed(std::int64_t releases) noexcept { max_missed_ = releases; }
 
@@ -178,35 +178,35 @@ class Commit {
     off,        // the commit was called off
     abandoned,  // it has lasted so long that the component was given up
   };
-  /// Comes to the gate, and waits there for the others or makes the change. [rt]
+  /// Comes to the gate, and waits there for the others or makes the change. [rt] as far as the actions are.
   Answer meet(Participant& place) noexcept;
   /// Called by each that was there when the change was made, once it is armed. [rt]
-  void gone_on(bool made_it) noexcept;
+  void gone_on(bool made_it) MAUVE_RT;
   /// Notes that it was there, or would have been but for the budget. [rt]
-  void note_came(Participant& place) noexcept;
+  void note_came(Participant& place) MAUVE_RT;
   /// How many more releases it may be held past, now. [rt]
-  std::int64_t may_miss(const Participant& place) const noexcept;
+  std::int64_t may_miss(const Participant& place) const MAUVE_RT;
   /// Lets those at the gate look whether they have to go. [rt]
-  void poke() noexcept;
+  void poke() MAUVE_RT;
 
   // ---- for who conducts it, and who wants it not to happen
 
   enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, overran, shut_down };
   /// Calls it off, without waiting for anybody: withdrawn by a task that is stopped or faulted, e.g. False when the
   /// change was made already, or is being taken this moment. [rt]
-  bool call_off(Off why, const Task* task = nullptr) noexcept;
+  bool call_off(Off why, const Task* task = nullptr) MAUVE_RT;
   /// Lets an adopt that lasts have no more than kPatience from now on. [rt]
-  void hurry() noexcept;
+  void hurry() MAUVE_RT;
   /// How many are to come. [non-rt]
   void expect(std::uint32_t parties) noexcept;
-  /// Makes the change where nobody is to come. [rt]
+  /// Makes the change where nobody is to come. [rt] as far as the actions are.
   void make_alone() noexcept;
   /// Sleeps until all have gone on, or it was called off, at most until the instant; whether it did. [rt]
-  bool wait_settled(time_ns_t until_ns) noexcept;
+  bool wait_settled(time_ns_t until_ns) MAUVE_RT;
   /// The instant at which an adopt or take that still lasts is given up. [rt]
-  time_ns_t patience_ends_ns(time_ns_t timeout_at_ns) const noexcept;
+  time_ns_t patience_ends_ns(time_ns_t timeout_at_ns) const MAUVE_RT;
   /// Gives up who makes the change, if anybody does still; whether it is given up now. [rt]
-  bool abandon() noexcept;
+  bool abandon() MAUVE_RT;
 
   /// Why it was called off. [non-rt], after it ended.
   Off off() const noexcept;
@@ -230,7 +230,7 @@ class Commit {
   bool begin_taking() noexcept;
   void take_all(const Clock& clock) noexcept;
   void borrow_priority() noexcept;
-  void repay_priority() noexcept;
+  void repay_priority() MAUVE_RT;
   void settle() noexcept;
 
   std::vector<Participant> participants_;
@@ -260,7 +260,7 @@ class Commit {
 
 /// Posts a commit to its running participants, in their order, and sees it to its end. Runs no user code. [rt]
 /// Returns once no participant refers to the commit any more, but for one whose adopt or take does not end.
-void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+void conduct(Commit& commit, time_ns_t timeout_ns) MAUVE_RT;
 
 /// The thread that conducts commits, SCHED_FIFO above all components where that is granted.
 ///
@@ -283,7 +283,7 @@ class Conductor {
   /// [non-rt]
   void make_alone(Commit& commit) noexcept;
   /// Calls off the commit under way, if there is one, and does not wait for its end; any thread. [rt]
-  void withdraw() noexcept;
+  void withdraw() MAUVE_RT;
 
  private:
   static constexpr std::uint32_t kNone = 0, kConduct = 1, kEnd = 2;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/architecture/change_lock.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -63,7 +64,7 @@ class PartsChange final : public CommitAction {
   /// Binds and configures the new parts. [non-rt] Throws Error; nothing but the new parts is touched.
   void prepare();
   /// Whether the component starts anew in its initial state: a new shell or fsm. [rt]
-  bool restarts() const noexcept { return restarts_; }
+  bool restarts() const MAUVE_RT { return restarts_; }
   /// Cleans up what is out: the old parts once they were taken, else the new ones. [non-rt]
   void retire() noexcept;
   /// The new core takes nothing over from the old one: that has failed. [setup]
@@ -142,7 +143,7 @@ struct ShownParts {
   bool operator==(const ShownParts&) const = default;
 };
 
-/// One component of an architecture. Its functions are for ordinary threads; its parts run on its task. What changes it
+/// One component of an architecture. All functions [non-rt]; its parts run on its task. What changes it
 /// is made by its architecture, one change at a time, as a transaction where parts, properties or wiring change.
 ///
 /// | member           | written by                                | read by             | under            |

@@ -42,18 +42,19 @@ class ExecutionWord {
     time_ns_t began_ns;
     time_ns_t limit_ns;
 
-    bool is_over(time_ns_t now_ns) const noexcept { return now_ns - began_ns > limit_ns; }
-    time_ns_t end_ns() const noexcept { return ExecutionWord::end_ns(began_ns, limit_ns); }
+    /// [rt]
+    bool is_over(time_ns_t now_ns) const MAUVE_RT { return now_ns - began_ns > limit_ns; }
+    time_ns_t end_ns() const MAUVE_RT { return ExecutionWord::end_ns(began_ns, limit_ns); }
   };
   /// The last instant at which it is not over its bound. [rt]
-  static constexpr time_ns_t end_ns(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+  static constexpr time_ns_t end_ns(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
     return limit_ns < kForever - began_ns ? began_ns + limit_ns : kForever;
   }
 
   // ---- the component's thread
 
   /// [rt]
-  void begin(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+  void begin(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
     began_ns_.store(began_ns, std::memory_order_release);
     limit_ns_.store(limit_ns, std::memory_order_release);
     const std::uint32_t before =
@@ -61,7 +62,7 @@ class ExecutionWord {
     word_.store(((before & ~kPhase) + kNext) | kRunning, std::memory_order_seq_cst);
   }
   /// False when it was condemned before it ended; true also when none was under way. [rt]
-  bool end() noexcept {
+  bool end() MAUVE_RT {
     std::uint32_t word = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
     if ((word & kPhase) == kIdle) return true;
     return (word & kPhase) == kRunning &&
@@ -69,7 +70,7 @@ class ExecutionWord {
   }
   /// After a condemned one: waits until the condemnation is complete; false when the component was removed meanwhile,
   /// and the thread is to end without another trace. [rt]
-  bool come_back() noexcept {
+  bool come_back() MAUVE_RT {
     for (;;) {
       std::uint32_t word = word_.load(std::memory_order_acquire);
       const std::uint32_t phase = word & kPhase;
@@ -86,23 +87,23 @@ class ExecutionWord {
   // ---- who condemns
 
   /// The execution under way, or nothing. [rt]
-  std::optional<Look> look() const noexcept {
+  std::optional<Look> look() const MAUVE_RT {
     const std::uint32_t word = word_.load(std::memory_order_seq_cst);
     if ((word & kPhase) != kRunning) return std::nullopt;
     return Look{word, began_ns_.load(std::memory_order_acquire), limit_ns_.load(std::memory_order_acquire)};
   }
   /// False when it has ended, or another one was first. [rt]
-  bool condemn(const Look& execution) noexcept {
+  bool condemn(const Look& execution) MAUVE_RT {
     std::uint32_t word = execution.word;
     return word_.compare_exchange_strong(word, (word & ~kPhase) | kCondemned, std::memory_order_acq_rel);
   }
   /// The condemnation is complete. [rt]
-  void sentence() noexcept { exchange_phase(kCondemned, kSentenced); }
+  void sentence() MAUVE_RT { exchange_phase(kCondemned, kSentenced); }
 
   // ---- who removes the component
 
   /// From now on the thread does not come back; false when it has, or was not condemned. [rt]
-  bool claim() noexcept {
+  bool claim() MAUVE_RT {
     for (;;) {
       std::uint32_t word = word_.load(std::memory_order_acquire);
       if ((word & kPhase) == kCondemned) {
@@ -116,11 +117,11 @@ class ExecutionWord {
     }
   }
   /// [rt]
-  void give_up_claim() noexcept { exchange_phase(kClaimed, kSentenced); }
-  void abandon() noexcept { exchange_phase(kClaimed, kAbandoned); }
+  void give_up_claim() MAUVE_RT { exchange_phase(kClaimed, kSentenced); }
+  void abandon() MAUVE_RT { exchange_phase(kClaimed, kAbandoned); }
   /// Whether its thread still runs a condemned execution. [rt]
-  bool is_condemned() const noexcept { return phase() >= kCondemned; }
-  bool is_abandoned() const noexcept { return phase() == kAbandoned; }
+  bool is_condemned() const MAUVE_RT { return phase() >= kCondemned; }
+  bool is_abandoned() const MAUVE_RT { return phase() == kAbandoned; }
 
  private:
   static constexpr std::uint32_t kIdle = 0, kRunning = 1, kCondemned = 2, kSentenced = 3, kClaimed = 4,

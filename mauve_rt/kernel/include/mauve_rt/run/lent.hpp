@@ -21,10 +21,10 @@ template <typename T>
 class Lent {
  public:
   /// [rt]
-  void lend(T& object) noexcept { object_.store(&object, std::memory_order_seq_cst); }
-  bool is_lent() const noexcept { return object_.load(std::memory_order_seq_cst) != nullptr; }
+  void lend(T& object) MAUVE_RT { object_.store(&object, std::memory_order_seq_cst); }
+  bool is_lent() const MAUVE_RT { return object_.load(std::memory_order_seq_cst) != nullptr; }
 
-  /// Calls the function with the object, if there is one; any number of threads. [rt]
+  /// Calls the function with the object, if there is one; any number of threads. [rt] as far as that is.
   template <typename Function>
   void use(Function&& function) noexcept {
     users_.fetch_add(1, std::memory_order_seq_cst);
@@ -34,7 +34,7 @@ class Lent {
   }
 
   /// Lets nobody begin to use it; whether all have ended by the instant. [rt]
-  bool recall(time_ns_t until_ns) noexcept {
+  bool recall(time_ns_t until_ns) MAUVE_RT {
     forget();
     for (;;) {
       const std::uint32_t users = users_.load(std::memory_order_seq_cst);
@@ -43,7 +43,7 @@ class Lent {
     }
   }
   /// Lets nobody begin to use it, and waits for nobody. [rt]
-  void forget() noexcept { object_.store(nullptr, std::memory_order_seq_cst); }
+  void forget() MAUVE_RT { object_.store(nullptr, std::memory_order_seq_cst); }
 
  private:
   std::atomic<T*> object_{nullptr};

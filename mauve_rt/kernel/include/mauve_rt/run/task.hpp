@@ -14,6 +14,7 @@
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/present_state.hpp"
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/statistics.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
 #include "mauve_rt/deploy/due_queue.hpp"
@@ -27,9 +28,9 @@ namespace mauve {
 enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, held, stopping, faulted };
 
 /// "UNCONFIGURED", "STOPPED", ... [rt]
-std::string_view to_string(ComponentState state) noexcept;
+std::string_view to_string(ComponentState state) MAUVE_RT;
 /// HELD is RUNNING to who looks at an architecture: it is for a moment only. [rt]
-constexpr ComponentState settled(ComponentState state) noexcept {
+constexpr ComponentState settled(ComponentState state) MAUVE_RT {
   return state == ComponentState::held ? ComponentState::running : state;
 }
 
@@ -82,7 +83,7 @@ struct ChangeSignal {
 
   /// Who else is told from now on; nullptr: nobody. [non-rt]
   void set_listener(ChangeSignal* other) noexcept { listener.store(other, std::memory_order_release); }
-  void bump() noexcept;  // [rt]
+  void bump() MAUVE_RT;  // [rt]
 };
 
 /// Runs one component.
@@ -105,7 +106,7 @@ struct ChangeSignal {
 /// | execution_             | machine, who condemns, who removes    | all of these | its own: execution_word.hpp        |
 /// | wait_bound_ns_         | commanders, machine parked; commits   | watchdog     | relaxed: a hint when to look       |
 /// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
-/// | demoted_               | who condemns, machine                 | machine      | execution_                         |
+/// | demoted_, verdict_     | who condemns, machine                 | machine      | execution_                         |
 /// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
 /// | shell_, fsm_, core_    | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
 /// | reference_ns_,         | the same                              | anyone       | relaxed: lone numbers              |
@@ -129,17 +130,19 @@ class Task {
   Task& operator=(const Task&) = delete;
 
   /// What the machine will run. Parked, or in a commit. [rt]
-  void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept;
+  void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
+  /// [setup]
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
-  const TaskSettings& settings() const noexcept { return settings_; }
-  Context& context() noexcept { return context_; }
+  /// [rt]
+  const TaskSettings& settings() const MAUVE_RT { return settings_; }
+  Context& context() MAUVE_RT { return context_; }
   /// What puts a fallback core in after a fault; nullptr: a fault is the end. [non-rt]
   void set_fallback(CommitAction* fallback) noexcept { fallback_.store(fallback, std::memory_order_release); }
   void set_fallen_back(bool fallen_back) noexcept {
     fallen_back_.store(fallen_back, std::memory_order_release);
   }
   /// Whether the core that runs is the fallback. [rt]
-  bool has_fallen_back() const noexcept { return fallen_back_.load(std::memory_order_acquire); }
+  bool has_fallen_back() const MAUVE_RT { return fallen_back_.load(std::memory_order_acquire); }
 
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
@@ -159,19 +162,19 @@ class Task {
   void simulate(const Clock& clock, bool trace);
   void end_simulation() noexcept;
   bool is_simulated() const noexcept { return simulated_; }
-  /// For the simulation's queue alone.
-  QueuePlace& queue_place() noexcept { return queue_place_; }
-  const Clock& clock() const noexcept { return *clock_; }
+  /// For the simulation's queue alone. [rt]
+  QueuePlace& queue_place() MAUVE_RT { return queue_place_; }
+  const Clock& clock() const MAUVE_RT { return *clock_; }
 
-  /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt]
+  /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt] as far as the states are.
   void resume() noexcept;
   /// The instant that the wait under way ends at; kForever while parked. [rt], the machine's thread or a simulation.
-  time_ns_t due_ns() const noexcept;
+  time_ns_t due_ns() const MAUVE_RT;
 
   /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
   time_ns_t join(time_ns_t epoch_ns) noexcept;
   /// The grid now; another commit may change it any moment. [rt]
-  Grid grid() const noexcept {
+  Grid grid() const MAUVE_RT {
     return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
             .period_ns = period_ns_.load(std::memory_order_relaxed)};
   }
@@ -190,25 +193,25 @@ class Task {
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
   void stop(time_ns_t timeout_ns = s_to_ns(1));
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
-  time_ns_t get_time() const noexcept { return context_.instant_ns.load(std::memory_order_relaxed); }
+  time_ns_t get_time() const MAUVE_RT { return context_.instant_ns.load(std::memory_order_relaxed); }
 
   // ---- the task's side of a commit (commit.hpp)
 
   /// Asks the machine to come to the commit's gate in its next wait. [rt]
-  void post(Participant& place) noexcept;
+  void post(Participant& place) MAUVE_RT;
   /// After this nobody refers to the participant any more, but the machine for its next release; false when somebody
   /// did still at the instant. [rt]
-  bool retract(time_ns_t until_ns) noexcept;
+  bool retract(time_ns_t until_ns) MAUVE_RT;
   /// Calls off the commit that the component takes part in, if any, unless its change is being made; any thread. [rt]
-  void withdraw_commit() noexcept;
+  void withdraw_commit() MAUVE_RT;
   /// Whether an event came that the wait under way waits for. [rt], the machine's thread
-  bool has_event() const noexcept {
+  bool has_event() const MAUVE_RT {
     return !event_settled_ && (control_.load(std::memory_order_acquire) & kEvent) != 0;
   }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
-  void write_outputs(bool commit) noexcept;
+  void write_outputs(bool commit) MAUVE_RT;
   /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
   void hold_parked(Participant& place) const noexcept;
   /// Carries on after a commit, when parked or simulated. [non-rt], command mutex held.
@@ -224,56 +227,56 @@ class Task {
                                         const std::string& remedy) const;
 
   /// Tells the machine that an event it may wait for has come. [rt]
-  void signal_event() noexcept;
+  void signal_event() MAUVE_RT;
 
   // ---- a wait within a state, for what another thread does
 
   /// The task whose thread this is, or nullptr. [rt]
-  static Task* of_this_thread() noexcept;
+  static Task* of_this_thread() MAUVE_RT;
   /// The same, or the task whose states the calling thread runs now in a simulation. [rt]
-  static const Task* executing_here() noexcept;
+  static const Task* executing_here() MAUVE_RT;
   /// By who runs a simulated task, around it; nullptr: none. [rt]
-  static void set_simulated_here(const Task* task) noexcept;
+  static void set_simulated_here(const Task* task) MAUVE_RT;
   /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
   /// the task's thread. Who sets the word calls signal_awaited() then.
-  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept;
-  void signal_awaited() noexcept;
+  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) MAUVE_RT;
+  void signal_awaited() MAUVE_RT;
   /// Whether the state under way is the last before a park. [rt]
-  bool is_to_stop() const noexcept {
+  bool is_to_stop() const MAUVE_RT {
     return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   }
 
   // ---- watched executions (rule 11, execution_word.hpp)
 
   /// What begins now is to last no longer than this. [rt], the machine's thread.
-  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
     execution_.begin(began_ns, limit_ns);
     if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
   }
   /// It has ended; false when it was condemned before: the thread goes to park_condemned() then. [rt], the same.
-  bool end_execution() noexcept { return execution_.end(); }
+  bool end_execution() MAUVE_RT { return execution_.end(); }
   /// Condemns the watched execution under way, whatever its bound - a state that declares one, or what the thread does and
   /// waits for at a commit's gate: tells FAULTED, takes the thread's priority away, then
   /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
   bool condemn(std::string what, time_ns_t now_ns);
   /// The same where it is over its bound. [rt]
-  bool condemn_if_over(time_ns_t now_ns) noexcept;
+  bool condemn_if_over(time_ns_t now_ns) MAUVE_RT;
   /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
   /// thread wakes the watchdog itself. [rt]
-  time_ns_t earliest_excess_ns() const noexcept;
+  time_ns_t earliest_excess_ns() const MAUVE_RT;
   /// Outputs that had to be left because of a lock: takes the right to write them; writes those that can be, all of them
   /// or not. [rt] as far as the resources are. By the watchdog's writer.
   bool take_outputs_left() noexcept;
   bool write_outputs_left() noexcept;
 
   /// A condemned execution's thread is not to come back from now on; false when it has. [rt], who removes the component.
-  bool claim() noexcept { return execution_.claim(); }
+  bool claim() MAUVE_RT { return execution_.claim(); }
   /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
-  void give_up_claim() noexcept { execution_.give_up_claim(); }
-  void abandon() noexcept;
-  bool is_abandoned() const noexcept { return execution_.is_abandoned(); }
+  void give_up_claim() MAUVE_RT { execution_.give_up_claim(); }
+  void abandon() MAUVE_RT;
+  bool is_abandoned() const MAUVE_RT { return execution_.is_abandoned(); }
   /// Whether its thread still executes what it was condemned for. [rt]
-  bool is_left_behind() const noexcept { return execution_.is_condemned(); }
+  bool is_left_behind() const MAUVE_RT { return execution_.is_condemned(); }
   /// What a person can do about a component whose thread does not come back. [rt]
   static constexpr const char* kLeftBehindRemedy =
       "its thread still executes: remove the component and add it anew, in one transaction";
@@ -281,17 +284,18 @@ class Task {
   static constexpr const char* kRepairRemedy =
       "repair it first (a step configure, or replace_core), or remove it";
 
-  ComponentState state() const noexcept {
+  /// [rt]
+  ComponentState state() const MAUVE_RT {
     return static_cast<ComponentState>(state_.load(std::memory_order_acquire));
   }
   /// For configure and cleanup of the component. [non-rt]
   void set_state(ComponentState state) noexcept;
   /// Exchanges what is known of the last fault, for one to be forgotten or remembered. [rt], the machine parked.
-  void swap_fault(FaultNote& note) noexcept;
+  void swap_fault(FaultNote& note) MAUVE_RT;
   /// Forgets a fault, for configure; the machine must be parked. [non-rt]
   void clear_fault() noexcept;
   /// Tells who waits for changes that there was one. [rt]
-  void signal_change() noexcept { changes_.bump(); }
+  void signal_change() MAUVE_RT { changes_.bump(); }
   /// Whether the machine is out of user code for good, until the next start. [non-rt]
   bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
   /// The state being executed or waited in; empty before the start. [non-rt]
@@ -302,10 +306,10 @@ class Task {
   Fault fault() const;
   const ThreadFacts& facts() const noexcept { return facts_; }
   const TaskStatistics& statistics() const noexcept { return statistics_; }
-  /// What the thread allocated, and its page faults, since its last start.
-  const ThreadCounters& counters() const noexcept { return counters_; }
+  /// What the thread allocated, and its page faults, since its last start. [rt]
+  const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
-  TraceRing* ring() noexcept { return ring_.get(); }
+  TraceRing* ring() MAUVE_RT { return ring_.get(); }
   /// Appends the ring's records and tells its counts; leaves all alone when nothing is traced. [non-rt]
   void drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped);
   /// Gives the ring away, when the component is removed before the ring is drained; parked, no thread. [non-rt]
@@ -365,11 +369,11 @@ class Task {
   void park_condemned() noexcept;
   void end_in_fault() noexcept;
   void park(ComponentState state) noexcept;
-  void carry_out_sentence(FaultNote note) noexcept;
+  void carry_out_sentence() MAUVE_RT;
   void take_back_outputs() noexcept;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
-  void publish_state(ComponentState state) noexcept;
+  void publish_state(ComponentState state) MAUVE_RT;
 
   void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
              std::int64_t c = 0) noexcept {
@@ -410,6 +414,7 @@ class Task {
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
   FaultNote fault_;
+  FaultNote verdict_;  // of a condemned execution, then the fault before it; empty while none is condemned
   std::vector<std::shared_ptr<void>> left_behind_;
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
   const std::atomic<int>* locks_held_{nullptr};

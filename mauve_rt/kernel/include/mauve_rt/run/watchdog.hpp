@@ -49,13 +49,13 @@ class Watchdog {
   void stop() noexcept;
 
   /// By a component that has begun an execution which must end by then. [rt]
-  void expect_end(time_ns_t end_ns) noexcept {
+  void expect_end(time_ns_t end_ns) MAUVE_RT {
     // seq_cst: a plain load on the usual machines; see above
     if (end_ns < wake_before_ns_.load(std::memory_order_seq_cst)) [[unlikely]]
       wake();
   }
   /// Has the outputs written that a condemned component lacks because of a lock. [rt]
-  void write_what_is_left() noexcept;
+  void write_what_is_left() MAUVE_RT;
   /// How often it has looked. [non-rt]
   std::uint64_t looks() const noexcept { return looks_.load(std::memory_order_relaxed); }
 
@@ -66,7 +66,7 @@ class Watchdog {
   time_ns_t look(time_ns_t now_ns) noexcept;
   void write_left_outputs() noexcept;
   Task* next_left(std::size_t& place) noexcept;
-  void wake() noexcept;
+  void wake() MAUVE_RT;
 
   pthread_t watcher_{};
   pthread_t writer_{};
