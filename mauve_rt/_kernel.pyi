@@ -1,7 +1,18 @@
 """The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Final, Literal, TypeAlias, final, overload
+from typing import (
+    Any,
+    ClassVar,
+    Final,
+    Literal,
+    TypeAlias,
+    TypedDict,
+    Unpack,
+    final,
+    overload,
+    type_check_only,
+)
 
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.fsms import Fsm
@@ -32,6 +43,32 @@ class MauveError(Exception):
     remedy: str
     step: int  # of a transaction, from 1; 0: none
     step_name: str
+
+@type_check_only
+class TaskSettings(TypedDict, total=False):
+    """How a component is run; of what is left out the kernel has the default. Limits: TASK_SETTINGS."""
+
+    priority: int
+    cpus: list[int]  # empty: any
+    offset_ns: int
+    period_ns: int  # 0: as the FSM says
+    overrun: str
+    max_backlog: int
+    stack_bytes: int
+    trace_records: int  # 0: by the period
+    hung_after_ns: int  # 0: 10 periods, 1 s at least
+
+@final
+class TaskSetting:
+    """What one of TaskSettings may be. A default outside of the limits is the kernel's own choice."""
+
+    default: Final[int | list[int] | str]
+    least: Final[int]  # of the number, or of each of the numbers
+    most: Final[int]
+    choices: Final[list[str]]  # of a word
+    hint: Final[str]
+
+TASK_SETTINGS: Final[dict[str, TaskSetting]]
 
 @final
 class FieldShape:
@@ -355,19 +392,11 @@ class Transaction:
         core: str | type[Core[Any]],
         fsm: str | type[Fsm[Any, Any]],
         *,
-        priority: int = 50,
-        cpus: list[int] = [],
-        offset_ns: int = 0,
-        period_ns: int = 0,
-        overrun: str = "skip",
-        max_backlog: int = 10,
-        stack_bytes: int = 524288,
-        trace_records: int = 0,
-        hung_after_ns: int = 0,
         properties: dict[str, PropertyValue] = {},
         alternatives: list[str] = [],
         fallback: str = "",
         reconfigurable: bool = True,
+        **settings: Unpack[TaskSettings],
     ) -> Transaction:
         """It arrives STOPPED; a start step starts it."""
     def remove_component(self, name: str) -> Transaction: ...
@@ -430,18 +459,10 @@ class Architecture:
         core: str | type[Core[Any]],
         fsm: str | type[Fsm[Any, Any]],
         *,
-        priority: int = 50,
-        cpus: list[int] = [],
-        offset_ns: int = 0,
-        period_ns: int = 0,
-        overrun: str = "skip",
-        max_backlog: int = 10,
-        stack_bytes: int = 524288,
-        trace_records: int = 0,
-        hung_after_ns: int = 0,
         alternatives: list[str] = [],
         fallback: str | type[Core[Any]] | None = None,
         reconfigurable: bool = True,
+        **settings: Unpack[TaskSettings],
     ) -> Component:
         """`fallback`: the core that takes over after a fault."""
     def component(self, name: str) -> Component: ...

@@ -54,19 +54,15 @@ void bind_architecture(py::module_& module) {
       .def(
           "add_component",
           [](const py::object& object, const std::string& name, const py::object& shell,
-             const py::object& core, const py::object& fsm, int priority, const std::vector<int>& cpus,
-             time_ns_t offset_ns, time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
-             std::size_t stack_bytes, std::size_t trace_records, time_ns_t hung_after_ns,
-             const std::vector<std::string>& alternatives, const py::object& fallback, bool reconfigurable) {
+             const py::object& core, const py::object& fsm, const std::vector<std::string>& alternatives,
+             const py::object& fallback, bool reconfigurable, const py::kwargs& settings) {
             auto& self = object.cast<PyArchitecture&>();
             const PluginRegistry& registry = self.registry;
             std::unique_ptr<CoreBase> fallback_core;
             if (!fallback.is_none()) fallback_core = make_core(fallback, registry);
-            const ComponentParts rest{
-                .settings = task_settings(priority, cpus, offset_ns, period_ns, overrun, max_backlog,
-                                          stack_bytes, trace_records, hung_after_ns),
-                .alternatives = alternatives,
-                .reconfigurable = reconfigurable};
+            const ComponentParts rest{.settings = task_settings(name, settings),
+                                      .alternatives = alternatives,
+                                      .reconfigurable = reconfigurable};
             Transaction transaction;
             transaction.add_component(name,
                                       Parts{.shell = make_shell(shell, registry),
@@ -77,11 +73,6 @@ void bind_architecture(py::module_& module) {
             return PyComponent(object, name);
           },
           py::arg("name"), py::arg("shell"), py::arg("core"), py::arg("fsm"), py::kw_only(),
-          py::arg("priority") = 50, py::arg("cpus") = std::vector<int>{}, py::arg("offset_ns") = 0,
-          py::arg("period_ns") = 0, py::arg("overrun") = "skip", py::arg("max_backlog") = 10,
-          py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
-          py::arg("trace_records") = TaskSettings{}.trace_records,
-          py::arg("hung_after_ns") = TaskSettings{}.hung_after_ns,
           py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = py::none(),
           py::arg("reconfigurable") = true)
       .def(

@@ -10,6 +10,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_python_shell(module);
   bind_python_fsm(module);
   bind_registry(module);
+  bind_settings(module);
   bind_architecture(module);
   bind_transaction(module);
   bind_host(module);

@@ -68,27 +68,6 @@ Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& 
   };
 }
 
-TaskSettings task_settings(int priority, const std::vector<int>& cpus, time_ns_t offset_ns,
-                           time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
-                           std::size_t stack_bytes, std::size_t trace_records, time_ns_t hung_after_ns) {
-  const std::map<std::string, OverrunPolicy> policies{
-      {"skip", OverrunPolicy::skip}, {"catch_up", OverrunPolicy::catch_up}, {"fault", OverrunPolicy::fault}};
-  const auto policy = policies.find(overrun);
-  if (policy == policies.end()) {
-    throw Error(ErrorCode::invalid_argument, "there is no such overrun policy",
-                {.element = "overrun", .expected = "skip, catch_up or fault", .found = overrun});
-  }
-  return {.priority = priority,
-          .cpus = cpus,
-          .offset_ns = offset_ns,
-          .period_ns = period_ns,
-          .overrun = policy->second,
-          .max_backlog = max_backlog,
-          .stack_bytes = stack_bytes,
-          .trace_records = trace_records,
-          .hung_after_ns = hung_after_ns};
-}
-
 void bind_registry(py::module_& module) {
   py::class_<PartFactory>(module, "PartFactory")
       .def(py::init([](const std::string& kind, const std::string& name, py::object make) {

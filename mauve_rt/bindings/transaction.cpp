@@ -8,15 +8,11 @@ namespace {
 using Self = PyTransaction&;
 
 PyTransaction& add_component(Self self, const std::string& name, const py::object& shell,
-                             const py::object& core, const py::object& fsm, int priority,
-                             const std::vector<int>& cpus, time_ns_t offset_ns, time_ns_t period_ns,
-                             const std::string& overrun, std::int64_t max_backlog, std::size_t stack_bytes,
-                             std::size_t trace_records, time_ns_t hung_after_ns,
+                             const py::object& core, const py::object& fsm,
                              const std::map<std::string, PropertyValue>& properties,
                              const std::vector<std::string>& alternatives, const std::string& fallback,
-                             bool reconfigurable) {
-  const ComponentParts rest{.settings = task_settings(priority, cpus, offset_ns, period_ns, overrun,
-                                                      max_backlog, stack_bytes, trace_records, hung_after_ns),
+                             bool reconfigurable, const py::kwargs& settings) {
+  const ComponentParts rest{.settings = task_settings(name, settings),
                             .properties = properties,
                             .alternatives = alternatives,
                             .fallback = fallback,
@@ -200,12 +196,7 @@ void bind_transaction(py::module_& module) {
   py::class_<PyTransaction> transaction(module, "Transaction");
   transaction.def(py::init<>())
       .def("add_component", &add_component, py::arg("name"), py::arg("shell"), py::arg("core"),
-           py::arg("fsm"), py::kw_only(), py::arg("priority") = 50, py::arg("cpus") = std::vector<int>{},
-           py::arg("offset_ns") = 0, py::arg("period_ns") = 0, py::arg("overrun") = "skip",
-           py::arg("max_backlog") = 10, py::arg("stack_bytes") = TaskSettings{}.stack_bytes,
-           py::arg("trace_records") = TaskSettings{}.trace_records,
-           py::arg("hung_after_ns") = TaskSettings{}.hung_after_ns,
-           py::arg("properties") = std::map<std::string, PropertyValue>{},
+           py::arg("fsm"), py::kw_only(), py::arg("properties") = std::map<std::string, PropertyValue>{},
            py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = "",
            py::arg("reconfigurable") = true);
   bind_replacements(transaction);

@@ -23,6 +23,8 @@ void bind_errors(py::module_& module);
 void bind_descriptions(py::module_& module);
 /// Registers PluginRegistry and PartFactory.
 void bind_registry(py::module_& module);
+/// Registers TaskSetting and the table of them.
+void bind_settings(py::module_& module);
 /// Registers Architecture and Component.
 void bind_architecture(py::module_& module);
 /// Registers Host and Deployer, their reports and the trace's drain.
@@ -64,9 +66,8 @@ py::object to_python(const PropertyValue& value);
 
 /// Makes another instance of an fsm; may be called, and ends, on any thread.
 Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry);
-TaskSettings task_settings(int priority, const std::vector<int>& cpus, time_ns_t offset_ns,
-                           time_ns_t period_ns, const std::string& overrun, std::int64_t max_backlog,
-                           std::size_t stack_bytes, std::size_t trace_records, time_ns_t hung_after_ns);
+/// Settings as keyword arguments; those not given have their defaults. Throws Error, py::type_error.
+TaskSettings task_settings(const std::string& component, const py::kwargs& given);
 
 struct PortDescription {
   std::string name;

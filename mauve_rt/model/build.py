@@ -111,15 +111,7 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
             if not installed or (plugin is not None and kind == "core" and plugin.shell == component.shell):
                 loader.require(kind, name)
     return {
-        "priority": component.priority,
-        "cpus": list(component.cpus or ()),
-        "offset_ns": component.offset_ns,
-        "period_ns": component.period_ns,
-        "overrun": component.overrun,
-        "max_backlog": component.max_backlog,
-        "stack_bytes": component.stack_bytes,
-        "trace_records": component.trace_records or 0,
-        "hung_after_ns": component.hung_after_ns,
+        **component.task_settings(),
         "alternatives": [_ANY_CORE]
         if installed
         else [core for core in allowed_parts(component, "core", loader) if core != component.core],

@@ -41,6 +41,7 @@ Nothing here looks at plug-ins, so a file can be read where none is installed.
 
 from typing import Any, Literal, Self
 
+from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
 from mauve_rt.model.kinds import (
     Choice,
     Fault,
@@ -62,14 +63,11 @@ QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
 GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event", "client")
 # What an event's topic carries: a message a raise, true a raise, or how often it was raised (the default).
 EVENT_TYPES = ("std_msgs/msg/Empty", "std_msgs/msg/Bool", "std_msgs/msg/UInt64")
-MAX_PRIORITY = 98  # 99 is the conductor's, which commits reconfigurations
-MIN_STACK_BYTES = 16_384
 MAX_CAPACITY = 1_000_000
 DEFAULT_READERS = 14
 DEFAULT_MESSAGE_BYTES = 65_536
 MAX_MESSAGE_BYTES = 2**28
 MAX_READERS = 1000
-MAX_TRACE_RECORDS = 1_048_576
 _LONGEST_MS = 1e9
 
 _PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
@@ -94,11 +92,7 @@ _RESOURCE_KIND = Text(
     rf"{'|'.join(GIVEN_RESOURCES)}|{_PLUGIN}",
     f"{', '.join(GIVEN_RESOURCES)} or the name of a plug-in, package/Class",
 )
-_CPUS = ListOf(Whole(0, 65_535), few=1)
-_PRIORITY = Whole(1, MAX_PRIORITY)
 _DURATION_MS = Real(least=0, most=_LONGEST_MS)
-_PRIORITY_HINT = "1 is the lowest, 98 the highest; 99 is kept for the conductor"
-_CPUS_HINT = "leave the key out to allow every CPU"
 
 
 class _Alternatives(ListOf):
@@ -148,8 +142,8 @@ class DiagnosticsModel(Section):
 class SenderModel(Section):
     """The thread that sends the messages of bound topics."""
 
-    priority: int = setting(_PRIORITY, default=1, hint=_PRIORITY_HINT)
-    cpus: list[int] | None = setting(_CPUS, default=None, hint=_CPUS_HINT)  # absent: any
+    priority: int = kernel_setting("priority", default=1)
+    cpus: list[int] | None = kernel_setting("cpus")  # absent: any
 
 
 class ExecutorModel(Section):
@@ -247,35 +241,27 @@ class ComponentModel(Section):
     fsm: str = setting(PLUGIN_NAME)
     alternatives: list[str] | Literal["installed"] = setting(_Alternatives(PLUGIN_NAME), default=[])
     fallback: str | None = setting(PLUGIN_NAME, default=None)
-    priority: int = setting(_PRIORITY, default=50, hint=_PRIORITY_HINT)
-    cpus: list[int] | None = setting(_CPUS, default=None, hint=_CPUS_HINT)  # absent: any
-    offset_ms: float = setting(_DURATION_MS, default=0.0, hint="milliseconds after the epoch")
-    period_ns: int = setting(Whole(0, 2**63 - 1), default=0)  # 0: as the FSM says
-    overrun: Literal["skip", "catch_up", "fault"] = setting(
-        Choice("skip", "catch_up", "fault"), default="skip"
-    )
-    max_backlog: int = setting(Whole(1, 1_000_000), default=10)
-    stack_bytes: int = setting(
-        Whole(MIN_STACK_BYTES, 2**30),
-        default=524_288,
-        hint="the default of 524288 does for most components",
-    )
-    trace_records: int | None = setting(Whole(2, MAX_TRACE_RECORDS), default=None)  # None: by the period
+    priority: int = kernel_setting("priority")
+    cpus: list[int] | None = kernel_setting("cpus")  # absent: any
+    offset_ms: float = kernel_setting("offset_ns", in_ms=True)
+    period_ns: int = kernel_setting("period_ns")  # 0: as the FSM says
+    overrun: Literal["skip", "catch_up", "fault"] = kernel_setting("overrun")
+    max_backlog: int = kernel_setting("max_backlog")
+    stack_bytes: int = kernel_setting("stack_bytes")
+    trace_records: int | None = kernel_setting("trace_records")  # None: by the period
     # A state that lasts longer is told as hung; None: 10 periods, 1 s at least.
-    hung_after_ms: float | None = setting(Real(above=0, most=_LONGEST_MS), default=None)
+    hung_after_ms: float | None = kernel_setting("hung_after_ns", in_ms=True)
     reconfigurable: bool = setting(Flag(), default=True)
     properties: dict[str, PropertyValue] = setting(TableOf(Scalar()), default={})
     diagnostics: DiagnosticsModel = setting(Part(DiagnosticsModel), default=DiagnosticsModel())
 
-    @property
-    def offset_ns(self) -> int:
-        """The offset from the epoch in nanoseconds."""
-        return round(self.offset_ms * 1e6)
-
-    @property
-    def hung_after_ns(self) -> int:
-        """As the kernel takes it: 0 stands for its own rule."""
-        return 0 if self.hung_after_ms is None else max(1, round(self.hung_after_ms * 1e6))
+    def task_settings(self) -> dict[str, Any]:
+        """How the kernel is to run it; what the file does not say is the kernel's choice."""
+        return {
+            each.name: each.to_kernel(getattr(self, key))
+            for key, each in self.settings.items()
+            if isinstance(each, KernelSetting) and getattr(self, key) is not None
+        }
 
 
 class FileModel(Section):

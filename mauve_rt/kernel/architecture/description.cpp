@@ -12,15 +12,12 @@ namespace {
 
 ComponentFacts facts_of(Component& component, time_ns_t epoch_ns) {
   Task& task = component.task();
-  const TaskSettings& settings = task.settings();
   return {.name = component.name(),
           .parts = component.shown(),
           .state = settled(task.state()),
           .period_ns = task.context().period_ns.load(std::memory_order_relaxed),
-          .offset_ns = settings.offset_ns,
           .reference_ns = task.grid().reference_ns == 0 ? 0 : task.grid().reference_ns - epoch_ns,
-          .priority = settings.priority,
-          .cpus = settings.cpus,
+          .settings = task.settings(),
           .alternatives = component.alternatives(),
           .fallback = component.fallback_implementation(),
           .reconfigurable = component.is_reconfigurable()};
@@ -39,20 +36,14 @@ void sort_by_name(std::vector<Facts>& facts) {
   std::sort(facts.begin(), facts.end(), [](const Facts& a, const Facts& b) { return a.name < b.name; });
 }
 
-std::string numbers(const std::vector<int>& values) {
-  std::vector<std::string> words;
-  words.reserve(values.size());
-  for (const int value : values) words.push_back(std::to_string(value));
-  return join(words);
-}
-
 std::string text_of(const ComponentFacts& facts) {
   std::string text = "component " + facts.name + "\n  state " + std::string(to_string(facts.state)) + "\n";
   text +=
       "  shell " + facts.parts.shell + "\n  core " + facts.parts.core + "\n  fsm " + facts.parts.fsm + "\n";
-  text += "  period_ns " + std::to_string(facts.period_ns) + "\n  offset_ns " +
-          std::to_string(facts.offset_ns) + "\n  reference_ns " + std::to_string(facts.reference_ns) + "\n";
-  text += "  priority " + std::to_string(facts.priority) + "\n  cpus " + numbers(facts.cpus) + "\n";
+  text += "  period_ns " + std::to_string(facts.period_ns) + "\n  reference_ns " +
+          std::to_string(facts.reference_ns) + "\n";
+  for (const TaskSetting& setting : kTaskSettings)
+    text += "  setting " + std::string(setting.name) + " " + to_string(setting.get(facts.settings)) + "\n";
   text += "  alternatives " + join(facts.alternatives) + "\n";
   if (!facts.fallback.empty()) text += "  fallback " + facts.fallback + "\n";
   if (!facts.reconfigurable) text += "  reconfigurable false\n";

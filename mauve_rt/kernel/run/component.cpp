@@ -97,43 +97,7 @@ void Component::show() {
 }
 
 void Component::set_settings(const TaskSettings& settings) {
-  constexpr int kHighest = 98;
-  if (settings.priority < 1 || settings.priority > kHighest) {
-    throw Error(ErrorCode::out_of_range, "the priority is out of range",
-                {.component = name_,
-                 .element = "priority",
-                 .expected = "1 to 98 (99 is kept for the conductor of transactions)",
-                 .found = std::to_string(settings.priority),
-                 .remedy = "choose another priority"});
-  }
-  if (settings.period_ns < 0 || settings.max_backlog < 1 || settings.stack_bytes < std::size_t{64} * 1024) {
-    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
-                {.component = name_, .expected = "period_ns >= 0, max_backlog >= 1, stack_bytes >= 65536"});
-  }
-  if (settings.offset_ns < 0 || settings.offset_ns > kLongest) {
-    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
-                {.component = name_,
-                 .element = "offset_ns",
-                 .expected = "0 to " + std::to_string(kLongest),
-                 .found = std::to_string(settings.offset_ns),
-                 .remedy = "give the time from the epoch to the first instant"});
-  }
-  for (const int cpu : settings.cpus) {
-    if (cpu >= 0 && cpu < CPU_SETSIZE) continue;
-    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
-                {.component = name_,
-                 .element = "cpus",
-                 .expected = "0 to " + std::to_string(CPU_SETSIZE - 1),
-                 .found = std::to_string(cpu),
-                 .remedy = "name CPUs of this machine, or none to allow every one"});
-  }
-  if (settings.hung_after_ns < 0) {
-    throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
-                {.component = name_,
-                 .element = "hung_after_ns",
-                 .expected = ">= 0 (0: 10 periods, 1 s at least)",
-                 .found = std::to_string(settings.hung_after_ns)});
-  }
+  check(settings, name_);
   task_.set_settings(settings);
 }
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
-from mauve_rt.model.schema import MAX_PRIORITY
 from mauve_rt.model.words import shown
 from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage
@@ -54,7 +54,7 @@ PARAMETERS: dict[str, Setting] = {
         _LIMITS.max_requested_priority,
         "highest priority that a request may give a component",
         minimum=1,
-        maximum=MAX_PRIORITY,
+        maximum=TASK_SETTINGS["priority"].most,
     ),
 }
 # Not declared: without a value the file's peers count, which are no default that could be told.

@@ -511,6 +511,8 @@ TEST(Settings, OutOfRangeAreRefusedWhereTheyAreGiven) {
   EXPECT_EQ(ErrorCode::out_of_range, code_of({.cpus = {5'000}}));
   EXPECT_EQ(ErrorCode::out_of_range, code_of({.priority = 0}));
   EXPECT_EQ(ErrorCode::out_of_range, code_of({.priority = 99}));
+  EXPECT_EQ(ErrorCode::out_of_range, code_of({.stack_bytes = 65'535}));
+  EXPECT_EQ(ErrorCode::out_of_range, code_of({.trace_records = 1}));
 }
 
 TEST(Settings, CpusThatTheMachineLacksAreToldAtDeployment) {

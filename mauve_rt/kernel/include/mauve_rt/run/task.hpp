@@ -21,6 +21,7 @@
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/run/commit.hpp"
 #include "mauve_rt/run/execution_word.hpp"
+#include "mauve_rt/run/task_settings.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
 namespace mauve {
@@ -33,25 +34,6 @@ std::string_view to_string(ComponentState state) MAUVE_RT;
 constexpr ComponentState settled(ComponentState state) MAUVE_RT {
   return state == ComponentState::held ? ComponentState::running : state;
 }
-
-/// What to do when an instant has passed before its wait is entered.
-enum class OverrunPolicy : std::uint8_t {
-  skip,      // go on at the next instant of the grid
-  catch_up,  // go on at once, owing at most max_backlog instants
-  fault,
-};
-
-struct TaskSettings {
-  int priority{50};         // SCHED_FIFO, 1 to 98; 99 is kept for the conductor of transactions
-  std::vector<int> cpus{};  // empty: any
-  time_ns_t offset_ns{0};   // instants are epoch + offset + k * period
-  time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
-  OverrunPolicy overrun{OverrunPolicy::skip};
-  std::int64_t max_backlog{10};
-  std::size_t stack_bytes{std::size_t{512} * 1024};  // prefaulted whole: it is held in memory
-  std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
-  time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
-};
 
 /// What the kernel gave the thread, read back from it.
 struct ThreadFacts {

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The settings of a component's task, by name: whatever the kernel's table has.
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+/// Throws py::type_error for a value of another type than the setting's.
+SettingValue from_python(const TaskSetting& setting, const SettingValue& example, py::handle value) {
+  try {
+    return std::visit(
+        [value](const auto& same) -> SettingValue { return value.cast<std::decay_t<decltype(same)>>(); },
+        example);
+  } catch (const py::cast_error&) {
+    throw py::type_error(std::string(setting.name) + ": found " + std::string(py::str(py::type::of(value))));
+  }
+}
+
+}  // namespace
+
+TaskSettings task_settings(const std::string& component, const py::kwargs& given) {
+  TaskSettings settings;
+  for (const auto& [key, value] : given) {
+    const auto name = key.cast<std::string>();
+    const auto* setting = std::find_if(kTaskSettings.begin(), kTaskSettings.end(),
+                                       [&name](const TaskSetting& each) { return each.name == name; });
+    if (setting == kTaskSettings.end())
+      throw py::type_error("add_component() has no argument '" + name + "'");
+    const SettingValue usual = setting->get(settings);
+    const SettingValue wanted = from_python(*setting, usual, value);
+    if (wanted != usual) check(*setting, wanted, component);
+    setting->assign(settings, wanted);
+  }
+  return settings;
+}
+
+void bind_settings(py::module_& module) {
+  py::class_<TaskSetting>(module, "TaskSetting")
+      .def_property_readonly("default",
+                             [](const TaskSetting& setting) { return setting.get(TaskSettings{}); })
+      .def_readonly("least", &TaskSetting::least)
+      .def_readonly("most", &TaskSetting::most)
+      .def_property_readonly("choices",
+                             [](const TaskSetting& setting) {
+                               return std::vector<std::string>(setting.choices.begin(),
+                                                               setting.choices.end());
+                             })
+      .def_property_readonly("hint", [](const TaskSetting& setting) { return std::string(setting.hint); });
+  py::dict all;
+  for (const TaskSetting& setting : kTaskSettings) all[std::string(setting.name).c_str()] = setting;
+  module.attr("TASK_SETTINGS") = all;
+}
+
+}  // namespace mauve::bindings

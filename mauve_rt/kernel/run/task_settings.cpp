@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/run/task_settings.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/base/error.hpp"
+
+namespace mauve {
+
+namespace {
+
+void check_number(const TaskSetting& setting, std::int64_t number, const std::string& component) {
+  if (number >= setting.least && number <= setting.most) return;
+  throw Error(ErrorCode::out_of_range, "a setting of the task is out of range",
+              {.component = component,
+               .element = std::string(setting.name),
+               .expected = std::to_string(setting.least) + " to " + std::to_string(setting.most),
+               .found = std::to_string(number),
+               .remedy = std::string(setting.hint)});
+}
+
+}  // namespace
+
+void check(const TaskSetting& setting, const SettingValue& value, const std::string& component) {
+  if (const auto* number = std::get_if<std::int64_t>(&value)) {
+    check_number(setting, *number, component);
+  } else if (const auto* numbers = std::get_if<std::vector<int>>(&value)) {
+    for (const int each : *numbers) check_number(setting, each, component);
+  } else if (const auto& word = std::get<std::string>(value);
+             std::ranges::find(setting.choices, word) == setting.choices.end()) {
+    throw Error(ErrorCode::invalid_argument, "a setting of the task is none of those there are",
+                {.component = component,
+                 .element = std::string(setting.name),
+                 .expected = join(setting.choices),
+                 .found = word});
+  }
+}
+
+void check(const TaskSettings& settings, const std::string& component) {
+  for (const TaskSetting& setting : kTaskSettings) {
+    const SettingValue value = setting.get(settings);
+    if (value != setting.get(TaskSettings{})) check(setting, value, component);
+  }
+}
+
+std::string to_string(const SettingValue& value) {
+  if (const auto* number = std::get_if<std::int64_t>(&value)) return std::to_string(*number);
+  if (const auto* word = std::get_if<std::string>(&value)) return *word;
+  std::vector<std::string> words;
+  for (const int number : std::get<std::vector<int>>(value)) words.push_back(std::to_string(number));
+  return join(words);
+}
+
+}  // namespace mauve
