@@ -110,6 +110,8 @@ class PropertyDescription:
     minimum: Final[float | None]
     maximum: Final[float | None]
     structural: Final[list[str]]  # parts that read it only when they are configured: shell, core, fsm
+    def check(self, value: PropertyValue) -> None:
+        """Raises MauveError (type_mismatch, out_of_range) for a value that it does not take."""
 
 @final
 class ShellDescription:

@@ -141,7 +141,15 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("description", &PropertyDescription::description)
       .def_readonly("minimum", &PropertyDescription::minimum)
       .def_readonly("maximum", &PropertyDescription::maximum)
-      .def_readonly("structural", &PropertyDescription::structural);
+      .def_readonly("structural", &PropertyDescription::structural)
+      .def(
+          "check",
+          [](const PropertyDescription& self, const PropertyValue& value) {
+            const PropertyOptions options{
+                .unit = self.unit, .minimum = self.minimum, .maximum = self.maximum};
+            static_cast<void>(checked(self.name, self.value, options, value));
+          },
+          py::arg("value"));
   py::class_<ShellDescription>(module, "ShellDescription")
       .def_readonly("name", &ShellDescription::name)
       .def_readonly("ports", &ShellDescription::ports)

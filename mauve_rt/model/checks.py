@@ -230,26 +230,15 @@ class Checks:
 
 
 def property_mismatch(known: PropertyDescription, value: PropertyValue) -> Mapping[str, str]:
-    """Expected and found where a value does not suit a property; empty where it does."""
-    kind = {bool: "bool", int: "int", float: "float", str: "str"}[type(value)]
-    if kind != known.type and (kind, known.type) != ("int", "float"):
-        wanted = {"bool": "true or false", "int": "a whole number", "float": "a number", "str": "text"}[
-            known.type
-        ]
-        remedy = "put it in quotes" if known.type == "str" else ""
-        return {"expected": wanted, "found": shown(value), "remedy": remedy, "code": "type_mismatch"}
-    if isinstance(value, str | bool):
-        return {}
-    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+    """Expected and found where the kernel would not take a value for a property; empty where it would."""
+    if known.type in ("int", "float") and isinstance(value, int) and not -(2**63) <= value < 2**63:
         return {"expected": "a number of at most 64 bits", "found": shown(value), "code": "out_of_range"}
-    low = known.minimum is not None and not value >= known.minimum
-    high = known.maximum is not None and not value <= known.maximum
-    if not low and not high:
-        return {}
-    unit = f" {known.unit}" if known.unit not in ("", "1") else ""
-    bounds = [f"at least {known.minimum:g}{unit}"] if known.minimum is not None else []
-    bounds += [f"at most {known.maximum:g}{unit}"] if known.maximum is not None else []
-    return {"expected": " and ".join(bounds), "found": f"{value:g}", "code": "out_of_range"}
+    try:
+        known.check(value)
+    except MauveError as error:
+        found = error.found if error.code == "out_of_range" else shown(value)
+        return {"expected": error.expected, "found": found, "remedy": error.remedy, "code": error.code}
+    return {}
 
 
 def _signature(port: PortDescription) -> str:

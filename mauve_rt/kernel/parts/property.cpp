@@ -18,14 +18,31 @@ std::string number(double value) {
   return shown.find_first_of(".en") == std::string::npos ? shown + ".0" : shown;
 }
 
-/// The value as T, or nothing when it is of another type; an integer serves as a float.
-template <typename T>
-std::optional<T> convert(const PropertyValue& value) {
-  if (const T* same = std::get_if<T>(&value)) return *same;
-  if constexpr (std::same_as<T, double>) {
-    if (const auto* integer = std::get_if<std::int64_t>(&value)) return static_cast<double>(*integer);
-  }
-  return std::nullopt;
+/// In no more digits than people read.
+std::string rounded(double value) {
+  std::array<char, 32> text{};
+  constexpr int kDigits = 6;
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits).ptr;
+  return {text.data(), end};
+}
+
+/// "at least 0 m and at most 10 m".
+std::string range_of(const PropertyOptions& options) {
+  const std::string unit = options.unit.empty() || options.unit == "1" ? "" : " " + options.unit;
+  std::string words;
+  if (options.minimum) words = "at least " + rounded(*options.minimum) + unit;
+  if (options.maximum)
+    words += (words.empty() ? "at most " : " and at most ") + rounded(*options.maximum) + unit;
+  return words.empty() ? "a number" : words;  // NaN is none
+}
+
+void check_range(const std::string& name, const PropertyOptions& options, double value) {
+  const bool below = options.minimum && !(value >= *options.minimum);
+  const bool above = options.maximum && !(value <= *options.maximum);
+  if (!below && !above && !std::isnan(value)) return;
+  throw Error(ErrorCode::out_of_range, "the value is out of range",
+              {.element = "property " + name, .expected = range_of(options), .found = rounded(value)});
 }
 
 }  // namespace
@@ -51,32 +68,22 @@ std::vector<std::string> names_of(ReadBy parts) {
   return names;
 }
 
-void PropertyBase::check_range(double value) const {
-  const bool below = options_.minimum && !(value >= *options_.minimum);
-  const bool above = options_.maximum && !(value <= *options_.maximum);
-  if (!below && !above && !std::isnan(value)) return;
-  const std::string low = options_.minimum ? number(*options_.minimum) : "-inf";
-  const std::string high = options_.maximum ? number(*options_.maximum) : "inf";
-  throw Error(ErrorCode::out_of_range, "the value is out of range",
-              {.element = "property " + name_,
-               .expected = low + " to " + high + (options_.unit.empty() ? "" : " " + options_.unit),
-               .found = number(value),
-               .remedy = "choose a value in the range"});
-}
-
-template <PropertyType T>
-PropertyValue Property<T>::checked(const PropertyValue& value) const {
-  const std::optional<T> converted = convert<T>(value);
-  if (!converted) {
+PropertyValue checked(const std::string& name, const PropertyValue& example, const PropertyOptions& options,
+                      const PropertyValue& value) {
+  constexpr std::array<std::string_view, 4> kTypes{"true or false", "a whole number", "a number", "text"};
+  const auto* integer = std::get_if<std::int64_t>(&value);
+  const bool is_float = std::holds_alternative<double>(example);
+  PropertyValue converted = is_float && integer != nullptr ? static_cast<double>(*integer) : value;
+  if (converted.index() != example.index()) {
     throw Error(ErrorCode::type_mismatch, "the value is of another type",
-                {.element = "property " + name(),
-                 .expected = std::string(property_type_name(PropertyValue(value_))),
+                {.element = "property " + name,
+                 .expected = std::string(kTypes[example.index()]),
                  .found = std::string(property_type_name(value)) + " " + to_string(value),
-                 .remedy = "write the value as the property's type"});
+                 .remedy = std::holds_alternative<std::string>(example) ? "put it in quotes" : ""});
   }
-  if constexpr (std::same_as<T, double> || std::same_as<T, std::int64_t>)
-    check_range(static_cast<double>(*converted));
-  return *converted;
+  if (const auto* real = std::get_if<double>(&converted)) check_range(name, options, *real);
+  if (integer != nullptr && !is_float) check_range(name, options, static_cast<double>(*integer));
+  return converted;
 }
 
 template class Property<bool>;

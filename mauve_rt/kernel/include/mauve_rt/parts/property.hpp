@@ -54,6 +54,12 @@ struct PropertyOptions {
   bool operator==(const PropertyOptions&) const = default;
 };
 
+/// The value as a property of `example`'s type has it: an integer serves where a float is asked for. The one check of
+/// whatever a property is set to, by a file, a request or a program. [non-rt]
+/// Throws Error: type_mismatch, out_of_range.
+PropertyValue checked(const std::string& name, const PropertyValue& example, const PropertyOptions& options,
+                      const PropertyValue& value);
+
 /// A property seen without its type.
 ///
 /// | member           | written by                                                  | read by            |
@@ -73,8 +79,7 @@ class PropertyBase {
   const PropertyOptions& options() const MAUVE_RT { return options_; }
   /// The present value; of a running component ask Component::property_values(). [setup]
   virtual PropertyValue boxed() const = 0;
-  /// The value converted to the property's type (an integer serves where a float is asked for). [non-rt]
-  /// Throws Error: type_mismatch, out_of_range.
+  /// The value converted to the property's type, as checked() above. [non-rt]
   virtual PropertyValue checked(const PropertyValue& value) const = 0;
   /// Takes a value that checked() returned, by swapping it with the present one. [rt]
   virtual void swap(PropertyValue& value) MAUVE_RT = 0;
@@ -84,7 +89,6 @@ class PropertyBase {
   virtual void end_preview() noexcept = 0;
 
  protected:
-  void check_range(double value) const;
   void set_previewer(pthread_t thread) noexcept { previewer_.store(thread, std::memory_order_relaxed); }
   bool is_previewed() const noexcept {
     // Relaxed: only the thread that stored its own id here finds it, and that one has written the preview itself.
@@ -112,7 +116,9 @@ class Property final : public PropertyBase {
   }  // NOLINT: reads like the value, as in the paper's listings
 
   PropertyValue boxed() const override { return value(); }
-  PropertyValue checked(const PropertyValue& value) const override;
+  PropertyValue checked(const PropertyValue& value) const override {
+    return mauve::checked(name(), T{}, options(), value);
+  }
   void swap(PropertyValue& value) noexcept override {
     if (T* const other = std::get_if<T>(&value))
       MAUVE_RT_TRUSTED(std::swap(*other, value_));  // texts change places
