@@ -24,17 +24,9 @@ __version__: Final[str]
 PropertyValue: TypeAlias = bool | int | float | str
 
 class MauveError(Exception):
-    """An error of the kernel. str() is one line: what, where, expected, found, remedy.
+    """An error of the kernel. str() is one line: what, where, expected, found, remedy."""
 
-    code is the name of an ErrorCode: 'invalid_argument', 'unknown_component', 'unknown_core',
-    'undeclared_core', 'unknown_shell', 'unknown_fsm', 'unknown_resource', 'unknown_service', 'unknown_port',
-    'unknown_property', 'unknown_type', 'type_mismatch', 'out_of_range', 'duplicate_name',
-    'loop_without_wait', 'bad_fsm', 'bad_period', 'configure_failed', 'not_configured', 'not_connected',
-    'not_running', 'already_running', 'faulted', 'not_reconfigurable', 'adopt_refused', 'prepare_failed',
-    'timeout', 'wrong_revision', 'would_deadlock', 'realtime_denied', 'plugin', 'io', 'internal'.
-    """
-
-    code: str
+    code: str  # a key of ERROR_REPLIES
     statement: str  # what alone
     component: str
     element: str
@@ -43,6 +35,9 @@ class MauveError(Exception):
     remedy: str
     step: int  # of a transaction, from 1; 0: none
     step_name: str
+
+# By code: the constant of mauve_msgs/msg/ReplyCode that answers a request which such an error refuses.
+ERROR_REPLIES: Final[dict[str, str]]
 
 @type_check_only
 class TaskSettings(TypedDict, total=False):

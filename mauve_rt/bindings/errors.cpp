@@ -12,9 +12,8 @@ py::handle mauve_error_type() {
 }
 
 ErrorCode error_code_of(std::string_view name) noexcept {
-  for (auto code = std::uint16_t{0}; code < static_cast<std::uint16_t>(ErrorCode::internal); ++code) {
-    if (to_string(static_cast<ErrorCode>(code)) == name) return static_cast<ErrorCode>(code);
-  }
+  for (const ErrorWords& words : kErrors)
+    if (words.name == name) return words.code;
   return ErrorCode::internal;
 }
 
@@ -36,6 +35,10 @@ py::handle python_type_of(const std::exception& error) {
 
 void bind_errors(py::module_& module) {
   module.attr("MauveError") = mauve_error_type();
+  py::dict replies;
+  for (const ErrorWords& words : kErrors)
+    replies[std::string(words.name).c_str()] = std::string(words.reply);
+  module.attr("ERROR_REPLIES") = replies;
   // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
   py::register_exception_translator([](std::exception_ptr pending) {
     try {

@@ -137,6 +137,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
     from mauve_rt.cli.client import connected  # noqa: PLC0415
     from mauve_rt.cli.views import print_json, report_lines  # noqa: PLC0415
+    from mauve_rt.control.requests import code_name  # noqa: PLC0415
 
     request = service_type.Request(
         request_id=args.request_id,
@@ -152,15 +153,7 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
     elif reply.success:
         print("\n  ".join([reply.message, *report_lines(reply.report)]))
     else:
-        code = next(
-            (
-                word
-                for word in dir(service_type.Response)
-                if word.isupper() and getattr(service_type.Response, word) == reply.code
-            ),
-            str(reply.code),
-        )
-        print(f"refused, {code} ({reply.code}): {reply.message}", file=sys.stderr)
+        print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
     return OK if reply.success else REFUSED
 
 

@@ -5,9 +5,10 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Protocol
+from typing import Any, Protocol
 
-from mauve_rt._kernel import NOT_MEASURED
+from mauve_msgs.msg import ReplyCode
+from mauve_rt._kernel import ERROR_REPLIES, NOT_MEASURED
 from mauve_rt.errors import error_code
 from mauve_rt.model.words import cut
 
@@ -21,6 +22,7 @@ __all__ = [
     "Request",
     "RequestLog",
     "Step",
+    "code_name",
     "code_of",
     "reused_id",
 ]
@@ -31,62 +33,24 @@ _SHOWN_STEP = 300
 _LONGEST_WORDS = 4000
 
 
-class Code(IntEnum):
-    """The codes of mauve_msgs/srv/Reconfigure."""
-
-    OK = 0
-    UNKNOWN_COMPONENT = 1
-    UNKNOWN_CORE = 2
-    UNDECLARED_CORE = 3
-    NOT_RUNNING = 4
-    ALREADY_RUNNING = 5
-    FAULTED = 6
-    NOT_RECONFIGURABLE = 7
-    WRONG_REVISION = 8
-    REQUEST_ID_REUSED = 9
-    PREPARE_FAILED = 10
-    ADOPT_REFUSED = 11
-    TIMEOUT = 12
-    NOT_ACTIVE = 13
-    INVALID = 14
-    UNSUPPORTED = 15
+_IntEnum: Any = IntEnum  # to mypy, which knows no generated messages: a test looks at the names in use
 
 
-_INVALID = (
-    "invalid_argument",
-    "type_mismatch",
-    "out_of_range",
-    "duplicate_name",
-    "unknown_property",
-    "unknown_port",
-    "unknown_service",
-    "unknown_resource",
-    "unknown_type",
-    "not_connected",
-    "bad_period",
-)
-_CODES = {
-    "unknown_component": Code.UNKNOWN_COMPONENT,
-    "unknown_core": Code.UNKNOWN_CORE,
-    "unknown_fsm": Code.UNKNOWN_CORE,
-    "unknown_shell": Code.UNKNOWN_CORE,
-    "undeclared_core": Code.UNDECLARED_CORE,
-    "not_running": Code.NOT_RUNNING,
-    "already_running": Code.ALREADY_RUNNING,
-    "faulted": Code.FAULTED,
-    "not_reconfigurable": Code.NOT_RECONFIGURABLE,
-    "structural_property": Code.NOT_RECONFIGURABLE,
-    "wrong_revision": Code.WRONG_REVISION,
-    "adopt_refused": Code.ADOPT_REFUSED,
-    "timeout": Code.TIMEOUT,
-    "not_configured": Code.NOT_ACTIVE,
-    **dict.fromkeys(_INVALID, Code.INVALID),
-}
+class Code(_IntEnum):
+    """The constants of mauve_msgs/msg/ReplyCode."""
+
+    vars().update({name: value for name, value in vars(ReplyCode).items() if isinstance(value, int)})
 
 
 def code_of(error: BaseException) -> Code:
-    """The code of an error of the kernel; any that is not known otherwise comes from preparing."""
-    return _CODES.get(error_code(error), Code.PREPARE_FAILED)
+    """The code of an error: the kernel's table has it."""
+    code: Code = getattr(Code, ERROR_REPLIES.get(error_code(error), "PREPARE_FAILED"))
+    return code
+
+
+def code_name(code: int) -> str:
+    """The name of a code; of one that is not known here its number."""
+    return str(Code(code).name) if code in set(Code) else str(code)
 
 
 class RefusalError(Exception):

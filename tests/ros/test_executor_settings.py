@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from ros_processes import PATIENCE_S, ExecutorProcess
 from std_msgs.msg import Float64
 
-from mauve_msgs.msg import ReconfigurationStep
+from mauve_msgs.msg import ReconfigurationStep, ReplyCode
 from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.node.executor.settings import PARAMETERS
 from mauve_rt.node.shared.settings import OF_RCLPY
@@ -180,7 +180,7 @@ def test_a_structural_property_is_set_beside_its_reader(executor: ExecutorProces
     assert remote.get("counter.period_ms") == [20]
     alone = ReconfigurationStep(kind="set_property", target="counter", name="period_ms", value="7")
     refused = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[alone])
-    assert (refused.success, refused.code) == (False, Reconfigure.Response.NOT_RECONFIGURABLE)
+    assert (refused.success, refused.code) == (False, ReplyCode.NOT_RECONFIGURABLE)
     reader = ReconfigurationStep(kind="replace_fsm", target="counter", name="executor_tests/CounterFsm")
     done = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=[alone, reader])
     assert done.success, done.message
@@ -192,7 +192,7 @@ def test_a_structural_property_is_set_beside_its_reader(executor: ExecutorProces
 
 def test_the_supervisor_s_parameters(domain: int, graph: Any, tmp_path: Path) -> None:
     (tmp_path / "rules.yaml").write_text(RULES, encoding="utf-8")
-    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main"]
+    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main.main"]
     rules = ["--ros-args", "-p", f"rules:={tmp_path / 'rules.yaml'}"]
     file = tmp_path / "parameters.yaml"
     file.write_text("supervisor: {ros__parameters: {rulse: x}}\n", encoding="utf-8")

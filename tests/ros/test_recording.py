@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64
 
 import mauve_rt.trace
-from mauve_msgs.msg import ReconfigurationStep
+from mauve_msgs.msg import ReconfigurationStep, ReplyCode
 from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording
 from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
@@ -57,7 +57,7 @@ def test_a_bag_begun_and_ended_while_the_executor_runs(executor: ExecutorProcess
     graph.spin_until(lambda: voice.get_subscription_count() > 0, "the recorder's subscription")
     events = graph.hear_events(EXECUTOR)
     again = start(graph, bag="other")
-    assert (again.success, again.code) == (False, StartRecording.Response.ALREADY_RUNNING)
+    assert (again.success, again.code) == (False, ReplyCode.ALREADY_RUNNING)
     for number in range(3):
         voice.publish(Float64(data=float(number)))
     swapped = graph.ask(
@@ -136,7 +136,7 @@ def test_what_is_refused_starts_nothing(executor: ExecutorProcess, graph: Any, t
         assert message in reply.message
         assert not (tmp_path / "new").exists()
     stopped = stop(graph)
-    assert (stopped.success, stopped.code) == (False, StopRecording.Response.NOT_RUNNING)
+    assert (stopped.success, stopped.code) == (False, ReplyCode.NOT_RUNNING)
 
 
 def test_a_full_disk_ends_the_recording_with_a_diagnostic(
@@ -179,11 +179,11 @@ def test_a_type_that_no_package_lists_is_refused_and_not_imported(
     graph: Any, tmp_path: Path, type_name: str
 ) -> None:
     reply = start(graph, bag="first", topics=[f"/x:{type_name}"])
-    assert (reply.success, reply.code) == (False, StartRecording.Response.INVALID)
+    assert (reply.success, reply.code) == (False, ReplyCode.INVALID)
     assert "of an installed message" in reply.message
     resource_text = f"{{kind: shared_data, type: {type_name}, topic: {{name: x, direction: publish}}}}"
     step = ReconfigurationStep(kind="add_resource", target="x", value=resource_text)
     added = graph.ask(Reconfigure, f"{EXECUTOR}/reconfigure", steps=[step])
-    assert (added.success, added.code) == (False, StartRecording.Response.INVALID)
+    assert (added.success, added.code) == (False, ReplyCode.INVALID)
     assert not (tmp_path / "imported").exists()
     assert not (tmp_path / "first").exists()

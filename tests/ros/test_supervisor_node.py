@@ -19,7 +19,14 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import PATIENCE_S, wait_for_signals
 
-from mauve_msgs.msg import ArchitectureState, ComponentInfo, ComponentStatus, PeerMessage, SupervisorDecision
+from mauve_msgs.msg import (
+    ArchitectureState,
+    ComponentInfo,
+    ComponentStatus,
+    PeerMessage,
+    ReplyCode,
+    SupervisorDecision,
+)
 from mauve_msgs.srv import Reconfigure
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.node.supervisor.node import Supervisor
@@ -169,7 +176,7 @@ def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: 
 
 def test_a_refusal_is_told_and_tried_again(graph: Graph, rules: Path):
     stand_in, decisions = supervised(graph, rules)
-    stand_in.refuse_with = Reconfigure.Response.PREPARE_FAILED
+    stand_in.refuse_with = ReplyCode.PREPARE_FAILED
     stand_in.talking = False
     graph.until(lambda: "done" in said(decisions))
     assert said(decisions) == ["armed", "condition_true", "do", "failed", "do", "done"]
@@ -204,7 +211,7 @@ def test_a_message_type_that_is_not_installed_is_refused(graph: Graph, rules: Pa
 
 def run(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "mauve_rt.node.supervisor.main", "--ros-args", *arguments],
+        [sys.executable, "-m", "mauve_rt.node.supervisor.main.main", "--ros-args", *arguments],
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311
