@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from mauve_msgs.msg import ComponentInfo, SupervisorDecision
+from mauve_rt.control.requests import Code, Outcome
 from mauve_rt.supervision.engine import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
 from mauve_rt.supervision.rule import ArchitectureView, ComponentView
@@ -21,6 +22,12 @@ def architecture_view(state: Any) -> ArchitectureView:
         for status in state.components
     }
     return ArchitectureView(state.instance_id, state.revision, components)
+
+
+def outcome_of(reply: Any) -> Outcome:
+    """Of the response of a mauve_msgs/srv/Reconfigure."""
+    code = Code(reply.code) if reply.code in set(Code) else Code.PREPARE_FAILED  # one of a newer executor
+    return Outcome(code=code, message=reply.message, revision=reply.revision)
 
 
 def inventory(instance_id: str, components: Iterable[Any], resources: Iterable[Any]) -> Inventory:

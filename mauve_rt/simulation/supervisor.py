@@ -1,20 +1,18 @@
 """A supervisor in virtual time: the rules of a file at work on an executor of the same simulation."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_rt._kernel import Simulation
-from mauve_rt.control.requests import Code
-from mauve_rt.control.requests import Request as ExecutorRequest
-from mauve_rt.control.requests import Step as ExecutorStep
+from mauve_rt.control.requests import Request
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
 from mauve_rt.simulation.executor import SimulatedExecutor
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
 from mauve_rt.supervision.conditions import SilenceCondition
 from mauve_rt.supervision.engine import Decision, RuleEngine
-from mauve_rt.supervision.requests import Outcome, Request
 from mauve_rt.supervision.rules import Rule, RulesFile
 
 _DECISIONS_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -38,7 +36,9 @@ class SimulatedSupervisor:
         self.decisions = f"{self.name}/decisions"
         listed = RulesFile(rules).rules.rules
         pairs = [(rule, self._condition(rule)) for rule in listed]
-        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look)
+        self._engine = RuleEngine(
+            pairs, act=self._act, decide=self._decide, look=self._look, id_prefix=f"{self.name}/"
+        )
         self._ended = False
         topics.listen(f"{executor.name}/state", self._on_state)
 
@@ -71,26 +71,8 @@ class SimulatedSupervisor:
         self._engine.on_inventory(self._now_s(), inventory(*self._executor.listed()))
 
     def _act(self, request: Request) -> None:
-        steps = tuple(ExecutorStep(step.kind, step.target, step.name, step.value) for step in request.steps)
-        done = self._executor.handle(
-            ExecutorRequest(
-                steps=steps,
-                request_id=f"{self.name}/{request.number}",
-                expected_revision=request.expected_revision,
-                requested_by=self.name,
-                cause=request.cause,
-                dry_run=request.dry_run,
-                max_missed=request.max_missed,
-            )
-        )
-        outcome = Outcome(
-            success=done.success,
-            message=done.message,
-            revision=done.revision,
-            wrong_revision=done.code is Code.WRONG_REVISION,
-            inactive=done.code is Code.NOT_ACTIVE,
-        )
-        self._engine.on_outcome(self._now_s(), request.number, outcome)
+        outcome = self._executor.handle(replace(request, requested_by=self.name))
+        self._engine.on_outcome(self._now_s(), request.request_id, outcome)
 
     def _decide(self, decision: Decision) -> None:
         now_ns = self._simulation.now_ns()

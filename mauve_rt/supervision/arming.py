@@ -6,12 +6,13 @@ it does and undoes (dry runs)? What would be refused is told then, not when the 
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.inventory import Inventory
-from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, Outcome, Request
+from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, asked
 from mauve_rt.supervision.rule import Kind, RuleLife
 
 ASK_AGAIN_S = 1.0
@@ -39,13 +40,13 @@ class Arming:
         *,
         look: Callable[[], None],
         act: Callable[[Request], None],
-        number: Callable[[], int],
+        ids: Iterator[str],
         tell: Tell,
     ) -> None:
-        """`look` asks for an inventory, `act` for a dry run; `number` gives each request its own."""
+        """`look` asks for an inventory, `act` for a dry run; `ids` has one for each request."""
         self._look = look
         self._act = act
-        self._number = number
+        self._ids = ids
         self._tell = tell
         self.forget()
 
@@ -53,7 +54,7 @@ class Arming:
         """The executor was started anew: what was asked of it before counts no longer."""
         self._unlisted: list[RuleLife] = []
         self._trials: deque[_Trial] = deque()
-        self._flight: tuple[int, _Trial] | None = None
+        self._flight: tuple[str, _Trial] | None = None
         self._look_again_s = self._try_again_s = 0.0
         self._waits_for_state = False
 
@@ -82,8 +83,10 @@ class Arming:
         if trial.kind == "do" and trial.life.in_effect:  # done meanwhile
             self._next(trial)
             return
-        request = Request(self._number(), tuple(trial.steps()), 0, _cause(trial), dry_run=True)
-        self._flight = (request.number, trial)
+        request = Request(
+            request_id=next(self._ids), steps=asked(trial.steps()), cause=_cause(trial), dry_run=True
+        )
+        self._flight = (request.request_id, trial)
         self._try_again_s = now_s + ANSWER_TIMEOUT_S
         self._act(request)
 
@@ -102,15 +105,15 @@ class Arming:
                     )
                 self._trials.append(_Trial(life, "undo"))
 
-    def on_outcome(self, now_s: float, number: int, outcome: Outcome) -> bool:
-        """The reply to a dry run; False when it is about something else."""
-        if self._flight is None or self._flight[0] != number:
+    def on_outcome(self, now_s: float, request_id: str, outcome: Outcome | None) -> bool:
+        """The reply to a dry run, None: it was not sent; False when it is about something else."""
+        if self._flight is None or self._flight[0] != request_id:
             return False
         _, trial = self._flight
         self._flight, self._try_again_s = None, 0.0
-        if not outcome.answered:
+        if outcome is None:
             self._try_again_s = now_s + ASK_AGAIN_S
-        elif outcome.inactive:
+        elif outcome.code is Code.NOT_ACTIVE:
             self._waits_for_state = True
         elif outcome.success:
             self._next(trial)

@@ -7,11 +7,13 @@ three callables.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 
+from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.supervision.arming import Arming
 from mauve_rt.supervision.conditions import Condition
 from mauve_rt.supervision.inventory import Inventory
-from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, Outcome, Request
+from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, asked
 from mauve_rt.supervision.rule import PRESENT, ArchitectureView, Kind, RuleLife
 from mauve_rt.supervision.rules import Rule
 
@@ -49,15 +51,19 @@ class RuleEngine:
         act: Callable[[Request], None],
         decide: Callable[[Decision], None],
         look: Callable[[], None],
+        id_prefix: str = "",
     ) -> None:
-        """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells."""
+        """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells.
+
+        `id_prefix` begins the id of each request: the executor has never seen one like it.
+        """
         self._lives = [RuleLife(rule, condition) for rule, condition in rules]
         self._act = act
         self._decide = decide
         self._view: ArchitectureView | None = None
         self._flight: _Flight | None = None
-        self._requests = 0
-        self._arming = Arming(look=look, act=act, number=self._number, tell=self._say)
+        self._ids = (f"{id_prefix}{number}" for number in count(1))
+        self._arming = Arming(look=look, act=act, ids=self._ids, tell=self._say)
 
     def tick(self, now_s: float) -> None:
         """Check every condition and act on what is due."""
@@ -88,16 +94,22 @@ class RuleEngine:
         for life in self._lives:
             self._follow(life, view, now_s)
 
-    def on_outcome(self, now_s: float, number: int, outcome: Outcome) -> None:
-        """The reply to a request; one that is not in flight any more is ignored."""
-        if self._arming.on_outcome(now_s, number, outcome):
+    def on_outcome(self, now_s: float, request_id: str, outcome: Outcome | None, message: str = "") -> None:
+        """The reply to a request; one that is not in flight any more is ignored.
+
+        No outcome: it did not reach the executor; `message` says why.
+        """
+        if self._arming.on_outcome(now_s, request_id, outcome):
             return
         flight = self._flight
-        if flight is None or flight.request.number != number or flight.outcome is not None:
+        if flight is None or flight.request.request_id != request_id or flight.outcome is not None:
             return
-        flight.life.revision_floor = outcome.revision
+        flight.life.revision_floor = outcome.revision if outcome is not None else 0
+        if outcome is None:
+            self._fail(flight, "not sent", now_s, message=message)
+            return
         if not outcome.success:
-            self._fail(flight, "refused" if outcome.answered else "not sent", now_s, outcome)
+            self._fail(flight, "refused", now_s, outcome)
             return
         flight.outcome = outcome
         flight.deadline_s = now_s + STATE_TIMEOUT_S
@@ -158,20 +170,16 @@ class RuleEngine:
     def _send(self, life: RuleLife, kind: Kind, now_s: float, view: ArchitectureView) -> None:
         cause = life.cause(kind, now_s)
         request = Request(
-            self._number(),
-            tuple(life.steps(kind)),
-            view.revision,
-            cause,
+            request_id=next(self._ids),
+            steps=asked(life.steps(kind)),
+            expected_revision=view.revision,
+            cause=cause,
             max_missed=life.max_missed(kind),
         )
         life.untouched = False
         self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
         self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))
         self._act(request)
-
-    def _number(self) -> int:
-        self._requests += 1
-        return self._requests
 
     def _excuse(self, life: RuleLife, kind: Kind, reason: str) -> None:
         if life.excused != kind:
@@ -202,9 +210,10 @@ class RuleEngine:
             or view.revision < flight.outcome.revision
         ):
             return
-        present = view.describe(flight.request.steps)
+        steps = flight.life.steps(flight.kind)
+        present = view.describe(steps)
         # At a later revision somebody else may have changed it again: that is no failure of ours.
-        if view.revision == flight.outcome.revision and not view.shows(flight.request.steps, unknown=True):
+        if view.revision == flight.outcome.revision and not view.shows(steps, unknown=True):
             self._fail(flight, f"~/state shows otherwise: {present}", now_s, flight.outcome)
             return
         self._flight = None
@@ -212,11 +221,14 @@ class RuleEngine:
         self._say(flight.life, "done", f"{flight.kind}: {present}", flight.outcome.message)
         self._follow(flight.life, view, now_s)
 
-    def _fail(self, flight: _Flight, reason: str, now_s: float, outcome: Outcome | None = None) -> None:
+    def _fail(
+        self, flight: _Flight, reason: str, now_s: float, outcome: Outcome | None = None, message: str = ""
+    ) -> None:
         self._flight = None
-        delay_s = flight.life.fail(now_s, wrong_revision=outcome is not None and outcome.wrong_revision)
+        wrong_revision = outcome is not None and outcome.code is Code.WRONG_REVISION
+        delay_s = flight.life.fail(now_s, wrong_revision=wrong_revision)
         reason = f"{flight.kind} failed: {reason}; next try in {delay_s:.2f} s if still needed"
-        self._say(flight.life, "failed", reason, outcome.message if outcome else "")
+        self._say(flight.life, "failed", reason, outcome.message if outcome else message)
 
     def _say(self, life: RuleLife, decision: str, reason: str, message: str = "") -> None:
         revision = self._view.revision if self._view is not None else 0

@@ -1,32 +1,13 @@
-"""What a supervisor asks of its executor, and the answer."""
+"""What a supervisor asks of its executor: the steps of its rules, as requests have them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 
-from mauve_rt.model.steps import Step
+from mauve_rt.control.requests import Step
+from mauve_rt.model.steps import Step as RuleStep
 
 ANSWER_TIMEOUT_S = 5.0
 
 
-@dataclass(frozen=True)
-class Request:
-    """A transaction for the executor. `number` names it in `on_outcome`."""
-
-    number: int
-    steps: Sequence[Step]
-    expected_revision: int
-    cause: str
-    dry_run: bool = False
-    max_missed: int = 0
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The executor's reply, or why there is none."""
-
-    success: bool
-    message: str
-    revision: int = 0
-    wrong_revision: bool = False
-    inactive: bool = False  # refused because the executor is not active
-    answered: bool = True  # False: the request did not reach the executor
+def asked(steps: Iterable[RuleStep]) -> tuple[Step, ...]:
+    """Steps of a rule as those of a request."""
+    return tuple(Step(step.kind, step.target, step.name, step.value) for step in steps)

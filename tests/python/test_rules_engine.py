@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.supervision.conditions import SilenceCondition
 from mauve_rt.supervision.engine import Decision, RuleEngine
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
-from mauve_rt.supervision.requests import Outcome, Request
 from mauve_rt.supervision.rule import ArchitectureView, ComponentView
 from mauve_rt.supervision.rules import Rule
 
@@ -100,8 +100,9 @@ class World:
         cores = [step.name for step in request.steps if step.kind == "replace_core"]
         strange = [core for core in cores if core not in self.known]
         words = "not active" if self.inactive else f"no core {strange[0]}" if strange else ""
-        outcome = Outcome(success=not words, message=words, inactive=self.inactive)
-        self.engine.on_outcome(self.now_s, request.number, outcome)
+        code = Code.NOT_ACTIVE if self.inactive else Code.UNKNOWN_CORE if words else Code.OK
+        outcome = Outcome(code=code, message=words)
+        self.engine.on_outcome(self.now_s, request.request_id, outcome)
 
     def _act(self, request: Request) -> None:
         if request.dry_run:
@@ -112,12 +113,12 @@ class World:
         if not self.answering:
             return
         if self.refusals:
-            self.engine.on_outcome(self.now_s, request.number, self.refusals.pop(0))
+            self.engine.on_outcome(self.now_s, request.request_id, self.refusals.pop(0))
             return
         step = request.steps[0]
         self.tell({step.target: ComponentView("RUNNING", step.name)})
-        outcome = Outcome(success=True, message="done", revision=self.revision)
-        self.engine.on_outcome(self.now_s, request.number, outcome)
+        outcome = Outcome(code=Code.OK, message="done", revision=self.revision)
+        self.engine.on_outcome(self.now_s, request.request_id, outcome)
 
     def said(self) -> list[str]:
         return [decision.decision for decision in self.decisions]
@@ -241,7 +242,7 @@ def test_the_cooldown_delays_the_next_action_and_says_so_once():
 def test_a_failed_action_is_tried_again_ever_later():
     world = started(rule(cooldown_s=1.0))
     world.talking = False
-    world.refusals = [Outcome(success=False, message="prepare failed") for _ in range(3)]
+    world.refusals = [Outcome(code=Code.PREPARE_FAILED, message="prepare failed") for _ in range(3)]
     world.run(12.0)
     assert world.said().count("failed") == 3
     assert world.said()[-1] == "done"
@@ -266,7 +267,7 @@ def test_an_answer_that_comes_too_late_is_ignored():
     world.run(6.3)
     said = world.said()
     world.engine.on_outcome(
-        world.now_s, world.requests[0].number, Outcome(success=True, message="", revision=9)
+        world.now_s, world.requests[0].request_id, Outcome(code=Code.OK, message="", revision=9)
     )
     assert world.said() == said
 
@@ -286,8 +287,8 @@ def test_a_success_that_the_state_contradicts_is_a_failure():
     world.talking = world.answering = False
     world.run(1.2)
     world.tell()
-    outcome = Outcome(success=True, message="", revision=world.revision)
-    world.engine.on_outcome(world.now_s, world.requests[0].number, outcome)
+    outcome = Outcome(code=Code.OK, message="", revision=world.revision)
+    world.engine.on_outcome(world.now_s, world.requests[0].request_id, outcome)
     assert world.said()[-1] == "failed"
     assert USUAL in world.decisions[-1].reason
 
@@ -296,8 +297,8 @@ def test_a_state_that_comes_after_the_answer_confirms_it():
     world = started()
     world.talking = world.answering = False
     world.run(1.2)
-    outcome = Outcome(success=True, message="", revision=world.revision + 1)
-    world.engine.on_outcome(world.now_s, world.requests[0].number, outcome)
+    outcome = Outcome(code=Code.OK, message="", revision=world.revision + 1)
+    world.engine.on_outcome(world.now_s, world.requests[0].request_id, outcome)
     assert world.said()[-1] == "do"
     world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
     assert world.said()[-1] == "done"
@@ -306,7 +307,7 @@ def test_a_state_that_comes_after_the_answer_confirms_it():
 def test_a_wrong_revision_is_tried_again_soon_but_with_the_new_state_only():
     world = started()
     world.talking = False
-    world.refusals = [Outcome(success=False, message="wrong revision", revision=7, wrong_revision=True)]
+    world.refusals = [Outcome(code=Code.WRONG_REVISION, message="wrong revision", revision=7)]
     world.run(2.0)
     assert world.said()[-1] == "failed"
     world.tell()
@@ -366,8 +367,8 @@ def test_one_action_at_a_time():
     world.answering = True
     world.engine.on_outcome(
         world.now_s,
-        world.requests[0].number,
-        Outcome(success=True, message="", revision=world.revision),
+        world.requests[0].request_id,
+        Outcome(code=Code.OK, message="", revision=world.revision),
     )
     world.run(0.1)
     assert [request.steps[0].target for request in world.requests] == ["exploration", "mapping"]

@@ -19,15 +19,15 @@ from rclpy.utilities import try_shutdown
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
 from mauve_msgs.srv import ListComponents, Reconfigure
+from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
+from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.node.supervisor.settings import PARAMETERS, check_arguments
 from mauve_rt.supervision.conditions import Condition, SilenceCondition
 from mauve_rt.supervision.engine import Decision, RuleEngine
-from mauve_rt.supervision.requests import Outcome, Request
 from mauve_rt.supervision.rule_types import heard_type
 from mauve_rt.supervision.rules import Rule, RulesFile
 
@@ -56,6 +56,7 @@ class Supervisor:
             act=self._act,
             decide=self._decide,
             look=self._look,
+            id_prefix=f"{uuid.uuid4()}/",
         )
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         self._decisions = node.create_publisher(
@@ -108,11 +109,10 @@ class Supervisor:
         client = self._try if request.dry_run else self._change
         if not client.service_is_ready():
             text = f"service {self._service} is not there"
-            missing = Outcome(success=False, message=text, answered=False)
-            self._engine.on_outcome(time.monotonic(), request.number, missing)
+            self._engine.on_outcome(time.monotonic(), request.request_id, None, text)
             return
         message = Reconfigure.Request(
-            request_id=str(uuid.uuid4()),
+            request_id=request.request_id,
             expected_revision=request.expected_revision,
             requested_by=self._node.get_fully_qualified_name(),
             cause=request.cause,
@@ -124,7 +124,7 @@ class Supervisor:
             max_missed=request.max_missed,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
-        self._call(client, message).add_done_callback(lambda future: on_reply(request.number, future))
+        self._call(client, message).add_done_callback(lambda future: on_reply(request.request_id, future))
 
     def _call(self, client: Any, message: Any) -> Any:
         """Ask; a call before it that got no answer is given up."""
@@ -134,19 +134,10 @@ class Supervisor:
         future = self._pending[client] = client.call_async(message)
         return future
 
-    def _on_reply(self, number: int, future: Any) -> None:
-        if future.exception() is not None:
-            outcome = Outcome(success=False, message=str(future.exception()), answered=False)
-        else:
-            reply = future.result()
-            outcome = Outcome(
-                success=reply.success,
-                message=reply.message,
-                revision=reply.revision,
-                wrong_revision=reply.code == Reconfigure.Response.WRONG_REVISION,
-                inactive=reply.code == Reconfigure.Response.NOT_ACTIVE,
-            )
-        self._engine.on_outcome(time.monotonic(), number, outcome)
+    def _on_reply(self, request_id: str, future: Any) -> None:
+        failure = future.exception()
+        outcome = outcome_of(future.result()) if failure is None else None
+        self._engine.on_outcome(time.monotonic(), request_id, outcome, str(failure or ""))
 
     def _decide(self, decision: Decision) -> None:
         reply = f" ({decision.message})" if decision.message else ""
