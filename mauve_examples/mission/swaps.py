@@ -5,9 +5,9 @@ from typing import Any
 
 from mauve_examples.mission.evidence import RobotEvidence, Timed
 from mauve_examples.mission.facts import MissionFacts
-from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
-from mauve_rt.trace.report.requests import Request, join_requests
+from mauve_rt.trace.reading.trace import Message
+from mauve_rt.trace.report.requests import RequestTold, join_requests
 
 EXPLORATION = "exploration"
 _ACTED = ("do", "undo")
@@ -70,7 +70,7 @@ def swap_problems(facts: MissionFacts, robot: str, swaps: list[Swap]) -> list[st
     return []
 
 
-def _joined(evidence: RobotEvidence, one: Reconfiguration, request: Request | None) -> Swap:
+def _joined(evidence: RobotEvidence, one: Reconfiguration, request: RequestTold | None) -> Swap:
     cause = "" if request is None else request.cause
     return Swap(
         robot=evidence.robot,

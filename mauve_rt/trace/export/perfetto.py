@@ -24,7 +24,7 @@ from mauve_rt.trace.export.packets import (
     Track,
     unicode,
 )
-from mauve_rt.trace.export.swaps import Request, find_requests, find_swaps, number_flows
+from mauve_rt.trace.export.swaps import RequestSlice, find_requests, find_swaps, number_flows
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.trace import Trace, merge_traces
@@ -87,7 +87,7 @@ def _description(one: ComponentInfo) -> str:
     return f"{one.shell}, {one.core}, {one.fsm}; priority {one.priority} {one.policy}, CPU {cpus}"
 
 
-def _write_request(file: PacketFile, process: int, request: Request) -> None:
+def _write_request(file: PacketFile, process: int, request: RequestSlice) -> None:
     """Write a slice on a track of its own: requests may overlap. Perfetto shows tracks of one name as one."""
     said = request.message.msg
     figures: dict[str, Figure] = {

@@ -29,13 +29,13 @@ class Swap:
     armed_ns: int
     what: str
     figures: dict[str, int | bool]
-    request: "Request | None" = None
+    request: "RequestSlice | None" = None
     flow: int = 0
     """The number of its flow; 0 when it has none, having nothing to flow from or to."""
 
 
 @dataclass(eq=False)
-class Request:
+class RequestSlice:
     """What somebody asked of the executor, from its preparation to its answer."""
 
     message: Message
@@ -92,12 +92,12 @@ def find_swaps(trace: Trace, component: str) -> list[Swap]:
     return found
 
 
-def find_requests(trace: Trace, swaps: Iterable[Swap]) -> list[Request]:
+def find_requests(trace: Trace, swaps: Iterable[Swap]) -> list[RequestSlice]:
     """What the executor told of requests, each with the swaps that its report names, which are told of it."""
     unasked = sorted(swaps, key=lambda swap: swap.armed_ns)
     requests = []
     for message in trace.messages(_EVENT_TYPE):
-        request = Request(message, message.monotonic_ns)
+        request = RequestSlice(message, message.monotonic_ns)
         for step in message.msg.report:
             match = _swap_of(step, message.monotonic_ns, unasked)
             if match is not None and match.request is None:

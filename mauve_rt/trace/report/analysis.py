@@ -12,14 +12,14 @@ from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigura
 from mauve_rt.trace.reading.statistics import ComponentStatistics, component_statistics
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.report.cycles import Array, releases_of, slices_by_state
-from mauve_rt.trace.report.requests import Request, join_requests
+from mauve_rt.trace.report.requests import RequestTold, join_requests
 
 
 class Swap(NamedTuple):
     """A reconfiguration as measured, and as asked for."""
 
     measured: Reconfiguration
-    request: Request | None
+    request: RequestTold | None
     changed_ns: int
     """When adopt and take were over, by the first record after them; the park's time without one."""
 

@@ -11,7 +11,7 @@ _REPLY_WITHIN_NS = 5_000_000_000  # the executor publishes its event after the r
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class RequestTold:
     """What an executor told about a request that touched a component."""
 
     requested_by: str
@@ -24,7 +24,7 @@ class Request:
     prepare_ns: int | None
 
 
-def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) -> list[Request | None]:
+def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) -> list[RequestTold | None]:
     """Return the request behind each reconfiguration; None where the bag does not tell.
 
     `events` are messages of type ReconfigurationEvent as `Trace.messages` gives them.
@@ -33,7 +33,7 @@ def join_requests(measured: Sequence[Reconfiguration], events: Iterable[Any]) ->
     return [_request_behind(one, told) for one in measured]
 
 
-def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> Request | None:
+def _request_behind(one: Reconfiguration, told: Sequence[Any]) -> RequestTold | None:
     """Return the one that tells of it, by its blackout; where that is not measured, the first soon after.
 
     Components of merged traces are named <bag>/<component>. Where the executor's topics do not have the name
@@ -64,12 +64,12 @@ def _has_measured(event: Any, component: str, blackout_ns: int) -> bool:
     return any(step.component == component and step.blackout_ns == blackout_ns for step in event.report)
 
 
-def _request(event: Any, component: str) -> Request:
+def _request(event: Any, component: str) -> RequestTold:
     steps = [step for step in event.report if step.component == component]
     prepare_ns = sum(step.prepare_ns for step in steps)
     # A bag may be of a time when reports did not name the cores.
     replacing = next((step for step in reversed(steps) if getattr(step, "to_core", "")), None)
-    return Request(
+    return RequestTold(
         requested_by=event.requested_by,
         cause=event.cause,
         steps=", ".join(step.step for step in steps),
