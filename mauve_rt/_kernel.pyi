@@ -89,7 +89,7 @@ class MessageShape:
 class PortDescription:
     name: Final[str]
     kind: Final[str]  # 'read', 'write', 'call', 'event'
-    type: str  # 'geometry_msgs/msg/Point', or 'void(package/Name)' for call ports
+    type: str  # 'geometry_msgs/msg/Point'; of a call port the name that its service declares
     resource: Final[str]  # '' when not connected
     service: Final[str]
     required: Final[bool]  # told of a shell's ports, not of a component's
@@ -125,7 +125,7 @@ class ServiceDescription:
 @final
 class ResourceDescription:
     name: Final[str]
-    kind: Final[str]  # 'shared_data', 'ring_buffer', 'latest_value', 'event', 'client', or the plug-in's name
+    kind: Final[str]  # a given kind, or the plug-in's name
     type: Final[str]
     services: Final[list[ServiceDescription]]
 
@@ -202,8 +202,6 @@ class StepReport:
     shift_ns: Final[int]  # by which a new epoch made its instants later
 
 NOT_MEASURED: Final[int]
-
-DEFAULT_MAX_READERS: Final[int]  # of a latest_value
 
 @final
 class ShellView:
@@ -284,12 +282,66 @@ class DataResource:
         *,
         kind: str,
         type: str,
-        capacity: int,
-        overwrite: bool,
-        max_bytes: int,
-        max_readers: int,
+        parameters: dict[str, PropertyValue],
         zero: bytes | None,
     ) -> None: ...
+
+@final
+class ResourceParameter:
+    """What one resource of a kind can be told."""
+
+    def __init__(
+        self,
+        name: str,
+        initial: PropertyValue,
+        *,
+        unit: str = "",
+        description: str = "",
+        minimum: float | None = None,
+        maximum: float | None = None,
+        required: bool = False,
+    ) -> None: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def type(self) -> str:
+        """As PropertyDescription.type."""
+    @property
+    def initial(self) -> PropertyValue:
+        """Unless told otherwise."""
+    @property
+    def description(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def minimum(self) -> float | None: ...
+    @property
+    def maximum(self) -> float | None: ...
+    @property
+    def required(self) -> bool: ...
+    @property
+    def counts_values(self) -> bool:
+        """So many values more take memory."""
+    @property
+    def limits_readers(self) -> bool:
+        """So many ports may connect to the service `read`."""
+    @property
+    def file_key(self) -> str:
+        """Its key in architecture files: `capacity`, or `service.timeout_ms`."""
+
+@final
+class ResourceKind:
+    """What a kind of resource tells of itself."""
+
+    name: Final[str]
+    parameters: Final[list[ResourceParameter]]
+    type_kind: Final[str]  # of what its type is: 'type' or 'call_type' of a registry; '': it has none
+    messages: Final[list[str]]  # as which its topic may say it, the last where no type is given
+    values: Final[int]  # so many take memory, besides those that parameters count
+    has_one_writer: Final[bool]
+
+def given_resource_kinds() -> list[ResourceKind]:
+    """The kinds that the kernel gives, in their order."""
 
 @final
 class PluginRegistry:
@@ -309,7 +361,9 @@ class PluginRegistry:
     def core(self, name: str, core_class: type[Core[Any]], shell_name: str) -> None: ...
     def fsm(self, name: str, fsm_class: type[Fsm[Any, Any]], shell_name: str) -> None: ...
     def resource(self, name: str, resource_class: type[Resource]) -> None:
-        """`name` is its kind in architecture files."""
+        """`name` is its kind in architecture files, its parameters are the keys."""
+    def resource_kind(self, name: str) -> ResourceKind:
+        """Given, or registered."""
     def names(self, kind: str) -> list[str]:
         """kind: 'shell', 'core', 'fsm', 'resource', 'type'."""
     def value_bytes(self, type: str) -> int:
@@ -406,11 +460,8 @@ class Transaction:
         *,
         kind: str,
         type: str = "",
-        capacity: int = 0,
-        overwrite: bool = False,
-        max_readers: int = 14,
-        timeout_ns: int = 100_000_000,
         topic: str = "",
+        **parameters: PropertyValue,
     ) -> Transaction:
         """As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''."""
     def remove_resource(self, name: str) -> Transaction:
@@ -472,16 +523,9 @@ class Architecture:
         *,
         kind: str,
         type: str = "",
-        capacity: int = 0,
-        overwrite: bool = False,
-        max_readers: int = 14,
-        timeout_ns: int = 100_000_000,
+        **parameters: PropertyValue,
     ) -> None:
-        """Adds a resource of a given kind or a plug-in's.
-
-        Given: 'shared_data', 'ring_buffer' (capacity, overwrite), 'latest_value' (max_readers), 'event',
-        'client' (timeout_ns).
-        """
+        """Adds a resource of a kind; PluginRegistry.resource_kind tells its parameters."""
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
     def commit(self, transaction: Transaction) -> TransactionReport:
         """Carries out a transaction, by the host if there is one; as Host.commit."""

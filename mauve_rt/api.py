@@ -40,6 +40,7 @@ from mauve_rt.parts.resources import (
     Resource,
     RingBuffer,
     SharedData,
+    parameter,
     service,
 )
 from mauve_rt.parts.shells import NativeShell, Shell
@@ -89,6 +90,7 @@ __all__ = [
     "event_port",
     "monotonic_ns",
     "ms_to_ns",
+    "parameter",
     "property",
     "read_port",
     "s_to_ns",

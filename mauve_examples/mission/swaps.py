@@ -5,8 +5,8 @@ from typing import Any
 
 from mauve_examples.mission.evidence import RobotEvidence, Timed
 from mauve_examples.mission.facts import MissionFacts
-from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.reading.facts import Message
+from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.report.requests import RequestTold, join_requests
 
 EXPLORATION = "exploration"

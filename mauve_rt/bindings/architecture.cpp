@@ -93,18 +93,12 @@ void bind_architecture(py::module_& module) {
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const std::string& kind, const std::string& type,
-             std::size_t capacity, bool overwrite, std::uint32_t max_readers, time_ns_t timeout_ns) {
-            const ResourceParameters parameters{.capacity = capacity,
-                                                .overwrite = overwrite,
-                                                .max_readers = max_readers,
-                                                .timeout_ns = timeout_ns};
+             const py::kwargs& keywords) {
             Transaction transaction;
-            transaction.add_resource(name, self.registry.make_resource(kind, type, parameters));
+            transaction.add_resource(name, self.registry.make_resource(kind, type, parameters_of(keywords)));
             commit_one(self, std::move(transaction));
           },
-          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
-          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders,
-          py::arg("timeout_ns") = kDefaultCallTimeout)
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "")
       .def(
           "connect",
           [](PyArchitecture& self, const std::string& component, const std::string& port,

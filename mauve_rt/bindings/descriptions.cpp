@@ -7,6 +7,20 @@ py::object to_python(const PropertyValue& value) {
   return std::visit([](const auto& held) -> py::object { return py::cast(held); }, value);
 }
 
+ResourceParameters parameters_of(const py::dict& keywords) {
+  ResourceParameters parameters;
+  for (const auto& [name, value] : keywords) {
+    try {
+      parameters.emplace(name.cast<std::string>(), value.cast<PropertyValue>());
+    } catch (const py::cast_error&) {
+      throw py::type_error(py::str("parameter {}: expected bool, int, float or str, found {!r}")
+                               .format(name, value)
+                               .cast<std::string>());
+    }
+  }
+  return parameters;
+}
+
 std::vector<PortDescription> describe_ports(const Shell& shell) {
   std::vector<PortDescription> ports;
   for (const auto& port : shell.ports()) {

@@ -36,8 +36,7 @@ py::handle python_type_of(const std::exception& error) {
 void bind_errors(py::module_& module) {
   module.attr("MauveError") = mauve_error_type();
   py::dict replies;
-  for (const ErrorWords& words : kErrors)
-    replies[std::string(words.name).c_str()] = std::string(words.reply);
+  for (const ErrorWords& words : kErrors) replies[std::string(words.name).c_str()] = std::string(words.reply);
   module.attr("ERROR_REPLIES") = replies;
   // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's
   py::register_exception_translator([](std::exception_ptr pending) {

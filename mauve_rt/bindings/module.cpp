@@ -17,6 +17,5 @@ PYBIND11_MODULE(_kernel, module) {
   bind_simulation(module);
   module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;
-  module.attr("DEFAULT_MAX_READERS") = mauve::kDefaultMaxReaders;
   module.def("monotonic_ns", &mauve::monotonic_now_ns);
 }

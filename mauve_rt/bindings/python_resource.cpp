@@ -7,9 +7,11 @@ namespace {
 
 class PythonResource final : public Resource {
  public:
-  explicit PythonResource(const PartFactory& factory) : Resource(factory.name, "") {
+  PythonResource(const PartFactory& factory, const ResourceParameters& parameters)
+      : Resource(factory.name, "") {
     in_python([&] {
       object_.set(factory.make->get()());
+      for (const auto& [name, value] : parameters) py::setattr(object_.get(), name.c_str(), to_python(value));
       for (const auto& item : object_.get().attr("_services")()) {
         const auto service = item.cast<py::tuple>();
         const auto name = service[0].cast<std::string>();
@@ -47,8 +49,9 @@ py::object PythonCallPort::call(const py::args& args, const py::kwargs& kwargs) 
   return method(*args, **kwargs);
 }
 
-std::unique_ptr<Resource> make_python_resource(const PartFactory& factory) {
-  return std::make_unique<PythonResource>(factory);
+std::unique_ptr<Resource> make_python_resource(const PartFactory& factory,
+                                               const ResourceParameters& parameters) {
+  return std::make_unique<PythonResource>(factory, parameters);
 }
 
 }  // namespace mauve::bindings

@@ -10,17 +10,38 @@ namespace {
 /// A resource of a data type: the kernel's where a library registered the type, else a serialized one.
 struct DataResource {
   std::string kind;
+  std::string type;
   ResourceParameters parameters;
-  SerializedOptions serialized;
-  bool has_zero;  // whether it can be serialized
+  std::optional<Message> zero;  // none: it cannot be serialized
 };
 
 std::unique_ptr<Resource> make_data_resource(const DataResource& data, const PluginRegistry& registry) {
   const std::vector<std::string> types = registry.names("type");
-  if (data.has_zero && !std::binary_search(types.begin(), types.end(), data.serialized.type)) {
-    return make_serialized_resource(data.kind, data.serialized);
+  if (data.zero && !std::binary_search(types.begin(), types.end(), data.type)) {
+    const ResourceParameters all = registry.checked_parameters(data.kind, data.parameters);
+    return make_serialized_resource(data.kind, {.type = data.type, .zero = *data.zero, .parameters = all});
   }
-  return registry.make_resource(data.kind, data.serialized.type, data.parameters);
+  return registry.make_resource(data.kind, data.type, data.parameters);
+}
+
+/// How a resource's own object is made into one of the kernel; None of a class.
+py::object instance_part(const py::object& resource) {
+  if (PyType_Check(resource.ptr()) || !py::hasattr(resource, "_instance_part")) return py::none();
+  return resource.attr("_instance_part")();
+}
+
+/// For a resource that is made only to be described.
+ResourceParameters parameters_needed(const ResourceKind& kind) {
+  ResourceParameters needed;
+  for (const ResourceParameter& parameter : kind.parameters) {
+    if (parameter.is_required) needed.emplace(parameter.name, parameter.initial);
+  }
+  return needed;
+}
+
+/// The parameters that a resource class in Python declares.
+std::vector<ResourceParameter> declared_parameters(const py::object& resource) {
+  return resource.attr("_parameters")().cast<std::vector<ResourceParameter>>();
 }
 
 PartFactory factory_of(const py::object& part, const std::string& kind) {
@@ -52,12 +73,10 @@ std::unique_ptr<FsmBase> make_fsm(const py::object& part, const PluginRegistry& 
   return make_python_fsm(factory_of(part, "fsm"));
 }
 std::unique_ptr<Resource> make_resource(const py::object& part, const PluginRegistry& registry) {
-  if (!PyType_Check(part.ptr()) && py::hasattr(part, "_instance_part")) {
-    const py::object made = part.attr("_instance_part")();
-    if (py::isinstance<DataResource>(made)) return make_data_resource(made.cast<DataResource>(), registry);
-    return make_python_resource(made.cast<PartFactory>());
-  }
-  return make_python_resource(factory_of(part, "resource"));
+  const py::object made = instance_part(part);
+  if (made.is_none()) return make_python_resource(factory_of(part, "resource"));
+  if (py::isinstance<DataResource>(made)) return make_data_resource(made.cast<DataResource>(), registry);
+  return make_python_resource(made.cast<PartFactory>());
 }
 
 Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry) {
@@ -68,7 +87,52 @@ Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& 
   };
 }
 
+void bind_resource_kinds(py::module_& module) {
+  py::class_<ResourceParameter>(module, "ResourceParameter")
+      .def(py::init([](const std::string& name, const PropertyValue& initial, const std::string& unit,
+                       const std::string& description, std::optional<double> minimum,
+                       std::optional<double> maximum, bool required) {
+             return ResourceParameter{.name = name,
+                                      .initial = initial,
+                                      .description = description,
+                                      .unit = unit,
+                                      .minimum = minimum,
+                                      .maximum = maximum,
+                                      .is_required = required};
+           }),
+           py::arg("name"), py::arg("initial"), py::kw_only(), py::arg("unit") = "",
+           py::arg("description") = "", py::arg("minimum") = std::nullopt, py::arg("maximum") = std::nullopt,
+           py::arg("required") = false)
+      .def_readonly("name", &ResourceParameter::name)
+      .def_property_readonly(
+          "type", [](const ResourceParameter& self) { return std::string(property_type_name(self.initial)); })
+      .def_property_readonly("initial", [](const ResourceParameter& self) { return to_python(self.initial); })
+      .def_readonly("description", &ResourceParameter::description)
+      .def_readonly("unit", &ResourceParameter::unit)
+      .def_readonly("minimum", &ResourceParameter::minimum)
+      .def_readonly("maximum", &ResourceParameter::maximum)
+      .def_readonly("required", &ResourceParameter::is_required)
+      .def_readonly("counts_values", &ResourceParameter::is_value_count)
+      .def_readonly("limits_readers", &ResourceParameter::is_reader_limit)
+      .def_property_readonly("file_key", [](const ResourceParameter& self) {
+        return self.file_key.empty() ? self.name : self.file_key;
+      });
+  py::class_<ResourceKind>(module, "ResourceKind")
+      .def_readonly("name", &ResourceKind::name)
+      .def_readonly("parameters", &ResourceKind::parameters)
+      .def_property_readonly("type_kind",
+                             [](const ResourceKind& self) {
+                               if (self.type == TypeNeed::none) return "";
+                               return self.type == TypeNeed::data ? "type" : "call_type";
+                             })
+      .def_readonly("messages", &ResourceKind::messages)
+      .def_readonly("values", &ResourceKind::values)
+      .def_readonly("has_one_writer", &ResourceKind::has_one_writer);
+  module.def("given_resource_kinds", &PluginRegistry::given_resource_kinds);
+}
+
 void bind_registry(py::module_& module) {
+  bind_resource_kinds(module);
   py::class_<PartFactory>(module, "PartFactory")
       .def(py::init([](const std::string& kind, const std::string& name, py::object make) {
              return PartFactory{kind, name, std::make_shared<PythonObject>(std::move(make))};
@@ -77,23 +141,17 @@ void bind_registry(py::module_& module) {
       .def_readonly("kind", &PartFactory::kind)
       .def_readonly("name", &PartFactory::name);
   py::class_<DataResource>(module, "DataResource")
-      .def(py::init([](const std::string& kind, const std::string& type, std::size_t capacity, bool overwrite,
-                       std::size_t max_bytes, std::uint32_t max_readers,
+      .def(py::init([](const std::string& kind, const std::string& type, const py::dict& parameters,
                        const std::optional<std::string>& zero) {
-             const std::string held = zero.value_or("");
-             const auto bytes = std::as_bytes(std::span(held));
-             return DataResource{
-                 .kind = kind,
-                 .parameters = {.capacity = capacity, .overwrite = overwrite, .max_readers = max_readers},
-                 .serialized = {.type = type,
-                                .zero = {bytes.begin(), bytes.end()},
-                                .max_bytes = max_bytes,
-                                .capacity = capacity,
-                                .overwrite = overwrite},
-                 .has_zero = zero.has_value()};
+             DataResource made{
+                 .kind = kind, .type = type, .parameters = parameters_of(parameters), .zero = {}};
+             if (zero) {
+               const auto bytes = std::as_bytes(std::span(*zero));
+               made.zero.emplace(bytes.begin(), bytes.end());
+             }
+             return made;
            }),
-           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("capacity"), py::arg("overwrite"),
-           py::arg("max_bytes"), py::arg("max_readers"), py::arg("zero"));
+           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"));
   py::class_<PluginRegistry>(module, "PluginRegistry")
       .def(py::init<>())
       .def("load_library", &PluginRegistry::load_library, py::arg("path"))
@@ -131,11 +189,13 @@ void bind_registry(py::module_& module) {
           "resource",
           [](PluginRegistry& self, const std::string& name, const py::object& resource) {
             const PartFactory part = factory_of(resource, "resource", name);
-            self.add_resource(name, "",
-                              [part](const ResourceParameters&) { return make_python_resource(part); });
+            self.add_resource(
+                {.name = name, .parameters = declared_parameters(resource)},
+                [part](const ResourceParameters& given) { return make_python_resource(part, given); });
           },
           py::arg("name"), py::arg("resource_class"))
       .def("names", &PluginRegistry::names, py::arg("kind"))
+      .def("resource_kind", &PluginRegistry::resource_kind, py::arg("name"), py::return_value_policy::copy)
       .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"))
       .def(
           "describe_shell",
@@ -148,13 +208,18 @@ void bind_registry(py::module_& module) {
       .def(
           "describe_resource",
           [](const PluginRegistry& self, const std::string& kind, const std::string& type) {
-            return describe_resource(*self.make_resource(kind, type, {.capacity = 1}));
+            const ResourceParameters needed = parameters_needed(self.resource_kind(kind));
+            return describe_resource(*self.make_resource(kind, type, needed));
           },
           py::arg("kind"), py::arg("type"))
       .def(
           "describe_resource",
           [](const PluginRegistry& self, const py::object& resource) {
-            return describe_resource(*make_resource(resource, self));
+            const py::object part = instance_part(resource);
+            if (!py::isinstance<DataResource>(part)) return describe_resource(*make_resource(resource, self));
+            auto data = part.cast<DataResource>();
+            data.parameters = parameters_needed(self.resource_kind(data.kind));  // as large as it must be
+            return describe_resource(*make_data_resource(data, self));
           },
           py::arg("resource"))
       .def("core_shell", &PluginRegistry::core_shell, py::arg("name"))

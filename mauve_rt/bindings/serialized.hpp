@@ -34,17 +34,15 @@ class SerializedWriteService : public ServiceBase {
 /// What a resource of serialized messages holds.
 struct SerializedOptions {
   std::string type;
-  Message zero;                 // the message with every field at its default
-  std::size_t max_bytes{4096};  // of one message
-  std::size_t capacity{0};      // of a ring_buffer
-  bool overwrite{false};        // a full ring's oldest
+  Message zero;                   // the message with every field at its default
+  ResourceParameters parameters;  // all of the kind, checked
 };
 
 /// As ReadPort<T> and WritePort<T>.
 std::unique_ptr<PortBase> make_serialized_port(PortKind kind, const std::string& name,
                                                const std::string& type, OutputOptions output,
                                                std::span<const std::byte> zero);
-/// As PluginRegistry::make_resource, of "shared_data" or "ring_buffer". Throws Error: invalid_argument.
+/// As PluginRegistry::make_resource, of a kind that has max_bytes. Throws Error: invalid_argument, unknown_type.
 std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, SerializedOptions options);
 
 }  // namespace mauve::bindings

@@ -11,7 +11,8 @@ struct Place {
   time_ns_t time_ns{0};
 
   void set(std::span<const std::byte> bytes, time_ns_t time) MAUVE_RT {
-    MAUVE_RT_TRUSTED(message.assign(bytes.begin(), bytes.end()));  // within what was reserved: allocates nothing
+    MAUVE_RT_TRUSTED(
+        message.assign(bytes.begin(), bytes.end()));  // within what was reserved: allocates nothing
     time_ns = time;
   }
 };
@@ -20,7 +21,9 @@ struct Place {
 class SerializedResource : public Resource {
  public:
   SerializedResource(std::string kind, SerializedOptions options)
-      : Resource(std::move(kind), options.type), options_(std::move(options)) {
+      : Resource(std::move(kind), options.type),
+        options_(std::move(options)),
+        max_bytes_(static_cast<std::size_t>(get<std::int64_t>(options_.parameters, "max_bytes"))) {
     offer(read_);
     offer(write_);
   }
@@ -39,8 +42,8 @@ class SerializedResource : public Resource {
   std::string why_refused(std::span<const std::byte> message) const override {
     const std::string found = "it has " + std::to_string(message.size()) + " bytes";
     if (message.size() < kCdrHeader.size()) return found + ", which are no message";
-    if (message.size() > options_.max_bytes)
-      return found + ", more than the " + std::to_string(options_.max_bytes) + " declared";
+    if (message.size() > max_bytes_)
+      return found + ", more than the " + std::to_string(max_bytes_) + " declared";
     return "the " + kind() + " was full";
   }
 
@@ -49,12 +52,12 @@ class SerializedResource : public Resource {
   virtual bool put_in(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT = 0;
 
   DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) {
-    message.reserve(options_.max_bytes);  // not under the lock
+    message.reserve(max_bytes_);  // not under the lock
     const std::lock_guard lock(mutex_);
     return take_out(message, time_ns, seen);
   }
   bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
-    if (message.size() > options_.max_bytes) return false;
+    if (message.size() > max_bytes_) return false;
     {
       const std::lock_guard lock(mutex_);
       if (!put_in(message, time_ns)) return false;
@@ -63,7 +66,7 @@ class SerializedResource : public Resource {
     return true;
   }
   TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
-    if (message.size() > options_.max_bytes) return TryWrite::done;
+    if (message.size() > max_bytes_) return TryWrite::done;
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
       const std::lock_guard lock(mutex_, std::adopt_lock);
@@ -74,7 +77,7 @@ class SerializedResource : public Resource {
   }
   Place place() const {
     Place made;
-    made.message.reserve(options_.max_bytes);
+    made.message.reserve(max_bytes_);
     return made;
   }
   const SerializedOptions& options() const noexcept { return options_; }
@@ -104,7 +107,8 @@ class SerializedResource : public Resource {
     SerializedResource& owner_;
   };
 
-  SerializedOptions options_;
+  const SerializedOptions options_;
+  const std::size_t max_bytes_;  // of one message
   PiMutex mutex_;
   Read read_{*this};
   Write write_{*this};
@@ -118,7 +122,7 @@ class SerializedResource : public Resource {
 class SerializedData final : public SerializedResource {
  public:
   explicit SerializedData(SerializedOptions options)
-      : SerializedResource("shared_data", std::move(options)), place_(place()) {}
+      : SerializedResource(SharedDataKind::describe().name, std::move(options)), place_(place()) {}
 
   bool peek_sample(Message& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
     sequence = 0;
@@ -152,8 +156,11 @@ class SerializedData final : public SerializedResource {
 /// | places_, first_, size_ | read, write services | mutex_ |
 class SerializedRing final : public SerializedResource {
  public:
-  explicit SerializedRing(SerializedOptions options) : SerializedResource("ring_buffer", std::move(options)) {
-    for (std::size_t i = 0; i < this->options().capacity; ++i) places_.push_back(place());
+  explicit SerializedRing(SerializedOptions options)
+      : SerializedResource(RingBufferKind::describe().name, std::move(options)),
+        overwrites_(get<bool>(this->options().parameters, "overwrite")) {
+    const auto capacity = get<std::int64_t>(this->options().parameters, "capacity");
+    for (std::int64_t i = 0; i < capacity; ++i) places_.push_back(place());
   }
 
  protected:
@@ -171,7 +178,7 @@ class SerializedRing final : public SerializedResource {
   }
   bool put_in(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
     if (size_ == places_.size()) {
-      if (!options().overwrite) return false;
+      if (!overwrites_) return false;
       drop_oldest();
     }
     places_[(first_ + size_) % places_.size()].set(message, time_ns);
@@ -185,31 +192,47 @@ class SerializedRing final : public SerializedResource {
     --size_;
   }
 
+  const bool overwrites_;
   std::vector<Place> places_;
   std::size_t first_{0};
   std::size_t size_{0};
 };
 
+template <typename Made>
+std::unique_ptr<Resource> make_serialized(SerializedOptions options) {
+  return std::make_unique<Made>(std::move(options));
+}
+
+using SerializedFactory = std::unique_ptr<Resource> (*)(SerializedOptions options);
+/// The given kinds that hold serialized messages too: those with the parameter max_bytes.
+const std::map<std::string, SerializedFactory>& serialized_kinds() {
+  static const std::map<std::string, SerializedFactory> kinds{
+      {SharedDataKind::describe().name, make_serialized<SerializedData>},
+      {RingBufferKind::describe().name, make_serialized<SerializedRing>}};
+  return kinds;
+}
+
 }  // namespace
 
 std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, SerializedOptions options) {
-  if (options.max_bytes < options.zero.size()) {
+  const auto found = serialized_kinds().find(kind);
+  if (found == serialized_kinds().end()) {
+    std::vector<std::string> kinds;
+    for (const auto& [name, factory] : serialized_kinds()) kinds.push_back(name);
+    throw Error(ErrorCode::unknown_type, "the data type is not registered",
+                {.element = "type " + options.type,
+                 .expected = "a type that a plug-in library registers, for a resource of kind " + kind,
+                 .found = "a message that is only known to Python",
+                 .remedy = "load a library that registers it, or use one of " + join(kinds)});
+  }
+  const auto max_bytes = static_cast<std::size_t>(get<std::int64_t>(options.parameters, "max_bytes"));
+  if (max_bytes < options.zero.size()) {
     throw Error(ErrorCode::invalid_argument, "the resource has no room for a message of its type",
                 {.element = "max_bytes",
                  .expected = "at least " + std::to_string(options.zero.size()),
-                 .found = std::to_string(options.max_bytes)});
+                 .found = std::to_string(max_bytes)});
   }
-  if (kind == "shared_data") return std::make_unique<SerializedData>(std::move(options));
-  if (kind == "ring_buffer" && options.capacity == 0) {
-    throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
-                {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add a capacity"});
-  }
-  if (kind == "ring_buffer") return std::make_unique<SerializedRing>(std::move(options));
-  throw Error(ErrorCode::unknown_type, "the data type is not registered",
-              {.element = "type " + options.type,
-               .expected = "a type that a plug-in library registers, for a resource of kind " + kind,
-               .found = "a message that is only known to Python",
-               .remedy = "load a library that registers it, or use shared_data or ring_buffer"});
+  return found->second(std::move(options));
 }
 
 }  // namespace mauve::bindings

@@ -120,19 +120,13 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
       .def(
           "add_resource",
           [](Self self, const std::string& name, const std::string& kind, const std::string& type,
-             std::size_t capacity, bool overwrite, std::uint32_t max_readers, time_ns_t timeout_ns,
-             const std::string& topic) -> Self {
+             const std::string& topic, const py::kwargs& keywords) -> Self {
             const TopicBinding binding = topic_binding(topic);
-            const ResourceParameters parameters{.capacity = capacity,
-                                                .overwrite = overwrite,
-                                                .max_readers = max_readers,
-                                                .timeout_ns = timeout_ns};
+            const ResourceParameters parameters = parameters_of(keywords);
             return self.add(
                 [=](Steps steps, Registry) { steps.add_resource(name, kind, type, parameters, binding); });
           },
-          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("capacity") = 0,
-          py::arg("overwrite") = false, py::arg("max_readers") = kDefaultMaxReaders,
-          py::arg("timeout_ns") = kDefaultCallTimeout, py::arg("topic") = "")
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "")
       .def(
           "remove_resource",
           [](Self self, const std::string& name) -> Self {

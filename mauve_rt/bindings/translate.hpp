@@ -52,7 +52,8 @@ struct PartFactory {
 std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const PluginRegistry& registry);
 std::unique_ptr<CoreBase> make_python_core(const PartFactory& factory);
 std::unique_ptr<FsmBase> make_python_fsm(const PartFactory& factory);
-std::unique_ptr<Resource> make_python_resource(const PartFactory& factory);
+std::unique_ptr<Resource> make_python_resource(const PartFactory& factory,
+                                               const ResourceParameters& parameters = {});
 
 // A part as Python names it: a registered name, or a class. Under the interpreter's lock.
 
@@ -61,6 +62,8 @@ std::unique_ptr<CoreBase> make_core(const py::object& part, const PluginRegistry
 std::unique_ptr<FsmBase> make_fsm(const py::object& part, const PluginRegistry& registry);
 std::unique_ptr<Resource> make_resource(const py::object& part, const PluginRegistry& registry);
 
+/// What a resource is told by keyword. Throws a TypeError of Python.
+ResourceParameters parameters_of(const py::dict& keywords);
 /// A property's value as Python has it.
 py::object to_python(const PropertyValue& value);
 

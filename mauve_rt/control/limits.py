@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.control.requests import Code, RefusalError, Request
+from mauve_rt.model.resource_kinds import given_kinds
 from mauve_rt.model.schema import ComponentModel, ResourceModel
 
 _TRACE_RECORD_BYTES = 48
 _USUAL_TRACE_RECORDS = 2048
-_CELLS = 3  # values that a shared_data or latest_value holds, beside one for each reader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,14 +63,10 @@ def bytes_of_component(component: ComponentModel) -> int:
 
 def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
     """What the values of a resource take, at least; the resources of plug-ins count for nothing."""
-    value = registry.value_bytes(resource.type)
-    depth = (resource.topic.qos.depth or 0) if resource.topic is not None else 0
-    match resource.kind:
-        case "ring_buffer":
-            return (value or resource.max_bytes) * ((resource.capacity or 0) + depth)
-        case "shared_data":
-            return (value or resource.max_bytes) * (_CELLS + depth)
-        case "latest_value":
-            return value * (_CELLS + resource.max_readers + depth)
-        case _:
-            return 0
+    kind = given_kinds().get(resource.kind)
+    if kind is None:
+        return 0
+    told = {each.name: resource.parameters.get(each.name, each.initial) for each in kind.parameters}
+    values = kind.values + sum(int(told[each.name]) for each in kind.parameters if each.counts_values)
+    depth = (resource.topic.qos.depth or 0) if resource.topic is not None and values else 0
+    return (registry.value_bytes(resource.type) or int(told.get("max_bytes", 0))) * (values + depth)

@@ -6,17 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.schema import (
-    EVENT_TYPES,
-    GIVEN_RESOURCES,
-    ComponentModel,
-    FileModel,
-    PropertyValue,
-    ResourceModel,
-)
+from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
+from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
 from mauve_rt.model.schema_errors import owner, read_content
 from mauve_rt.model.substitution import substituted_property
-from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.words import did_you_mean, listed
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 
@@ -131,7 +125,7 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
         *_override_problems(model, overrides or Overrides()),
         *element_problems(model),
         *_connection_problems(model),
-        *_latest_value_problems(model),
+        *_port_count_problems(model),
     ]
     if problems:
         raise ArchitectureFileError(file.path, problems)
@@ -190,51 +184,43 @@ def _cpu_problems(
 def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
     for name, resource in model.resources.items():
         location = ("resources", name)
-        if resource.kind == "ring_buffer" and resource.capacity is None:
-            what = f"resource '{name}' has no capacity"
-            yield model.problem(location, what, expected="capacity: how many elements the ring_buffer holds")
-        if resource.kind == "event" and resource.type not in ("", *EVENT_TYPES):
-            what = f"resource '{name}' of kind event cannot be said by that message"
-            expected = f"{', '.join(EVENT_TYPES)}, or none, which is the last"
+        kind = given_kinds().get(resource.kind)
+        if kind is not None and kind.messages and resource.type not in ("", *kind.messages):
+            what = f"resource '{name}' of kind {resource.kind} cannot be said by that message"
+            expected = f"{', '.join(kind.messages)}, or none, which is the last"
             yield model.problem((*location, "type"), what, expected=expected, found=resource.type)
-        if resource.kind in GIVEN_RESOURCES and resource.kind != "event" and not resource.type:
-            example = "std_srvs/srv/SetBool" if resource.kind == "client" else "geometry_msgs/msg/Point"
+        if kind is not None and kind.type_kind and not resource.type:
+            example = "std_srvs/srv/SetBool" if kind.type_kind == "call_type" else "geometry_msgs/msg/Point"
             yield model.problem(location, f"resource '{name}' has no type", expected=f"e.g. {example}")
         yield from _service_problems(model, name)
-        for key, kind in (
-            ("capacity", "ring_buffer"),
-            ("overwrite", "ring_buffer"),
-            ("max_readers", "latest_value"),
-        ):
-            if resource.kind != kind and key in resource.given:
-                what = f"resource '{name}' of kind {resource.kind} has no {key}"
-                yield model.key_problem((*location, key), what, remedy=f"only a {kind} has one")
 
 
 def _service_problems(model: ArchitectureModel, name: str) -> Iterator[Problem]:
     """A client calls a ROS service; any other resource may offer a call of its own as one."""
     resource, location = model.resources[name], ("resources", name)
-    service, is_client = resource.service, resource.kind == "client"
+    service, kind = resource.service, given_kinds().get(resource.kind)
+    is_client = kind is not None and kind.type_kind == "call_type"
     if is_client and resource.topic is not None:
-        what = f"resource '{name}' of kind client is bound to a topic"
-        yield model.key_problem((*location, "topic"), what, remedy="a client calls a service")
+        what = f"resource '{name}' of kind {resource.kind} is bound to a topic"
+        yield model.key_problem((*location, "topic"), what, remedy=f"a {resource.kind} calls a service")
     if service is None:
         if is_client:
-            what = f"resource '{name}' of kind client calls no service"
+            what = f"resource '{name}' of kind {resource.kind} calls no service"
             yield model.problem(location, what, expected="service: {name: ...}")
         return
     at = (*location, "service")
     if is_client and service.offers is not None:
-        what = f"resource '{name}' of kind client cannot offer a service"
+        what = f"resource '{name}' of kind {resource.kind} cannot offer a service"
         yield model.key_problem((*at, "offers"), what, remedy="leave offers out; it calls the service")
     if not is_client and service.offers is None:
         what = f"resource '{name}' does not say which of its calls the ROS service is"
         yield model.problem(
             at, what, expected="offers: the name of a call", remedy="or kind: client, to call it"
         )
-    if not is_client and "timeout_ms" in service.given:
+    if "timeout_ms" in service.given and not (kind is not None and has_key(kind, "service.timeout_ms")):
         what = f"resource '{name}' of kind {resource.kind} has no timeout_ms"
-        yield model.key_problem((*at, "timeout_ms"), what, remedy="only a client has one")
+        remedy = f"only a {listed(given_kinds_with('service.timeout_ms'))} has one"
+        yield model.key_problem((*at, "timeout_ms"), what, remedy=remedy)
 
 
 def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
@@ -258,29 +244,32 @@ def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
         first.setdefault(port, line)
 
 
-def _latest_value_problems(model: ArchitectureModel) -> Iterator[Problem]:
-    """A latest_value has one writer, a port or an incoming topic, and as many readers as it says."""
+def _port_count_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    """Some kinds have one writer, a port or an incoming topic, or as many readers as a parameter says."""
     for name, resource in model.resources.items():
-        if resource.kind != "latest_value":
+        kind = given_kinds().get(resource.kind)
+        if kind is None:
             continue
         linked = [connection for connection in model.connections if connection.resource == name]
         writes = [connection.location for connection in linked if connection.service == "write"]
         if resource.topic is not None and resource.topic.direction == "subscribe":
             writes.insert(0, ("resources", name, "topic"))
-        for location in writes[1:]:
+        for location in writes[1:] if kind.has_one_writer else ():
             yield model.problem(
                 (*location, 1),
-                f"a second writer of resource '{name}' of kind latest_value",
+                f"a second writer of resource '{name}' of kind {kind.name}",
                 remedy=f"it has one; see line {model.file.position(writes[0])[0]}, or use shared_data",
                 code="invalid_argument",
             )
         reads = [connection.location for connection in linked if connection.service == "read"]
-        for location in reads[resource.max_readers :]:
-            yield model.problem(
-                (*location, 1),
-                f"too many readers of resource '{name}' of kind latest_value",
-                expected=f"at most {resource.max_readers}",
-                found=str(len(reads)),
-                remedy="raise its max_readers",
-                code="invalid_argument",
-            )
+        for limit in (parameter for parameter in kind.parameters if parameter.limits_readers):
+            most = int(resource.parameters.get(limit.name, limit.initial))
+            for location in reads[most:]:
+                yield model.problem(
+                    (*location, 1),
+                    f"too many readers of resource '{name}' of kind {kind.name}",
+                    expected=f"at most {most}",
+                    found=str(len(reads)),
+                    remedy=f"raise its {limit.name}",
+                    code="invalid_argument",
+                )

@@ -11,10 +11,13 @@ from mauve_rt._kernel import (
 )
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, PortTypeError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
+from mauve_rt.model.kinds import Faults
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.resource_kinds import given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
-from mauve_rt.model.schema import GIVEN_RESOURCES, PropertyValue
+from mauve_rt.model.schema import PropertyValue, ResourceModel
+from mauve_rt.model.schema_errors import fault_problem
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.model.yaml_file import Location
 from mauve_rt.parts.message_types import message_class, service_class
@@ -133,12 +136,13 @@ class Checks:
         resource = self._model.resources[name]
         place: Location = ("resources", name)
         try:
-            if resource.kind not in GIVEN_RESOURCES:
-                missing = [*self._plugin("resource", resource.kind, (*place, "kind"))]
-                yield from missing
-                if missing:
+            if resource.kind not in given_kinds():
+                wrong = [*self._plugin("resource", resource.kind, (*place, "kind"))]
+                wrong = wrong or self._parameters(resource, place)
+                yield from wrong
+                if wrong:
                     return
-            type_kind = "call_type" if resource.kind == "client" else "type"
+            type_kind = self._loader.registry.resource_kind(resource.kind).type_kind or "type"
             if resource.type:
                 self._loader.require_type(resource.type, type_kind)
             self._resources[name] = describe_resource(resource, self._loader.registry)
@@ -159,6 +163,13 @@ class Checks:
         at = (*place, "type" if resource.type else "kind")
         yield from self._structs(self._resources[name].services, at)
         yield from self._service(name)
+
+    def _parameters(self, resource: ResourceModel, place: Location) -> list[Problem]:
+        """What is wrong with the parameters of a plug-in's kind; of a given one's the file told."""
+        faults: Faults = []
+        kind, keys = self._loader.registry.resource_kind(resource.kind), tuple(resource.settings)
+        read_parameters(kind, resource.parameters, place, faults, others=keys)
+        return [fault_problem(self._model.file, fault) for fault in faults]
 
     def _structs(
         self, carriers: Iterable[PortDescription | ServiceDescription], place: Location

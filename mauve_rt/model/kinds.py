@@ -24,10 +24,12 @@ class Fault:
         self, place: Location, what: str, *, limit: Any = None, found: Any = None, known: tuple[str, ...] = ()
     ) -> None:
         self.place = place
-        self.what = what  # "unknown", "missing" (a key); "name" (a bad one); else what the value should be
+        # "unknown", "missing" (a key); "name" (a bad one); of a resource "foreign" (a key that its kind,
+        # `limit`, does not have) and "lacks" (one that it needs); else what the value should be
+        self.what = what
         self.limit = limit  # of "more", "least", "most", "few", "many"; text of "form", "rule" and "choice"
         self.found = found
-        self.known = known  # keys, where one is unknown
+        self.known = known  # keys, where one is unknown; kinds that have a foreign one
         self.hint = ""
 
 

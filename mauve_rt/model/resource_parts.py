@@ -3,30 +3,22 @@
 from typing import Any
 
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
+from mauve_rt.model.resource_kinds import has_key
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.parts.message_types import message_class
 
 
 def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str, Any]:
     """How a resource is added: serialized where its type is a message that no library registered."""
-    from mauve_rt.parts.resources import RingBuffer, SharedData  # noqa: PLC0415 - they need the model themselves
+    from mauve_rt.parts.resources import DataOfKind  # noqa: PLC0415 - it needs the model itself
 
-    kind, name, capacity = resource.kind, resource.type, resource.capacity or 0
-    if kind in ("shared_data", "ring_buffer") and name not in registry.names("type") and message_class(name):
-        if kind == "shared_data":
-            return {"resource": SharedData(name, max_bytes=resource.max_bytes)}
-        ring: RingBuffer[Any] = RingBuffer(
-            name, capacity=capacity, overwrite=resource.overwrite, max_bytes=resource.max_bytes
-        )
-        return {"resource": ring}
-    return {
-        "kind": kind,
-        "type": name,
-        "capacity": capacity,
-        "overwrite": resource.overwrite,
-        "max_readers": resource.max_readers,
-        **({"timeout_ns": round(resource.service.timeout_ms * 1e6)} if resource.service else {}),
-    }
+    kind, name, parameters = resource.kind, resource.type, {**resource.parameters}
+    if resource.service is not None and resource.service.timeout_ms is not None:
+        parameters["timeout_ns"] = round(resource.service.timeout_ms * 1e6)
+    can_be_serialized = has_key(registry.resource_kind(kind), "max_bytes")
+    if can_be_serialized and name not in registry.names("type") and message_class(name):
+        return {"resource": DataOfKind(kind, name, **parameters)}
+    return {"kind": kind, "type": name, **parameters}
 
 
 def describe_resource(resource: ResourceModel, registry: PluginRegistry) -> ResourceDescription:

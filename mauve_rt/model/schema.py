@@ -39,6 +39,7 @@ not wait for other components, or for another CPU to wake up, say where it runs 
 Nothing here looks at plug-ins, so a file can be read where none is installed.
 """
 
+from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
@@ -54,20 +55,14 @@ from mauve_rt.model.kinds import (
     Text,
     Whole,
 )
+from mauve_rt.model.resource_kinds import given_kinds, read_parameters
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.yaml_file import Location
 
 PropertyValue = bool | int | float | str
 
 QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
-GIVEN_RESOURCES = ("shared_data", "ring_buffer", "latest_value", "event", "client")
-# What an event's topic carries: a message a raise, true a raise, or how often it was raised (the default).
-EVENT_TYPES = ("std_msgs/msg/Empty", "std_msgs/msg/Bool", "std_msgs/msg/UInt64")
-MAX_CAPACITY = 1_000_000
-DEFAULT_READERS = 14
-DEFAULT_MESSAGE_BYTES = 65_536
-MAX_MESSAGE_BYTES = 2**28
-MAX_READERS = 1000
+MAX_DEPTH = 1_000_000  # of the queue of a topic
 _LONGEST_MS = 1e9
 
 _PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
@@ -89,8 +84,8 @@ _NAMESPACE = Text(
 )
 _ENDPOINT = Text(r"\w+\.\w+", "name.port or name.service")
 _RESOURCE_KIND = Text(
-    rf"{'|'.join(GIVEN_RESOURCES)}|{_PLUGIN}",
-    f"{', '.join(GIVEN_RESOURCES)} or the name of a plug-in, package/Class",
+    rf"{'|'.join(given_kinds())}|{_PLUGIN}",
+    f"{', '.join(given_kinds())} or the name of a plug-in, package/Class",
 )
 _DURATION_MS = Real(least=0, most=_LONGEST_MS)
 
@@ -170,7 +165,7 @@ class QosModel(Section):
     durability: Literal["volatile", "transient_local"] | None = setting(
         Choice("volatile", "transient_local"), default=None
     )
-    depth: int | None = setting(Whole(1, MAX_CAPACITY), default=None)
+    depth: int | None = setting(Whole(1, MAX_DEPTH), default=None)
     deadline_ms: float = setting(_DURATION_MS, default=0.0)
     lifespan_ms: float = setting(_DURATION_MS, default=0.0)
     liveliness: Literal["automatic", "manual_by_topic"] = setting(
@@ -207,30 +202,43 @@ class ServiceModel(Section):
     offers: str | None = setting(
         IDENTIFIER, default=None
     )  # the resource's call; absent: the resource is a client
-    timeout_ms: float = setting(
-        Real(above=0, most=_LONGEST_MS), default=100.0
-    )  # of a client: no call blocks longer
+    # Of a client: no call blocks longer.
+    timeout_ms: float | None = setting(Real(above=0, most=_LONGEST_MS), default=None)
 
 
 class ResourceModel(Section):
-    """Data that components share."""
+    """Data that components share. What else it is told is of its kind, which says what that may be."""
 
     kind: str = setting(_RESOURCE_KIND)
     type: str = setting(Text(), default="")
-    capacity: int | None = setting(Whole(1, MAX_CAPACITY), default=None)  # elements; ring_buffer only
-    # A full ring_buffer drops its oldest element rather than the new one.
-    overwrite: bool = setting(Flag(), default=False)
     topic: TopicModel | None = setting(Part(TopicModel), default=None)
     service: ServiceModel | None = setting(Part(ServiceModel), default=None)
-    # Ports; latest_value only.
-    max_readers: int = setting(Whole(1, MAX_READERS), default=DEFAULT_READERS)
-    # Of one message, where no plug-in registered its type: what is larger is refused and counted.
-    max_bytes: int = setting(Whole(1, MAX_MESSAGE_BYTES), default=DEFAULT_MESSAGE_BYTES)
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Those of its kind that it is told; of a plug-in's kind as the file has them, whatever they are."""
+        told: Mapping[str, Any] = vars(self)["_parameters"]
+        return told
 
     @property
     def topic_type(self) -> str:
         """The message type of its topic."""
-        return self.type or (EVENT_TYPES[-1] if self.kind == "event" else "")
+        kind = given_kinds().get(self.kind)
+        return self.type or (kind.messages[-1] if kind is not None and kind.messages else "")
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, ResourceModel) and super().__eq__(other) and self.parameters == other.parameters
+        )
+
+    __hash__ = None
+
+    def _take(self, values: Mapping[str, Any], place: Location, faults: Faults) -> None:
+        super()._take({key: value for key, value in values.items() if key in self.settings}, place, faults)
+        told = {key: value for key, value in values.items() if key not in self.settings}
+        if (kind := given_kinds().get(str(values.get("kind")))) is not None:
+            told = read_parameters(kind, told, place, faults, others=tuple(self.settings))
+        vars(self)["_parameters"] = told
 
 
 class ComponentModel(Section):

@@ -40,7 +40,7 @@ def read_content(model: type[_Read], file: YamlFile) -> _Read:
         raise file.error("not an architecture file", expected=f"the keys {keys}", found=found)
     content = model.read(file.data, (), faults)
     if faults:
-        raise ArchitectureFileError(file.path, [_problem(file, fault) for fault in faults])
+        raise ArchitectureFileError(file.path, [fault_problem(file, fault) for fault in faults])
     return content
 
 
@@ -50,7 +50,8 @@ def expected(fault: Fault) -> str:
     return _EXPECTED.get(fault.what, "{limit}").format(limit=limit)
 
 
-def _problem(file: YamlFile, fault: Fault) -> Problem:
+def fault_problem(file: YamlFile, fault: Fault) -> Problem:
+    """One fault, in words."""
     location = fault.place
     component, element = owner(location)
     facts = {"component": component, "element": element}
@@ -59,6 +60,13 @@ def _problem(file: YamlFile, fault: Fault) -> Problem:
     if fault.what == "unknown":
         remedy = did_you_mean(name, fault.known)
         return file.key_problem(location, f"unknown key '{name}'{within}", remedy=remedy, **facts)
+    if fault.what == "foreign":
+        what = f"{_subject(location[:-1])} of kind {fault.limit} has no {name}"
+        remedy = f"only a {listed(fault.known)} has one"
+        return file.key_problem(location, what, remedy=remedy, **facts)
+    if fault.what == "lacks":
+        what = f"{_subject(location)} has no {fault.limit.partition(':')[0]}"
+        return file.problem(location, what, expected=fault.limit, **facts)
     if fault.what == "missing":
         what = f"{_subject(location)} has no '{fault.limit}'"
         return file.problem(location, what, remedy="add it", **facts)

@@ -2,25 +2,29 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, Self, TypeVar, overload
 
-from mauve_rt._kernel import DEFAULT_MAX_READERS, DataResource, PartFactory
+from mauve_rt._kernel import DataResource, PartFactory, ResourceParameter
 from mauve_rt.parts import messages
 from mauve_rt.parts.part import Configurable, implementation_name
 
 __all__ = [
     "AnyResource",
+    "DataOfKind",
     "EventCounter",
     "LatestValue",
+    "Parameter",
     "Resource",
     "RingBuffer",
     "SharedData",
+    "parameter",
     "service",
     "service_type",
 ]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
+V = TypeVar("V", bound=bool | int | float | str)
 _MARK = "_mauve_service"
 
 
@@ -65,6 +69,57 @@ def service_type(method: Callable[..., Any]) -> str:
     return str(found)
 
 
+class Parameter(Generic[V]):
+    """A parameter of a resource written in Python, declared by `parameter`; of an object its value."""
+
+    def __init__(self, initial: V, **facts: Any) -> None:
+        self.initial = initial
+        self._facts = facts
+        self._name = ""
+
+    def __set_name__(self, _owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, resource: None, _owner: type) -> Self: ...
+    @overload
+    def __get__(self, resource: object, _owner: type) -> V: ...
+    def __get__(self, resource: object | None, _owner: type) -> Self | V:
+        if resource is None:
+            return self
+        value: V = vars(resource).get(self._name, self.initial)
+        return value
+
+    def __set__(self, resource: object, value: V) -> None:
+        vars(resource)[self._name] = value
+
+    def described(self) -> ResourceParameter:
+        """As the kernel takes it."""
+        return ResourceParameter(self._name, self.initial, **self._facts)
+
+
+def parameter(
+    initial: V,
+    *,
+    unit: str = "",
+    description: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    required: bool = False,
+) -> Parameter[V]:
+    """A parameter of a resource written in Python: bool, int, float or str, by its initial value.
+
+        class Window(Resource):
+            length = parameter(10, unit="samples", description="how far it looks back", minimum=1)
+
+    Architecture files have it as a key of the resource, `add_resource` as a keyword. It is set once, before
+    configure().
+    """
+    return Parameter(
+        initial, unit=unit, description=description, minimum=minimum, maximum=maximum, required=required
+    )
+
+
 class AnyResource(ABC):
     """What `Architecture.add_resource` takes."""
 
@@ -83,6 +138,11 @@ class Resource(Configurable, AnyResource):
     def _instance_part(self) -> PartFactory:
         return PartFactory("resource", implementation_name(type(self)), lambda: self)
 
+    @classmethod
+    def _parameters(cls) -> list[ResourceParameter]:
+        found = {name: each for base in reversed(cls.__mro__) for name, each in vars(base).items()}
+        return [each.described() for each in found.values() if isinstance(each, Parameter)]
+
     def _services(self) -> list[tuple[str, str]]:
         """(name, type) of each service; a method that overrides one stays it."""
         found: dict[str, str] = {}
@@ -93,50 +153,32 @@ class Resource(Configurable, AnyResource):
         return list(found.items())
 
 
-class _Data(AnyResource, Generic[T]):
-    kind = ""
+class DataOfKind(AnyResource, Generic[T]):
+    """A resource of a given kind by its name: what it may be told is the kind's own."""
 
-    def __init__(
-        self,
-        type: type[T] | str,  # noqa: A002 - the word of the field
-        *,
-        capacity: int = 0,
-        overwrite: bool = False,
-        max_bytes: int = 4096,
-        max_readers: int = DEFAULT_MAX_READERS,
-    ) -> None:
+    def __init__(self, kind: str, type: type[T] | str, **parameters: bool | float | str) -> None:  # noqa: A002
         name = messages.type_name(type)
         self._resource = DataResource(
-            kind=self.kind,
-            type=name,
-            capacity=capacity,
-            overwrite=overwrite,
-            max_bytes=max_bytes,
-            max_readers=max_readers,
-            zero=messages.zero(name),
+            kind=kind, type=name, parameters=parameters, zero=messages.zero(name) if name else None
         )
 
     def _instance_part(self) -> DataResource:
         return self._resource
 
 
-class SharedData(_Data[T]):
+class SharedData(DataOfKind[T]):
     """The newest value; services `read` and `write`.
 
-    A message type that no loaded library registered is held serialized, up to `max_bytes`: then components
-    in Python and topics share it, and ports of components in C++ are refused.
+    A message type that no loaded library registered is held serialized, up to `max_bytes` (65,536): then
+    components in Python and topics share it, and ports of components in C++ are refused.
     """
 
-    kind = "shared_data"
-
-    def __init__(self, type: type[T] | str, *, max_bytes: int = 4096) -> None:  # noqa: A002
-        super().__init__(type, max_bytes=max_bytes)
+    def __init__(self, type: type[T] | str, *, max_bytes: int | None = None) -> None:  # noqa: A002
+        super().__init__("shared_data", type, **_told(max_bytes=max_bytes))
 
 
-class RingBuffer(_Data[T]):
+class RingBuffer(DataOfKind[T]):
     """A queue of `capacity` elements; a read removes, so each element goes to one reader."""
-
-    kind = "ring_buffer"
 
     def __init__(
         self,
@@ -144,24 +186,25 @@ class RingBuffer(_Data[T]):
         capacity: int,
         *,
         overwrite: bool = False,
-        max_bytes: int = 4096,
+        max_bytes: int | None = None,
     ) -> None:
-        super().__init__(type, capacity=capacity, overwrite=overwrite, max_bytes=max_bytes)
+        told = _told(capacity=capacity, overwrite=overwrite, max_bytes=max_bytes)
+        super().__init__("ring_buffer", type, **told)
 
 
-class LatestValue(_Data[T]):
+class LatestValue(DataOfKind[T]):
     """The newest value of one writer, read without a lock; for types that a loaded library registered."""
 
-    kind = "latest_value"
-
-    def __init__(self, type: type[T] | str, *, max_readers: int = DEFAULT_MAX_READERS) -> None:  # noqa: A002
-        super().__init__(type, max_readers=max_readers)
+    def __init__(self, type: type[T] | str, *, max_readers: int | None = None) -> None:  # noqa: A002
+        super().__init__("latest_value", type, **_told(max_readers=max_readers))
 
 
-class EventCounter(_Data[int]):
+class EventCounter(DataOfKind[int]):
     """Counts events that event ports raise."""
 
-    kind = "event"
-
     def __init__(self) -> None:
-        super().__init__("")
+        super().__init__("event", "")
+
+
+def _told(**parameters: int | None) -> dict[str, int]:
+    return {name: value for name, value in parameters.items() if value is not None}

@@ -78,7 +78,7 @@ class SimulatedExecutor:
     def _bind(self, resource: str, described: ResourceModel, bound: TopicModel) -> None:
         topic = resolved(bound.name, self.namespace)
         if bound.direction == "publish":
-            qos = qos_profile(bound.qos, capacity=described.capacity or 0)
+            qos = qos_profile(bound.qos, capacity=described.parameters.get("capacity", 0))
             self._outgoing[resource] = _Outgoing(topic, described.topic_type, qos)
             return
 

@@ -465,6 +465,45 @@ class Lamp final : public mauve::Resource {
   Look look{*this};
 };
 
+/// What is read is what it was told.
+class Window final : public mauve::Resource {
+ public:
+  static std::vector<mauve::ResourceParameter> parameters() {
+    return {{.name = "length_s",
+             .initial = 0.5,
+             .description = "how far it looks back",
+             .unit = "s",
+             .minimum = 0.25,
+             .maximum = 60.0},
+            {.name = "label", .initial = "", .description = "what it is for", .is_required = true}};
+  }
+
+  explicit Window(const mauve::ResourceParameters& given)
+      : Resource("executor_tests/Window", ""), length_s_(mauve::get<double>(given, "length_s")) {
+    offer(read);
+  }
+
+ private:
+  class Read final : public mauve::ReadService<Number> {
+   public:
+    explicit Read(Window& owner) : ReadService("read"), owner_(owner) {}
+    mauve::DataStatus read(Number& value, mauve::time_ns_t& time_ns,
+                           mauve::ReaderState& reader) noexcept override {
+      value.data = owner_.length_s_;
+      time_ns = 1;
+      return reader.look(1);
+    }
+
+   private:
+    Window& owner_;
+  };
+
+  const double length_s_;
+
+ public:
+  Read read{*this};
+};
+
 }  // namespace executor_tests
 
 MAUVE_PLUGINS(registry) {
@@ -501,6 +540,7 @@ MAUVE_PLUGINS(registry) {
   registry.core<Stopper>("executor_tests/Stopper", stopper);
   registry.fsm<StopperFsm>("executor_tests/StopperFsm", stopper);
   registry.resource<Lamp>("executor_tests/Lamp");
+  registry.resource<Window>("executor_tests/Window");
   const std::string caller = "executor_tests/CallerShell";
   registry.shell<CallerShell>(caller);
   registry.core<Caller>("executor_tests/Caller", caller);

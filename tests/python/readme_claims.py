@@ -396,6 +396,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
         "python/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
     ),
+    "a file sets and checks it as a `ring_buffer`'s `capacity`": (
+        "python/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
+        "python/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
+    ),
     "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
         "ros/test_bound_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
     ),

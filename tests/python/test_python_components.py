@@ -167,7 +167,7 @@ def test_unregistered_messages_have_a_face_to_topics(built: Stage):
     data, _, _ = deployer.read_resource("pose")
     assert deserialize_message(data, PoseStamped) == PoseStamped()
     long = PoseStamped()
-    long.header.frame_id = "x" * 5000
+    long.header.frame_id = "x" * 70_000
     assert not deployer.write_resource("pose", serialize_message(long)), "longer than its max_bytes"
 
 

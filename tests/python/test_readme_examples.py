@@ -17,7 +17,7 @@ from mauve_examples.figures import page
 from mauve_rt import _kernel
 from mauve_rt.cli.main import build_parser
 from mauve_rt.model import load_architecture
-from mauve_rt.model.schema import GIVEN_RESOURCES
+from mauve_rt.model.resource_kinds import given_kinds
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -95,7 +95,7 @@ def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:
 
 def test_every_kind_of_resource_is_told() -> None:
     concepts = README[README.index("**Resources** hold data") :]
-    assert [kind for kind in GIVEN_RESOURCES if f"`{kind}`" not in concepts] == []
+    assert [kind for kind in given_kinds() if f"`{kind}`" not in concepts] == []
 
 
 def test_service_calls_have_fields_of_their_services() -> None:

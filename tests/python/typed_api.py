@@ -45,6 +45,7 @@ from mauve_rt.api import (
     event_port,
     monotonic_ns,
     ms_to_ns,
+    parameter,
     property,  # noqa: A004
     read_port,
     s_to_ns,
@@ -61,8 +62,10 @@ class Pose:
 
 
 class Map(Resource):
+    size = parameter(1, unit="cells", minimum=1)
+
     def configure(self) -> bool | None:
-        self.cells = [0]
+        self.cells = [0] * self.size
         return True
 
     @service

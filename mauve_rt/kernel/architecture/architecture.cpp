@@ -188,7 +188,7 @@ void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
   if (topic != TopicBinding::none && !resource.is_serializable()) {
     throw Error(ErrorCode::invalid_argument, "the resource cannot be bound to a topic",
                 {.element = "resource " + resource.name(),
-                 .expected = "shared_data, ring_buffer, latest_value or event",
+                 .expected = "one that holds messages",
                  .found = resource.kind()});
   }
   if (topic == TopicBinding::subscribe) resource.bind_input();

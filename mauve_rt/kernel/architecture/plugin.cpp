@@ -4,7 +4,9 @@
 #include <dlfcn.h>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/data/event_counter.hpp"
+#include "mauve_rt/parts/property.hpp"
+
+#include "base/names.hpp"
 
 namespace mauve {
 
@@ -48,22 +50,48 @@ auto made(const std::string& what, Make&& make) -> decltype(make()) {
   throw failed("its factory made nothing");
 }
 
-EventMessage event_message(const std::string& type) {
-  for (const EventMessage said : {EventMessage::empty, EventMessage::truth, EventMessage::count}) {
-    if (type == type_of(said)) return said;
+/// A parameter's value in its own type. Throws Error: type_mismatch, out_of_range.
+PropertyValue checked(const ResourceParameter& parameter, const PropertyValue& value) {
+  const PropertyOptions options{
+      .unit = parameter.unit, .minimum = parameter.minimum, .maximum = parameter.maximum};
+  const auto check = [&]<typename T>(const T& initial) {
+    return Property<T>(parameter.name, initial, options).checked(value);
+  };
+  try {
+    return std::visit(check, parameter.initial);
+  } catch (const Error& error) {
+    ErrorDetail detail = error.detail();
+    detail.element = parameter.name;
+    throw Error(error.code(), error.statement(), detail);
   }
-  throw Error(
-      ErrorCode::invalid_argument, "an event cannot be said by that message",
-      {.element = "type",
-       .expected = "std_msgs/msg/Empty, std_msgs/msg/Bool, std_msgs/msg/UInt64, or none, which is the last",
-       .found = type});
+}
+
+std::vector<std::string> names_of(const std::vector<ResourceParameter>& parameters) {
+  std::vector<std::string> names;
+  for (const ResourceParameter& parameter : parameters) names.push_back(parameter.name);
+  return names;
 }
 
 }  // namespace
 
 PluginRegistry::PluginRegistry() {
-  add_resource("event", "", [](const ResourceParameters&) { return std::make_unique<EventCounter>(); });
+  const auto add = [this]<typename Given>(Given) {
+    const ResourceKind kind = Given::describe();
+    KindEntry& entry = resources_[kind.name];
+    entry.kind = kind;
+    if constexpr (requires { Given::make("", {}); }) {
+      entry.factories[""] = [](const ResourceParameters& given) { return Given::make("", given); };
+      for (const std::string& type : kind.messages)
+        entry.factories[type] = [type](const ResourceParameters& given) { return Given::make(type, given); };
+    }
+  };
+  std::apply([&](auto... kinds) { (add(kinds), ...); }, GivenResources{});
   ports_.emplace(type_name<EventCount>(), data_ports<EventCount>());
+}
+
+std::vector<ResourceKind> PluginRegistry::given_resource_kinds() {
+  return std::apply([](auto... kinds) { return std::vector{decltype(kinds)::describe()...}; },
+                    GivenResources{});
 }
 
 void PluginRegistry::load_library(const std::string& path) {
@@ -100,10 +128,16 @@ void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_n
                              std::function<std::unique_ptr<FsmBase>()> factory) {
   add_entry(fsms_, name, "fsm " + name, Entry<FsmBase>{shell_name, std::move(factory)});
 }
-void PluginRegistry::add_resource(const std::string& kind, const std::string& type, ResourceFactory factory) {
-  // Packages share data types: the first registration of one serves all.
-  if (!type.empty() && resources_.contains({kind, type})) return;
-  add_entry(resources_, std::pair(kind, type), kind + " " + type, std::move(factory));
+void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
+  const std::string name = kind.name;
+  const std::set<std::string> taken{"kind", "name", "resource", "service", "topic", "type"};
+  for (const std::string& parameter : names_of(kind.parameters)) {
+    check_name("parameter", parameter);
+    if (!taken.contains(parameter)) continue;
+    throw Error(ErrorCode::plugin, "a parameter cannot have that name",
+                {.element = "resource " + name, .expected = "none of " + join(taken), .found = parameter});
+  }
+  add_entry(resources_, name, "resource " + name, KindEntry{std::move(kind), {{"", std::move(factory)}}});
 }
 
 std::unique_ptr<Shell> PluginRegistry::make_shell(const std::string& name) const {
@@ -123,30 +157,74 @@ std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const
 }
 
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,
-                                                        const ResourceParameters& parameters) const {
-  if (const auto found = resources_.find({kind, type}); found != resources_.end())
-    return made(kind + " " + type, [&] { return found->second(parameters); });
-  if (kind == "event") return std::make_unique<EventCounter>(event_message(type));
-  if (kind == "latest_value" && resources_.contains({"shared_data", type})) {
+                                                        const ResourceParameters& given) const {
+  const ResourceKind& known = resource_kind(kind);
+  const auto& factories = resources_.at(kind).factories;
+  const auto factory = factories.find(type);
+  if (factory == factories.end()) throw_not_of_type(known, type);
+  const ResourceParameters parameters = checked_parameters(kind, given);
+  return made(kind + " " + type, [&] { return factory->second(parameters); });
+}
+
+const ResourceKind& PluginRegistry::resource_kind(const std::string& name) const {
+  if (const auto found = resources_.find(name); found != resources_.end()) return found->second.kind;
+  throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
+              {.element = "kind " + name,
+               .expected = "one of " + join(names("resource")),
+               .found = name,
+               .remedy = "check the name, and that a package registers it among its plug-ins"});
+}
+
+ResourceParameters PluginRegistry::checked_parameters(const std::string& kind,
+                                                      const ResourceParameters& given) const {
+  const auto& known = resource_kind(kind).parameters;
+  ResourceParameters all;
+  for (const ResourceParameter& parameter : known) {
+    const auto told = given.find(parameter.name);
+    if (told == given.end() && parameter.is_required) {
+      throw Error(ErrorCode::invalid_argument, "a " + kind + " needs a " + parameter.name,
+                  {.element = parameter.name,
+                   .expected = parameter.description,
+                   .found = "none",
+                   .remedy = "add " + parameter.name});
+    }
+    all.emplace(parameter.name, told == given.end() ? parameter.initial : checked(parameter, told->second));
+  }
+  for (const auto& [name, value] : given) {
+    if (all.contains(name)) continue;
+    throw Error(ErrorCode::invalid_argument, "a resource of kind " + kind + " has no such parameter",
+                {.element = name,
+                 .expected = known.empty() ? "none" : "one of " + join(names_of(known)),
+                 .found = name,
+                 .remedy = "check the name"});
+  }
+  return all;
+}
+
+void PluginRegistry::throw_not_of_type(const ResourceKind& kind, const std::string& type) const {
+  if (kind.type == TypeNeed::data && ports_.contains(type)) {
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",
                 {.element = "type " + type,
                  .expected = "a trivially copyable type",
                  .found = "one with a copy constructor of its own",
                  .remedy = "use shared_data, or bounded members in the type"});
   }
-  if (kind == "client") {
+  if (kind.type == TypeNeed::data) throw_unknown_type(type);
+  if (kind.type == TypeNeed::call) {
     throw Error(ErrorCode::unknown_type, "the type of call is not registered",
                 {.element = "type " + type,
                  .expected = "one of " + join(names("call_type")),
                  .found = type,
                  .remedy = "check the name, and that a package registers it among its plug-ins"});
   }
-  if (kind == "shared_data" || kind == "ring_buffer" || kind == "latest_value") throw_unknown_type(type);
-  throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
-              {.element = "kind " + kind,
-               .expected = "one of " + join(names("resource")),
-               .found = kind,
-               .remedy = "check the name, and that a package registers it among its plug-ins"});
+  if (!kind.messages.empty()) {
+    throw Error(
+        ErrorCode::invalid_argument, "an " + kind.name + " cannot be said by that message",
+        {.element = "type", .expected = join(kind.messages) + ", or none, which is the last", .found = type});
+  }
+  throw Error(
+      ErrorCode::unknown_resource, "the kind of resource is of no type",
+      {.element = "kind " + kind.name, .expected = "no type", .found = type, .remedy = "leave type out"});
 }
 
 std::unique_ptr<PortBase> PluginRegistry::make_port(PortKind kind, const std::string& type,
@@ -197,12 +275,13 @@ std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
   } else if (kind == "fsm") {
     add_keys(fsms_);
   } else if (kind == "resource") {
-    for (const auto& [key, factory] : resources_) found.insert(key.first);
-  } else if (kind == "type" || kind == "call_type") {
-    for (const auto& [key, factory] : resources_) {
-      if ((key.first == "client") == (kind == "call_type")) found.insert(key.second);
+    for (const auto& [name, entry] : resources_) {
+      if (!entry.factories.empty()) found.insert(name);
     }
-    found.erase("");
+  } else if (kind == "type" || kind == "call_type") {
+    for (const auto& [name, entry] : resources_) {
+      if (entry.kind.type == (kind == "type" ? TypeNeed::data : TypeNeed::call)) add_keys(entry.factories);
+    }
   } else {
     throw Error(ErrorCode::invalid_argument, "there is no such kind of plug-in",
                 {.expected = "shell, core, fsm, resource, type or call_type", .found = kind});

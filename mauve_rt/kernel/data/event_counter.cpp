@@ -98,4 +98,17 @@ bool EventCounter::write_sample(std::span<const std::byte> message, time_ns_t ti
   return true;
 }
 
+ResourceKind EventKind::describe() {
+  return {
+      .name = "event",
+      .messages = {type_of(EventMessage::empty), type_of(EventMessage::truth), type_of(EventMessage::count)}};
+}
+
+std::unique_ptr<Resource> EventKind::make(const std::string& message, const ResourceParameters&) {
+  for (const EventMessage said : {EventMessage::empty, EventMessage::truth}) {
+    if (message == type_of(said)) return std::make_unique<EventCounter>(said);
+  }
+  return std::make_unique<EventCounter>();
+}
+
 }  // namespace mauve

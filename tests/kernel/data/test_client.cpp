@@ -220,7 +220,7 @@ TEST(ClientByName, IsMadeFromARegisteredCallType) {
   PluginRegistry registry;
   registry.call_type<Increment>();
   registry.call_type<Increment>();  // by another package
-  const auto made = registry.make_resource("client", kType, {.timeout_ns = 5});
+  const auto made = registry.make_resource("client", kType, {{"timeout_ns", 5}});
   ASSERT_NE(nullptr, made->client());
   EXPECT_EQ(5, made->client()->timeout_ns());
   EXPECT_THAT(registry.names("call_type"), ::testing::ElementsAre(kType));
@@ -320,7 +320,7 @@ TEST(Transaction, AddsWhatIsCarriedOutside) {
   with.configure();
   deployed.deploy();
   Transaction add;
-  add.add_resource("calls", "client", kType, {.timeout_ns = ms_to_ns(1)})
+  add.add_resource("calls", "client", kType, {{"timeout_ns", ms_to_ns(1)}})
       .add_resource("beat", "shared_data", kNumberType, {}, TopicBinding::publish)
       .add_resource("quiet", "shared_data", kNumberType)
       .connect("c", "output", "quiet", "write");

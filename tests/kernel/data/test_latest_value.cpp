@@ -173,7 +173,7 @@ TEST(LatestValue, OfATypeThatCannotBeCopiedAsBytesIsRefused) {
             code_of([&] { registry.make_resource("latest_value", "test_msgs/msg/Owning", {}); }));
   EXPECT_EQ(ErrorCode::unknown_type, code_of([&] { registry.make_resource("latest_value", "a/msg/B", {}); }));
   registry.type<Number>();
-  const auto resource = registry.make_resource("latest_value", "std_msgs/msg/Float64", {.max_readers = 3});
+  const auto resource = registry.make_resource("latest_value", "std_msgs/msg/Float64", {{"max_readers", 3}});
   EXPECT_EQ(3U, resource->find_service("read")->max_ports());
 }
 

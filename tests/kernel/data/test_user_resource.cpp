@@ -123,5 +123,46 @@ TEST_F(Deployed, EachCallIsTracedByResourceAndService) {
   EXPECT_EQ("map.update", TraceNames::all()[begins[0].name]);
 }
 
+class Window final : public Resource {
+ public:
+  static std::vector<ResourceParameter> parameters() {
+    return {{.name = "length", .initial = std::int64_t{4}, .unit = "samples", .minimum = 1, .maximum = 9},
+            {.name = "gain", .initial = 1.0, .is_required = true}};
+  }
+  explicit Window(const ResourceParameters& given)
+      : Resource("test/Window", ""),
+        length(get<std::int64_t>(given, "length")),
+        gain(get<double>(given, "gain")) {}
+  const std::int64_t length;
+  const double gain;
+};
+
+TEST(UserResource, IsMadeOfParametersThatWereChecked) {
+  PluginRegistry registry;
+  registry.resource<Window>("test/Window");
+  const auto refusal = [&](const ResourceParameters& given) {
+    try {
+      registry.make_resource("test/Window", "", given);
+    } catch (const Error& error) {
+      return std::pair(error.code(), error.detail().element);
+    }
+    return std::pair(ErrorCode::internal, std::string());
+  };
+  const auto made = registry.make_resource("test/Window", "", {{"gain", 2}});
+  const auto& window = dynamic_cast<const Window&>(*made);
+  EXPECT_EQ(4, window.length);
+  EXPECT_EQ(2.0, window.gain);
+  EXPECT_EQ(std::pair(ErrorCode::invalid_argument, std::string("gain")), refusal({{"length", 5}}));
+  EXPECT_EQ(std::pair(ErrorCode::out_of_range, std::string("length")),
+            refusal({{"gain", 2}, {"length", 10}}));
+  EXPECT_EQ(std::pair(ErrorCode::type_mismatch, std::string("gain")), refusal({{"gain", true}}));
+  EXPECT_EQ(std::pair(ErrorCode::invalid_argument, std::string("width")),
+            refusal({{"gain", 2}, {"width", 1}}));
+  EXPECT_EQ(Window::parameters(), registry.resource_kind("test/Window").parameters);
+  EXPECT_THROW(
+      registry.add_resource({.name = "test/Bad", .parameters = {{.name = "type", .initial = false}}}, {}),
+      Error);
+}
+
 }  // namespace
 }  // namespace mauve::testing

@@ -9,21 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/data/client.hpp"
-#include "mauve_rt/data/latest_value.hpp"
+#include "mauve_rt/architecture/given_resources.hpp"
 #include "mauve_rt/data/port.hpp"
-#include "mauve_rt/data/ring_buffer.hpp"
-#include "mauve_rt/data/shared_data.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {
-
-struct ResourceParameters {
-  std::size_t capacity{0};                        // ring_buffer
-  bool overwrite{false};                          // ring_buffer
-  std::uint32_t max_readers{kDefaultMaxReaders};  // latest_value
-  time_ns_t timeout_ns{kDefaultCallTimeout};      // client
-};
 
 /// What the process knows how to make. Filled by libraries, asked by architectures. One thread at a
 /// time. All functions [non-rt].
@@ -32,7 +22,7 @@ class PluginRegistry {
   using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
   using ResourceFactory = std::function<std::unique_ptr<Resource>(const ResourceParameters&)>;
 
-  /// Knows the kind event, which needs no type.
+  /// Knows the given kinds of resources; of those that need a type none can be made yet.
   PluginRegistry();
 
   /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call
@@ -52,37 +42,29 @@ class PluginRegistry {
   void fsm(const std::string& name, const std::string& shell_name) {
     add_fsm(name, shell_name, [] { return std::make_unique<FsmType>(); });
   }
-  /// A resource of the plug-in's own; `name` is its kind in architecture files.
+  /// A resource of the plug-in's own; `name` is its kind in architecture files. It is made of its parameters, where
+  /// a static parameters() says which they are.
   template <typename ResourceType>
   void resource(const std::string& name) {
-    add_resource(name, "", [](const ResourceParameters&) { return std::make_unique<ResourceType>(); });
+    if constexpr (requires { ResourceType::parameters(); }) {
+      add_resource({.name = name, .parameters = ResourceType::parameters()},
+                   [](const ResourceParameters& given) { return std::make_unique<ResourceType>(given); });
+    } else {
+      add_resource({.name = name},
+                   [](const ResourceParameters&) { return std::make_unique<ResourceType>(); });
+    }
   }
-  /// A data type: makes shared_data, ring_buffer, ports and, if it can be copied as bytes, latest_value of it
-  /// possible.
+  /// A data type: makes ports possible, and the given kinds of resources that can be of it.
   template <Described T>
   void type() {
     // Ports of the C++ type that the resources are of, whoever else registers the name later.
-    if (!resources_.contains({"shared_data", type_name<T>()}))
-      ports_.insert_or_assign(type_name<T>(), data_ports<T>());
-    add_resource("shared_data", type_name<T>(),
-                 [](const ResourceParameters&) { return std::make_unique<SharedData<T>>(); });
-    add_resource("ring_buffer", type_name<T>(), [](const ResourceParameters& parameters) {
-      return std::make_unique<RingBuffer<T>>(parameters.capacity,
-                                             parameters.overwrite ? WhenFull::overwrite : WhenFull::refuse);
-    });
-    if constexpr (std::is_trivially_copyable_v<T>) {
-      add_resource("latest_value", type_name<T>(), [](const ResourceParameters& parameters) {
-        return std::make_unique<LatestValue<T>>(parameters.max_readers);
-      });
-    }
+    if (add_given<T>(type_name<T>())) ports_.insert_or_assign(type_name<T>(), data_ports<T>());
   }
 
   /// The type of a ROS service: makes clients of it possible. Ports and offered calls need no registration.
   template <DescribedCall S>
   void call_type() {
-    add_resource("client", std::string(CallTraits<S>::name), [](const ResourceParameters& parameters) {
-      return std::make_unique<Client<S>>(parameters.timeout_ns);
-    });
+    add_given<S>(std::string(CallTraits<S>::name));
   }
 
   // The same with a factory, for parts that are no C++ class of their own.
@@ -91,16 +73,25 @@ class PluginRegistry {
   void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory);
   void add_fsm(const std::string& name, const std::string& shell_name,
                std::function<std::unique_ptr<FsmBase>()> factory);
-  void add_resource(const std::string& kind, const std::string& type, ResourceFactory factory);
+  /// A kind without types.
+  void add_resource(ResourceKind kind, ResourceFactory factory);
 
   std::unique_ptr<Shell> make_shell(const std::string& name) const;
   std::unique_ptr<CoreBase> make_core(const std::string& name) const;
   std::unique_ptr<FsmBase> make_fsm(const std::string& name) const;
   /// Throws Error: unknown_resource (kind), unknown_type, type_mismatch (latest_value of a type that cannot be
-  /// copied as bytes), invalid_argument (a ring without capacity, an event with a type), out_of_range
-  /// (max_readers).
+  /// copied as bytes), invalid_argument (an event of a type that cannot say it); of its parameters as
+  /// checked_parameters().
   std::unique_ptr<Resource> make_resource(const std::string& kind, const std::string& type,
-                                          const ResourceParameters& parameters) const;
+                                          const ResourceParameters& given) const;
+  /// The given kinds, in their order. [non-rt]
+  static std::vector<ResourceKind> given_resource_kinds();
+  /// Throws Error: unknown_resource.
+  const ResourceKind& resource_kind(const std::string& name) const;
+  /// All parameters of a kind: as given, else as they are unless told.
+  /// Throws Error: unknown_resource, invalid_argument (one is missing, or the kind has none such), type_mismatch,
+  /// out_of_range.
+  ResourceParameters checked_parameters(const std::string& kind, const ResourceParameters& given) const;
 
   /// A read or write port of a registered type, or an event port (`type` is empty).
   /// Throws Error: unknown_type, invalid_argument (a call port, whose signature only C++ knows).
@@ -137,14 +128,33 @@ class PluginRegistry {
             sizeof(T)};
   }
 
+  struct KindEntry {
+    ResourceKind kind;
+    std::map<std::string, ResourceFactory> factories;  // by type
+  };
+
+  /// Every given kind that can be of the type, of data or of calls; false: it was registered before.
+  template <typename Type>
+  bool add_given(const std::string& type) {
+    return std::apply([&](auto... kinds) { return (add_given<Type>(kinds, type) | ...); }, GivenResources{});
+  }
+  template <typename Type, typename Given>
+  bool add_given(Given, const std::string& type) {
+    if constexpr (requires(ResourceParameters given) { Given::template make<Type>(given); }) {
+      auto& factories = resources_.at(Given::describe().name).factories;
+      return factories.emplace(type, Given::template make<Type>).second;
+    }
+    return false;
+  }
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
+  [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const;
 
   std::set<std::string> libraries_;
   std::map<std::string, Entry<Shell>> shells_;
   std::map<std::string, Entry<CoreBase>> cores_;
   std::map<std::string, Entry<FsmBase>> fsms_;
-  std::map<std::pair<std::string, std::string>, ResourceFactory> resources_;  // by (kind, type)
-  std::map<std::string, PortFactories> ports_;                                // by type
+  std::map<std::string, KindEntry> resources_;  // by kind
+  std::map<std::string, PortFactories> ports_;  // by type
 };
 
 }  // namespace mauve

@@ -12,6 +12,7 @@
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
 
 namespace mauve {
 
@@ -67,7 +68,6 @@ class ClientBase : public Resource {
   void end(std::uint32_t number, CallOutcome outcome, FunctionRef<void()> put);
 
  private:
-  CallOutcome post(FunctionRef<void()> put) noexcept;
   void await(std::uint32_t number, time_ns_t until_ns, Task* caller) const noexcept;
   void count(CallOutcome outcome, time_ns_t lasted_ns) noexcept;
 
@@ -126,6 +126,24 @@ class Client final : public ClientBase {
 
  public:
   Call call{*this};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct ClientKind {
+  static ResourceKind describe() {
+    return {.name = "client",
+            .parameters = {{.name = "timeout_ns",
+                            .initial = kDefaultCallTimeout,
+                            .description = "how long a call may take",
+                            .unit = "ns",
+                            .minimum = 1,
+                            .file_key = "service.timeout_ms"}},
+            .type = TypeNeed::call};
+  }
+  template <DescribedCall S>
+  static std::unique_ptr<Resource> make(const ResourceParameters& given) {
+    return std::make_unique<Client<S>>(get<std::int64_t>(given, "timeout_ns"));
+  }
 };
 
 }  // namespace mauve

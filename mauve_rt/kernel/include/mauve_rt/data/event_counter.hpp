@@ -8,6 +8,7 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
 
 namespace mauve {
 
@@ -76,6 +77,12 @@ class EventCounter final : public Resource {
  public:
   Read read{*this};
   Raise raise{*this};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct EventKind {
+  static ResourceKind describe();
+  static std::unique_ptr<Resource> make(const std::string& message, const ResourceParameters&);
 };
 
 }  // namespace mauve

@@ -11,6 +11,7 @@
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/latest_register.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
 
 namespace mauve {
 
@@ -127,6 +128,29 @@ class LatestValue final : public NewestResource {
  public:
   Read read{*this};
   Write write{*this};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct LatestValueKind {
+  static ResourceKind describe() {
+    return {.name = "latest_value",
+            .parameters = {{.name = "max_readers",
+                            .initial = std::int64_t{kDefaultMaxReaders},
+                            .description = "how many ports may read it",
+                            .minimum = 1,
+                            .maximum = kMostReaders,
+                            .is_value_count = true,
+                            .is_reader_limit = true}},
+            .type = TypeNeed::data,
+            .values = 3,
+            .has_one_writer = true};
+  }
+  template <Described T>
+    requires std::is_trivially_copyable_v<T>
+  static std::unique_ptr<Resource> make(const ResourceParameters& given) {
+    return std::make_unique<LatestValue<T>>(
+        static_cast<std::uint32_t>(get<std::int64_t>(given, "max_readers")));
+  }
 };
 
 }  // namespace mauve

@@ -10,6 +10,7 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
 
 namespace mauve {
 
@@ -154,6 +155,32 @@ class RingBuffer final : public Resource {
  public:
   Read read{*this};
   Write write{*this};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct RingBufferKind {
+  static ResourceKind describe() {
+    return {
+        .name = "ring_buffer",
+        .parameters = {{.name = "capacity",
+                        .initial = std::int64_t{1},
+                        .description = "how many elements the ring_buffer holds",
+                        .minimum = 1,
+                        .maximum = 1'000'000,
+                        .is_required = true,
+                        .is_value_count = true},
+                       {.name = "overwrite",
+                        .initial = false,
+                        .description = "whether a full one drops its oldest element rather than the new one"},
+                       max_bytes_parameter()},
+        .type = TypeNeed::data};
+  }
+  template <Described T>
+  static std::unique_ptr<Resource> make(const ResourceParameters& given) {
+    return std::make_unique<RingBuffer<T>>(
+        static_cast<std::size_t>(get<std::int64_t>(given, "capacity")),
+        get<bool>(given, "overwrite") ? WhenFull::overwrite : WhenFull::refuse);
+  }
 };
 
 }  // namespace mauve

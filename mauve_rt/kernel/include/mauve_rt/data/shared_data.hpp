@@ -8,6 +8,7 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
 
 namespace mauve {
 
@@ -101,6 +102,20 @@ class SharedData final : public NewestResource {
  public:
   Read read{*this};
   Write write{*this};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct SharedDataKind {
+  static ResourceKind describe() {
+    return {.name = "shared_data",
+            .parameters = {max_bytes_parameter()},
+            .type = TypeNeed::data,
+            .values = 3};  // its own, and one on its way in and one out
+  }
+  template <Described T>
+  static std::unique_ptr<Resource> make(const ResourceParameters&) {
+    return std::make_unique<SharedData<T>>();
+  }
 };
 
 }  // namespace mauve

@@ -5,24 +5,17 @@
 #include <pthread.h>
 
 #include <atomic>
-#include <concepts>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/this_thread.hpp"
+#include "mauve_rt/base/value.hpp"
 
 namespace mauve {
-
-using PropertyValue = std::variant<bool, std::int64_t, double, std::string>;
-
-template <typename T>
-concept PropertyType = std::same_as<T, bool> || std::same_as<T, std::int64_t> || std::same_as<T, double> ||
-                       std::same_as<T, std::string>;
 
 /// "bool", "int", "float" or "str", as architecture files have them. [rt]
 std::string_view property_type_name(const PropertyValue& value) MAUVE_RT;
@@ -77,7 +70,7 @@ class PropertyBase {
   /// [rt]
   const std::string& name() const MAUVE_RT { return name_; }
   const PropertyOptions& options() const MAUVE_RT { return options_; }
-  /// The present value; of a running component ask Component::property_values(). [setup]
+  /// The present value; of a running component ask Component::shown(). [setup]
   virtual PropertyValue boxed() const = 0;
   /// The value converted to the property's type, as checked() above. [non-rt]
   virtual PropertyValue checked(const PropertyValue& value) const = 0;

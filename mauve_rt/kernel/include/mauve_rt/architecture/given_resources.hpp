@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The kinds of resources that the kernel gives.
+#pragma once
+
+#include <tuple>
+
+#include "mauve_rt/data/client.hpp"
+#include "mauve_rt/data/event_counter.hpp"
+#include "mauve_rt/data/latest_value.hpp"
+#include "mauve_rt/data/ring_buffer.hpp"
+#include "mauve_rt/data/shared_data.hpp"
+
+namespace mauve {
+
+/// Each has describe(), and make(): a template for those of a data type, or of a type of calls; else it gets the type.
+using GivenResources = std::tuple<SharedDataKind, RingBufferKind, LatestValueKind, EventKind, ClientKind>;
+
+}  // namespace mauve

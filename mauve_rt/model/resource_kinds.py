@@ -1,0 +1,83 @@
+"""Kinds of resources: which keys one has in a file and what they may be, as the registry tells it."""
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
+from mauve_rt.model.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
+from mauve_rt.model.section import Setting
+from mauve_rt.model.yaml_file import Location
+
+_INT64 = 2**63
+
+
+@cache
+def given_kinds() -> Mapping[str, ResourceKind]:
+    """The kinds that the kernel gives, by name, in its order; a registry knows those of plug-ins too."""
+    return {kind.name: kind for kind in given_resource_kinds()}
+
+
+def has_key(kind: ResourceKind, key: str) -> bool:
+    """Whether a resource of the kind has the key in a file: `capacity`, or `service.timeout_ms`."""
+    return any(parameter.file_key == key for parameter in kind.parameters)
+
+
+def given_kinds_with(key: str) -> tuple[str, ...]:
+    """The given kinds that have a key."""
+    return tuple(name for name, kind in given_kinds().items() if has_key(kind, key))
+
+
+def read_parameters(
+    kind: ResourceKind, values: Mapping[str, Any], place: Location, faults: Faults, *, others: tuple[str, ...]
+) -> dict[str, Any]:
+    """The parameters of a resource at `place` of a file; what is wrong is added to `faults`.
+
+    `others`: the keys that a resource of any kind has.
+    """
+    known = {each.name: each for each in kind.parameters if each.file_key == each.name}
+    read = {}
+    for key, value in values.items():
+        if key in known:
+            read[key] = _read(known[key], value, (*place, key), faults)
+        elif owners := given_kinds_with(key):
+            faults.append(Fault((*place, key), "foreign", limit=kind.name, known=owners))
+        else:
+            faults.append(Fault((*place, key), "unknown", known=(*others, *known)))
+    for key, parameter in known.items():
+        if parameter.required and key not in values:
+            faults.append(Fault(place, "lacks", limit=f"{key}: {parameter.description}"))
+    return read
+
+
+def _read(parameter: ResourceParameter, value: Any, place: Location, faults: Faults) -> Any:
+    before = len(faults)
+    read = Setting(_kind_of(parameter), parameter.initial, _hint(parameter)).read(value, place, faults)
+    for fault in faults[before:]:
+        if fault.what in ("least", "most") and parameter.unit:
+            fault.limit = f"{fault.limit:.15g} {parameter.unit}"
+    return read
+
+
+def _kind_of(parameter: ResourceParameter) -> Kind:
+    low, high = parameter.minimum, parameter.maximum
+    match parameter.type:
+        case "bool":
+            return Flag()
+        case "int":
+            return Whole(-_INT64 if low is None else int(low), _INT64 - 1 if high is None else int(high))
+        case "float":
+            bounds = {"least": low, "most": high}
+            return Real(**{name: bound for name, bound in bounds.items() if bound is not None})
+        case _:
+            return Text()
+
+
+def _hint(parameter: ResourceParameter) -> str:
+    """What it says, and between which bounds."""
+    bounds = [f"{bound:.15g}" for bound in (parameter.minimum, parameter.maximum) if bound is not None]
+    text = f"it says {parameter.description}" if parameter.description else "choose a value"
+    both = 2
+    if len(bounds) == both:
+        text += f", {bounds[0]} to {bounds[1]} {parameter.unit}".rstrip()
+    return text
