@@ -52,6 +52,7 @@ struct TaskSetting {
   void (*assign)(TaskSettings&, const SettingValue&);  // one that was checked
 };
 
+/// One whose value is a number. [non-rt]
 template <auto Member>
 constexpr TaskSetting number_setting(std::string_view name, std::int64_t least, std::int64_t most,
                                      std::string_view hint) {
