@@ -176,35 +176,6 @@ void Draft::remove_resource(const std::string& name) {
   }
 }
 
-void Draft::connect(DraftComponent& component, const std::string& port_name, const std::string& resource_name,
-                    const std::string& service_name) {
-  const PortBase& port = find_port(component.shell(), port_name, component.name());
-  if (const auto wired = component.wires.find(port_name); wired != component.wires.end()) {
-    throw Error(ErrorCode::duplicate_name, "the port is connected already",
-                {.component = component.name(),
-                 .element = "port " + port_name,
-                 .found = "a connection to " + wired->second.resource + "." + wired->second.service->name(),
-                 .remedy = "disconnect it in a step before"});
-  }
-  ServiceBase& service = find_service(resource(resource_name), service_name, component.name(), port_name);
-  try {
-    port.check(service);
-  } catch (const Error& failure) {
-    rethrow_as_of(failure, component.name(), step_);
-  }
-  component.wires.emplace(port_name, Wire{.resource = resource_name, .service = &service, .step = step_});
-}
-
-void Draft::disconnect(DraftComponent& component, const std::string& port) {
-  if (component.wires.erase(port) != 0) {
-    component.disconnected.insert_or_assign(port, step_);
-    return;
-  }
-  find_port(component.shell(), port, component.name());
-  throw Error(ErrorCode::invalid_argument, "the port is not connected",
-              {.component = component.name(), .element = "port " + port, .remedy = "leave the step out"});
-}
-
 void Draft::set_property(DraftComponent& component, const std::string& name, const PropertyValue& value) {
   const PropertyBase& property = find_property(component.shell(), name, component.name());
   try {

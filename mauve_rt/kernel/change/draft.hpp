@@ -48,6 +48,7 @@ struct DraftComponent {
   bool core_unready{false};  // the new core is put in as it is
   int configure_step{0};     // the last that configures it anew
   int first_step{0};
+  std::vector<std::unique_ptr<CommitAction>> actions{};  // that steps want in the commit beside all this
 
   const std::string& name() const noexcept { return component->name(); }
   /// The shell that will be in force.
@@ -109,9 +110,6 @@ class Draft {
   void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic);
   /// Throws Error (invalid_argument) while it is connected or bound to a topic.
   void remove_resource(const std::string& name);
-  void connect(DraftComponent& component, const std::string& port, const std::string& resource,
-               const std::string& service);
-  void disconnect(DraftComponent& component, const std::string& port);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
 
   /// Touches all that can take a new epoch. Throws Error: not_configured when nothing is deployed.

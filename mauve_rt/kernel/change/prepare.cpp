@@ -157,6 +157,7 @@ void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
   prepare_repair(changed);
   changes_.push_back({.draft = &changed});
   Change& change = changes_.back();
+  for (auto& action : changed.actions) keep(*changed.component, std::move(action));
   if (changed.has_new_parts()) {
     const int step = changed.core_step != 0  ? changed.core_step
                      : changed.fsm_step != 0 ? changed.fsm_step

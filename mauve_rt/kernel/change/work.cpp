@@ -263,12 +263,12 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
   }
-  const auto resynchronised = std::find_if(
-      reports_.begin(), reports_.end(), [](const StepReport& step) { return step.step == "resynchronise"; });
-  if (committed_ && resynchronised != reports_.end()) {  // a line each, after those of the steps
+  const auto& steps = transaction_.steps();
+  const auto for_all = std::find_if(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
+  if (committed_ && for_all != steps.end()) {  // a line each, after those of the steps
     for (const auto& component : touched_) {
       StepReport& line = report.steps.emplace_back();
-      line.step = resynchronised->step;
+      line.step = (*for_all)->text();
       line.component = component->name();
     }
   }

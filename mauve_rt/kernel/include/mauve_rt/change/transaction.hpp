@@ -6,6 +6,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "mauve_rt/architecture/plugin.hpp"
@@ -28,26 +30,63 @@ struct ComponentParts {
   bool reconfigurable{true};
 };
 
-/// One step: checks itself against what the steps before it will have made of the architecture.
+/// A component to be added: its parts by name, or as objects.
+struct NewComponent {
+  ComponentParts rest{};
+  bool by_name{true};
+  Parts parts{};
+  Component::FsmFactory make_fsm{};
+  std::unique_ptr<CoreBase> fallback{};
+};
+
+/// A resource to be added: of a registered kind, or as an object.
+struct NewResource {
+  std::string kind{};
+  std::string type{};
+  ResourceParameters parameters{};
+  bool by_kind{true};
+  std::unique_ptr<Resource> resource{};
+  TopicBinding topic{TopicBinding::none};
+};
+
+/// What a step puts in, as its kind takes it.
+using StepValue = std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>,
+                               std::unique_ptr<FsmBase>, std::unique_ptr<Shell>, NewComponent, NewResource>;
+
+struct StepKind;
+
+/// One step: checks itself against what the steps before it will have made of the architecture. All functions [non-rt].
 class TransactionStep {
  public:
-  TransactionStep() = default;
-  virtual ~TransactionStep() = default;
-  TransactionStep(const TransactionStep&) = delete;
-  TransactionStep& operator=(const TransactionStep&) = delete;
+  TransactionStep(const StepKind& its_kind, std::string its_target, std::string its_name, StepValue its_value);
 
-  /// "connect mapping.scan lidar.read": kind, target, value. [non-rt]
-  virtual const std::string& text() const noexcept = 0;
-  /// The component it is about; empty for steps about resources. [non-rt]
-  virtual const std::string& component() const noexcept = 0;
-  /// Enters its effect into the draft; uses up the parts it was given. [non-rt] Throws Error.
-  virtual void draft(Draft& draft) = 0;
+  /// "connect mapping.scan lidar.read": kind, target, value.
+  const std::string& text() const noexcept { return text_; }
+  /// The component it is about; empty for steps about resources.
+  const std::string& component() const noexcept;
+  /// Whether it has a report of every component that it touched.
+  bool is_for_all() const noexcept;
+  /// Enters its effect into the draft; uses up the parts it was given. Throws Error.
+  void draft(Draft& draft);
+
+  const std::string target;  // a component, or a resource
+  const std::string name;    // what of it: a property, a port, a registered part
+  StepValue value;
+
+ private:
+  const StepKind& kind_;
+  std::string text_;
 };
 
 /// A list of steps, taken in order; nothing happens before Host::commit or Architecture::commit. All functions [non-rt].
 /// Parts are given by registered name or as objects; objects serve one commit.
 class Transaction {
  public:
+  /// A step by the name of its kind; the calls below are the same, typed. Throws Error (invalid_argument): no such kind.
+  Transaction& add(std::string_view kind, std::string target = {}, std::string name = {}, StepValue value = {});
+  /// A step of a kind in no table.
+  Transaction& add(const StepKind& kind, std::string target, std::string name = {}, StepValue value = {});
+
   /// By name: one of the component's declared alternatives, or the core it was declared with.
   Transaction& replace_core(const std::string& component, const std::string& implementation);
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core);
@@ -103,8 +142,6 @@ class Transaction {
   const std::vector<std::unique_ptr<TransactionStep>>& steps() const noexcept { return steps_; }
 
  private:
-  Transaction& add(std::unique_ptr<TransactionStep> step);
-
   std::vector<std::unique_ptr<TransactionStep>> steps_;
 };
 

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The end of a port's connection.
+#include "change/steps/step_kind.hpp"
+#include "parts/lookup.hpp"
+
+namespace mauve {
+
+const StepKind steps::disconnect{
+    .name = "disconnect",
+    .words = [](const TransactionStep& step) { return step.target + "." + step.name; },
+    .draft = [](Draft& draft, TransactionStep& step) {
+      DraftComponent& component = draft.change(step.target);
+      if (component.wires.erase(step.name) != 0) {
+        component.disconnected.insert_or_assign(step.name, draft.step());
+        return;
+      }
+      find_port(component.shell(), step.name, component.name());
+      throw Error(
+          ErrorCode::invalid_argument, "the port is not connected",
+          {.component = component.name(), .element = "port " + step.name, .remedy = "leave the step out"});
+    }};
+
+}  // namespace mauve

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A component that leaves: parked, its outputs written, its ports disconnected.
+#include "change/steps/step_kind.hpp"
+
+namespace mauve {
+
+const StepKind steps::remove_component{
+    .name = "remove_component",
+    .draft = [](Draft& draft, TransactionStep& step) { draft.remove_component(step.target); }};
+
+}  // namespace mauve

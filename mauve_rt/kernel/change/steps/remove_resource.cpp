@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A resource that leaves; no port is connected to it.
+#include "change/steps/step_kind.hpp"
+
+namespace mauve {
+
+const StepKind steps::remove_resource{
+    .name = "remove_resource",
+    .target = StepTarget::resource,
+    .draft = [](Draft& draft, TransactionStep& step) { draft.remove_resource(step.target); }};
+
+}  // namespace mauve

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A new common epoch for all components that can take one.
+#include "change/steps/step_kind.hpp"
+
+namespace mauve {
+
+const StepKind steps::resynchronise{
+    .name = "resynchronise",
+    .target = StepTarget::all,
+    .words = [](const TransactionStep&) { return std::string(); },
+    .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
+
+}  // namespace mauve

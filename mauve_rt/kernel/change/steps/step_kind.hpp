@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The kinds of steps: a file each in this folder, and the table of them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "mauve_rt/change/transaction.hpp"
+
+#include "change/draft.hpp"
+
+namespace mauve {
+
+enum class StepTarget : std::uint8_t { component, resource, all };
+
+/// What a step of this kind says and does.
+struct StepKind {
+  std::string_view name;
+  StepTarget target{StepTarget::component};
+  /// "mapping.scan lidar.read": what follows the kind where a step is told.
+  std::string (*words)(const TransactionStep& step) = [](const TransactionStep& step) { return step.target; };
+  /// Checks the step and enters its effect into the draft; uses up the parts it was given. Throws Error.
+  void (*draft)(Draft& draft, TransactionStep& step);
+};
+
+/// The table. A file of this folder defines the kind.
+#define MAUVE_STEP_KINDS(kind) \
+  kind(replace_core)           \
+  kind(place_core)             \
+  kind(replace_fsm)            \
+  kind(replace_shell)          \
+  kind(set_property)           \
+  kind(connect)                \
+  kind(disconnect)             \
+  kind(add_component)          \
+  kind(remove_component)       \
+  kind(add_resource)           \
+  kind(remove_resource)        \
+  kind(start)                  \
+  kind(stop)                   \
+  kind(configure)              \
+  kind(resynchronise)
+
+namespace steps {
+#define MAUVE_DECLARE_STEP_KIND(name) extern const StepKind name;
+MAUVE_STEP_KINDS(MAUVE_DECLARE_STEP_KIND)
+#undef MAUVE_DECLARE_STEP_KIND
+}  // namespace steps
+
+/// The step's value. Throws Error (invalid_argument) when it is another one.
+template <typename Value>
+Value& value_of(TransactionStep& step) {
+  if (auto* value = std::get_if<Value>(&step.value)) return *value;
+  throw Error(ErrorCode::invalid_argument, "the step has another value than its kind takes",
+              {.element = step.text(), .remedy = "give it by the call of Transaction that bears its name"});
+}
+template <typename Value>
+const Value& property_value_of(const TransactionStep& step) {
+  const auto* value = std::get_if<PropertyValue>(&step.value);
+  if (const auto* found = value != nullptr ? std::get_if<Value>(value) : nullptr) return *found;
+  throw Error(ErrorCode::invalid_argument, "the step has another value than its kind takes",
+              {.element = step.text(), .remedy = "give it by the call of Transaction that bears its name"});
+}
+
+/// Objects serve one commit; a second draft of the same step finds nothing left.
+template <typename Part>
+std::unique_ptr<Part> take(std::unique_ptr<Part>& part) {
+  if (part != nullptr) return std::move(part);
+  throw Error(
+      ErrorCode::invalid_argument, "the step has no part to put in",
+      {.expected = "an object", .found = "none", .remedy = "give each transaction objects of its own"});
+}
+
+/// How a part is told: by its registered name.
+template <typename Part>
+std::string shown(const std::string& name, const std::unique_ptr<Part>& part) {
+  if (part == nullptr) return name;
+  return part->implementation().empty() ? "(an object)" : part->implementation();
+}
+
+/// Whether the step brings its part as an object.
+template <typename Part>
+bool brings(const TransactionStep& step) noexcept {
+  return std::holds_alternative<std::unique_ptr<Part>>(step.value);
+}
+
+/// "exploration mauve_examples/LocalExploration"
+template <typename Part>
+std::string part_words(const TransactionStep& step) {
+  const auto* part = std::get_if<std::unique_ptr<Part>>(&step.value);
+  return step.target + " " + (part != nullptr ? shown({}, *part) : step.name);
+}
+
+/// The component whose part is to be replaced. Throws Error.
+DraftComponent& replacing(Draft& draft, const std::string& component);
+/// Makes a registered fsm, as often as asked.
+Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm);
+
+}  // namespace mauve
