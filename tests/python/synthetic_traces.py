@@ -5,12 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.format.kinds import kinds_told
 from mauve_rt.trace.format.records import RECORD, Kind, Records
 from mauve_rt.trace.reading.facts import Loss, Message
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import TraceBag
 
+ROOT = next(folder for folder in Path(__file__).parents if (folder / "mauve_msgs").is_dir())
+TABLE = (ROOT / "mauve_msgs" / "msg" / "TraceRecord.msg").read_text(encoding="utf-8")
 MS = 1_000_000
 EPOCH_NS = 20 * MS
 PERIOD_NS = 10 * MS
@@ -25,7 +30,8 @@ def trace_of(source: SyntheticSource, messages: tuple[Message, ...] = ()) -> Tra
         rows = records[name] = everything[everything["component"] == index]
         losses[name] = Loss(drain.written[index], len(rows), drain.dropped[index], drain.dropped[index])
     pairs = np.array([(drain.monotonic_ns, drain.realtime_ns)], np.int64)
-    return Trace(records, tuple(source.trace_names()), losses, pairs, lambda _: iter(messages))
+    names = tuple(source.trace_names())
+    return Trace(records, names, losses, pairs, lambda _: iter(messages), kinds=kinds_told(TABLE))
 
 
 def record(source: SyntheticSource, folder: Path) -> Path:
@@ -34,6 +40,30 @@ def record(source: SyntheticSource, folder: Path) -> Path:
     recorder.start()
     recorder.stop()
     return folder
+
+
+class FlushedByHand:
+    """A bag that is flushed when the test says so: what lies between two flushes is no matter of load."""
+
+    def __init__(
+        self, source: SyntheticSource, folder: Path, *, node_name: str, split: Split | None = None
+    ) -> None:
+        self._source = source
+        self._bag = TraceBag(source, folder, node_name=node_name, on_error=_refuse, split=split)
+
+    def flush(self) -> None:
+        """Bring what the source was given into the bag."""
+        self._bag.write(self._source.drain_trace(), [], whole=True)
+        self._bag.flush()
+
+    def close(self) -> None:
+        """Flush a last time."""
+        self._bag.write(self._source.drain_trace(), [], whole=True)
+        self._bag.close()
+
+
+def _refuse(text: str) -> None:
+    raise AssertionError(text)
 
 
 def record_small_bag(folder: Path) -> Path:

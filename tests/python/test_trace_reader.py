@@ -1,11 +1,11 @@
 """Reading a bag back: what is in it, what is missing from it, and what is not a bag with a trace."""
 
 import shutil
-import time
 from pathlib import Path
 from typing import get_args
 
 import pytest
+from synthetic_traces import FlushedByHand
 
 import mauve_rt.trace
 import mauve_rt.trace.reading.typed_records as typed
@@ -126,12 +126,11 @@ def test_a_bag_without_a_trace_is_refused(tmp_path: Path):
 def test_a_bag_cut_off_anywhere_gives_what_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("mauve_rt.trace.bag.mcap_scan._PAUSE_S", 0)
     source = SyntheticSource(["a"])
-    recorder = Recorder(source, tmp_path / "bag", node_name="/e", flush_period_s=0.001, drain_period_s=0.001)
-    recorder.start()
+    recorded = FlushedByHand(source, tmp_path / "bag", node_name="/e")
     for index in range(20):
         source.add("a", Kind.MARK, index)
-        time.sleep(0.003)
-    recorder.stop()
+        recorded.flush()
+    recorded.close()
     (file,) = (tmp_path / "bag").glob("*.mcap")
     whole = file.read_bytes()
     data_end = mauve_rt.trace.open(file).files[0].whole_bytes + 13  # behind the DataEnd record
@@ -183,11 +182,13 @@ def test_records_come_typed_and_as_data_frames(tmp_path: Path):
 
 
 def test_every_kind_has_its_type(tmp_path: Path):
+    share = tmp_path / "prefix" / "share" / "mauve_msgs" / "msg" / "TraceRecord.msg"
+    share.write_text("uint16 HEARTBEAT=99  # name: beat\n" + share.read_text())
     source = SyntheticSource(["a"])
-    for kind in Kind:
+    for kind in [*Kind, 99]:
         source.add("a", kind, int(kind), a=1)
     found = list(record(source, tmp_path / "bag").typed())
-    assert len({type(one) for one in found}) == len(Kind)
+    assert len({type(one) for one in found}) == len(Kind) + 1
     assert set(get_args(typed.Record)) == {type(one) for one in found}
 
 

@@ -123,7 +123,7 @@ def test_messages_from_many_threads_all_arrive(recorder: Recorder):
 def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path: Path, source: SyntheticSource):
     recorder = Recorder(source, tmp_path / "bag", node_name=NODE, flush_period_s=60, queue_bytes=40)
     recorder.start()
-    time.sleep(0.2)  # the first flush is immediate
+    wait_until(lambda: recorder.message_count)  # the first flush is immediate
     taken = [recorder.record("/w", TEXT, HELLO, monotonic_ns=0) for _ in range(5)]
     recorder.stop()
     assert taken == [True, True, False, False, False]

@@ -11,15 +11,6 @@ from mauve_rt.trace.reading.pairs import gaps
 from mauve_rt.trace.reading.trace import Trace
 
 _AT_ONCE = 1 << 15  # records that are Python's objects at a time
-_FIGURES = {  # what a, b, c of a record are called
-    Kind.DEPLOYMENT: ("epoch_ns", "offset_ns", "period_ns"),
-    Kind.START: ("first_instant_ns",),
-    Kind.STOP: ("pending_ns",),
-    Kind.FAULT: ("instant_ns",),
-    Kind.OVERRUN: ("missed_ns", "entered_ns", "skipped"),
-    Kind.RECONFIGURATION: ("phase", "duration_ns"),
-    Kind.MARK: ("a", "b", "c"),
-}
 _ENDS_ALL = (Kind.START, Kind.STOP, Kind.FAULT)
 
 
@@ -65,8 +56,8 @@ class ComponentTrack:
                     self._tell_loss(index)
                 if kind in draw:
                     draw[kind](index, *fields)
-                elif kind in _FIGURES:
-                    self._happen(Kind(kind), index, *fields)
+                elif kind in self._trace.kinds:
+                    self._happen(kind, *fields)
             progress(int(some[-1]))
         self._end_all(int(self._rows["time_ns"][-1]) if len(self._rows) else 0)
 
@@ -111,14 +102,18 @@ class ComponentTrack:
         self._track.begin(self._at(time_ns - waited_ns), what, "contention", {"holder_tid": holder})
         self._track.end(self._at(time_ns))
 
-    def _happen(self, kind: Kind, _index: int, time_ns: int, name: int, *figures: int) -> None:
+    def _happen(self, kind: int, time_ns: int, name: int, *figures: int) -> None:
+        """An instant, its fields named as in the bag's table."""
         if kind in _ENDS_ALL:
             self._end_all(time_ns)
         if kind == Kind.RECONFIGURATION and self._open and self._open[-1][0] == Kind.PARKED:
             return  # the slice has its figures
         word = self._trace.name(name)
-        told: dict[str, int | str] = dict(zip(_FIGURES[kind], figures, strict=False))
-        what = kind.name.lower()
+        of_kind = self._trace.kinds[kind]
+        what = of_kind.name
+        told: dict[str, int | str] = {
+            meaning: figures["abc".index(field)] for field, meaning in of_kind.figures.items()
+        }
         if kind == Kind.MARK:
             what = word
         elif word:

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from mauve_rt.trace.export.output import new_folder
+from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reading import frames
 from mauve_rt.trace.reading.statistics import ComponentStatistics, Distribution, all_statistics
@@ -30,22 +32,29 @@ _ROWS_AT_ONCE = 100_000
 def export_csv(trace: Trace, folder: Path, *, force: bool = False, progress: Progress = silent) -> None:
     """Write a folder of CSV files, UTF-8, with a header row each that names the units.
 
-    The columns are those of `mauve_rt.trace.reading.frames`; components.csv counts, and statistics.csv has
-    the distributions of `mauve_rt.trace.reading.statistics`. What is not known is an empty field.
+    The columns are those of `mauve_rt.trace.reading.frames`; kinds of records that are newer than this reader
+    have a file each, named by the bag. components.csv counts, and statistics.csv has the distributions of
+    `mauve_rt.trace.reading.statistics`. What is not known is an empty field.
 
     Raises:
         TraceError: the folder exists already (unless `force`), or cannot be written.
 
     """
     with new_folder(folder, force=force) as place:
-        works = len(_FRAMES) + 1
-        for done, (name, frame_of) in enumerate(_FRAMES.items()):
+        all_frames = _FRAMES | _newer_frames(trace)
+        works = len(all_frames) + 1
+        for done, (name, frame_of) in enumerate(all_frames.items()):
             of_one = part(progress, done / works, (done + 1) / works)
             _write_parts(frame_of(trace), place / f"{name}.csv", of_one)
         statistics = all_statistics(trace, progress=part(progress, 1 - 1 / works, 1))
         _write(_counts(statistics), place / "components.csv")
         _write(_distributions(statistics), place / "statistics.csv")
         progress(1, "statistics.csv")
+
+
+def _newer_frames(trace: Trace) -> dict[str, Callable[[Trace], pd.DataFrame]]:
+    newer = sorted(set(trace.kinds) - set(Kind))
+    return {trace.kinds[kind].name: partial(frames.of_kind, kind=kind) for kind in newer}
 
 
 def _write_parts(frame: pd.DataFrame, path: Path, progress: Progress) -> None:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 
 class Kind(IntEnum):
-    """Kinds of trace records; the meaning of a, b, c is told in mauve_msgs/msg/TraceRecord.msg."""
+    """Kinds of trace records that readers know more of than their table tells (see `kinds`)."""
 
     DEPLOYMENT = 1
     START = 2

@@ -112,11 +112,22 @@ def reconfigurations(trace: Trace) -> pd.DataFrame:
     return pd.DataFrame(columns).astype({name: kinds.get(name, "int64") for name in names})
 
 
+def of_kind(trace: Trace, kind: int) -> pd.DataFrame:
+    """Records of any kind: component, time_ns, and its fields as the bag's table names them."""
+    component, rows = _of_kind(trace, kind)
+    fields = trace.kinds[kind].fields
+    told = {
+        name: _words(trace, rows["name"]) if field == "name" else rows[field]
+        for field, name in fields.items()
+    }
+    return pd.DataFrame({"component": component, "time_ns": rows["time_ns"], **told})
+
+
 def records(trace: Trace) -> pd.DataFrame:
     """Every record: component, sequence, time_ns, kind, name, a, b, c; see mauve_msgs/msg/TraceRecord.msg."""
     component, rows = _stacked(trace.records)
     kinds, which = np.unique(rows["kind"], return_inverse=True)
-    known = {int(kind): kind.name.lower() for kind in Kind}
+    known = {number: kind.name for number, kind in trace.kinds.items()}
     return pd.DataFrame(
         {
             "component": component,
@@ -144,7 +155,7 @@ def _spans(trace: Trace, kinds: tuple[Kind, Kind], what: str, duration: str) -> 
     )
 
 
-def _of_kind(trace: Trace, kind: Kind) -> tuple[pd.Categorical, Records]:
+def _of_kind(trace: Trace, kind: int) -> tuple[pd.Categorical, Records]:
     return _stacked({name: trace.of(name, kind) for name in trace.components})
 
 

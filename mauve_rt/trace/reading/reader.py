@@ -18,6 +18,7 @@ from mauve_rt.trace.bag.files import bag_files
 from mauve_rt.trace.bag.mcap_scan import McapScan
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, decode_batch
+from mauve_rt.trace.format.kinds import RecordKind, kinds_told
 from mauve_rt.trace.format.mcap_records import Channel
 from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.format.records import RECORD, Records
@@ -82,6 +83,7 @@ class _Content:
         self._first_grids: dict[str, Deployment] | None = None
         self._known: set[tuple[Path, int]] = set()
         self._types = _Types()
+        self._kinds: dict[int, RecordKind] = {}
 
     def add(self, scan: McapScan, channel: Channel, data: bytes) -> None:
         type_name = scan.type_of(channel)
@@ -90,7 +92,8 @@ class _Content:
             return
         if (scan.path, channel.id) not in self._known:
             self._known.add((scan.path, channel.id))
-            _check_layout(scan, channel)
+            if type_name == _BATCH_TYPE:
+                self._kinds.update(kinds_told(_record_definition(scan, channel)))
         try:
             if type_name == _BATCH_TYPE:
                 self._topics.add(channel.topic)
@@ -138,6 +141,7 @@ class _Content:
             first_grids=self._first_grids or {},
             files=tuple(self.files),
             topics=self._all_topics,
+            kinds=self._kinds,
         )
 
 
@@ -168,18 +172,17 @@ class _Types:
             raise TraceError(msg) from error
 
 
-def _check_layout(scan: McapScan, channel: Channel) -> None:
-    """See that the bag's records are those that this version reads.
+def _record_definition(scan: McapScan, channel: Channel) -> str:
+    """Return the text of TraceRecord.msg in the definition of a topic of batches.
 
     Raises:
-        TraceError: they are not.
+        TraceError: the bag's records are not those that this version reads.
 
     """
     schema = scan.schemas[channel.schema_id]
-    if schema.name != _BATCH_TYPE:
-        return
     part = _RECORD_PART.search(schema.data.decode(errors="replace"))
-    found = _FIELD.findall(part[1]) if part else []
+    text = part[1] if part else ""
+    found = _FIELD.findall(text)
     if found != _RECORD_FIELDS:
         shown = ", ".join(" ".join(field) for field in found) or "no TraceRecord"
         expected = ", ".join(" ".join(field) for field in _RECORD_FIELDS)
@@ -188,6 +191,7 @@ def _check_layout(scan: McapScan, channel: Channel) -> None:
             f"('{scan.header.library}'): expected records of {expected}; found {shown}; read it with that one"
         )
         raise TraceError(msg)
+    return text
 
 
 def _per_component(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.kinds import RecordKind, kinds_known
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, MessageSource
@@ -41,6 +42,8 @@ class Trace:
     """What it was read from."""
     topics: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     """Of every topic in the bag, the trace's own too: type and number of messages."""
+    kinds: Mapping[int, RecordKind] = field(default_factory=kinds_known)
+    """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -58,7 +61,7 @@ class Trace:
         rows = [records["time_ns"] for records in self.records.values() if len(records)]
         return (min(int(row.min()) for row in rows), max(int(row.max()) for row in rows)) if rows else (0, 0)
 
-    def of(self, component: str, *kinds: Kind) -> Records:
+    def of(self, component: str, *kinds: int) -> Records:
         """Records of one component, of these kinds (all when none is named).
 
         Raises:
@@ -158,6 +161,7 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         },
         files=tuple(file for trace in traces.values() for file in trace.files),
         topics=_all_topics(traces.values()),
+        kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
     )
 
 

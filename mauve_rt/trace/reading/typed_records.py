@@ -80,7 +80,7 @@ class StateEnded(NamedTuple):
 
 
 class Waited(NamedTuple):
-    """A wait was entered in time."""
+    """A wait was entered, at or before the instant of its end."""
 
     time_ns: int
     component: str
@@ -170,9 +170,21 @@ class Marked(NamedTuple):
     c: int
 
 
+class Told(NamedTuple):
+    """A record of a kind that came after this reader, as the bag's table names it."""
+
+    time_ns: int
+    component: str
+    kind: str
+    word: str
+    """What `name` stands for; empty when the kind has none."""
+    figures: dict[str, int]
+    """a, b, c by what they are called."""
+
+
 Record = (
     Deployed | Started | Stopped | Faulted | Released | StateBegun | StateEnded | Waited | Overrun | Parked
-    | Armed | ServiceBegun | ServiceEnded | Contended | Reconfigured | Marked
+    | Armed | ServiceBegun | ServiceEnded | Contended | Reconfigured | Marked | Told
 )  # fmt: skip
 
 _MAKE: dict[int, Callable[[int, str, str, int, int, int], Record]] = {
@@ -198,7 +210,7 @@ _MAKE: dict[int, Callable[[int, str, str, int, int, int], Record]] = {
 
 
 def typed_records(trace: Trace, *components: str) -> Iterator[Record]:
-    """Yield the records of these components (all when none is named) by time. Kinds not known are left out.
+    """Yield the records of these components (all when none is named) by time. Kinds not told of are left out.
 
     Raises:
         TraceError: there is no such component in the trace.
@@ -212,7 +224,10 @@ def _of_component(trace: Trace, component: str) -> Iterator[Record]:
     rows: Any = trace.of(component)
     rows = rows[np.argsort(rows["time_ns"], kind="stable")]  # a release is stamped by its actual time
     for row in rows:
-        make = _MAKE.get(int(row["kind"]))
+        kind, time_ns, word = int(row["kind"]), int(row["time_ns"]), trace.name(int(row["name"]))
+        make, told = _MAKE.get(kind), trace.kinds.get(kind)
         if make is not None:
-            word = trace.name(int(row["name"]))
-            yield make(int(row["time_ns"]), component, word, int(row["a"]), int(row["b"]), int(row["c"]))
+            yield make(time_ns, component, word, int(row["a"]), int(row["b"]), int(row["c"]))
+        elif told is not None:
+            figures = {name: int(row[field]) for field, name in told.figures.items()}
+            yield Told(time_ns, component, told.name, word if "name" in told.fields else "", figures)

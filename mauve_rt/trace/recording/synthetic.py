@@ -39,7 +39,7 @@ class SyntheticSource:
         self._dropped = [0] * len(self.components)
 
     def add(
-        self, component: str, kind: Kind, time_ns: int, *, name: str = "", a: int = 0, b: int = 0, c: int = 0
+        self, component: str, kind: int, time_ns: int, *, name: str = "", a: int = 0, b: int = 0, c: int = 0
     ) -> None:
         """Write a record."""
         index = self.components.index(component)

@@ -13,7 +13,7 @@
 
 namespace mauve {
 
-/// Kinds of records; what a, b and c mean stands in mauve_msgs/msg/TraceRecord.msg, constant by constant.
+/// Kinds of records. The table of what their fields mean is mauve_msgs/msg/TraceRecord.msg, which has every one of them.
 enum class TraceKind : std::uint16_t {
   deployment = 1,
   start = 2,

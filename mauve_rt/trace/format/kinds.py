@@ -1,0 +1,49 @@
+"""What the kinds of trace records are called, and their fields: a table that every bag brings along.
+
+It is the list of constants of mauve_msgs/msg/TraceRecord.msg, whose text is in the bag:
+
+    uint16 RELEASE=5    # name: wait, a: nominal_ns, b: actual_ns, c: place_ns (of a within a period)
+
+So a reader names kinds that are newer than itself; `Kind` has those that it knows more of.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from mauve_rt.trace.format.records import Kind
+
+_KIND = re.compile(
+    r"^uint16 (?P<name>[A-Z][A-Z0-9_]*)=(?P<number>\d+)[ \t]*(?:#(?P<fields>.*))?$", re.MULTILINE
+)
+_FIELD = re.compile(r"\b(name|a|b|c): (\w+)")
+_IN_BRACKETS = re.compile(r"\([^)]*\)")
+
+
+class RecordKind(NamedTuple):
+    """A kind of records."""
+
+    name: str
+    """In small letters, e.g. release."""
+    fields: Mapping[str, str]
+    """What those of `name`, `a`, `b`, `c` mean that it uses, e.g. {"name": "wait", "a": "nominal_ns"}."""
+
+    @property
+    def figures(self) -> dict[str, str]:
+        """`fields` without `name`: those that are numbers."""
+        return {field: meaning for field, meaning in self.fields.items() if field != "name"}
+
+
+def kinds_told(definition: str) -> dict[int, RecordKind]:
+    """Return the kinds that the text of TraceRecord.msg tells of, by their numbers."""
+    return {
+        int(told["number"]): RecordKind(
+            told["name"].lower(), dict(_FIELD.findall(_IN_BRACKETS.sub("", told["fields"] or "")))
+        )
+        for told in _KIND.finditer(definition)
+    }
+
+
+def kinds_known() -> dict[int, RecordKind]:
+    """Return the kinds that this reader knows, of a trace without a definition."""
+    return {kind: RecordKind(kind.name.lower(), {}) for kind in Kind}
