@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -36,9 +37,8 @@ class SimulatedSupervisor:
         self.decisions = f"{self.name}/decisions"
         listed = RulesFile(rules).rules.rules
         pairs = [(rule, self._condition(rule)) for rule in listed]
-        self._engine = RuleEngine(
-            pairs, act=self._act, decide=self._decide, look=self._look, id_prefix=f"{self.name}/"
-        )
+        ids = (f"{self.name}/{number}" for number in count(1))
+        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look, ids=ids)
         self._ended = False
         topics.listen(f"{executor.name}/state", self._on_state)
 

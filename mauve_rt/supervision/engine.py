@@ -5,9 +5,8 @@ request and `on_inventory` with that of ~/list_components, all from one thread. 
 three callables.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.supervision.arming import Arming
@@ -51,18 +50,18 @@ class RuleEngine:
         act: Callable[[Request], None],
         decide: Callable[[Decision], None],
         look: Callable[[], None],
-        id_prefix: str = "",
+        ids: Iterator[str],
     ) -> None:
         """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells.
 
-        `id_prefix` begins the id of each request: the executor has never seen one like it.
+        `ids` has one for each request, which the executor has never seen.
         """
         self._lives = [RuleLife(rule, condition) for rule, condition in rules]
         self._act = act
         self._decide = decide
         self._view: ArchitectureView | None = None
         self._flight: _Flight | None = None
-        self._ids = (f"{id_prefix}{number}" for number in count(1))
+        self._ids = ids
         self._arming = Arming(look=look, act=act, ids=self._ids, tell=self._say)
 
     def tick(self, now_s: float) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import count
 
 import pytest
 
@@ -64,7 +65,8 @@ class World:
     def __post_init__(self) -> None:
         self.conditions = [SilenceCondition("/in", longer_than_s=1.0) for _ in self.rules]
         pairs = list(zip(self.rules, self.conditions, strict=True))
-        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look)
+        ids = map(str, count(1))
+        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look, ids=ids)
         self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
         self._last_word_s = self.now_s
 

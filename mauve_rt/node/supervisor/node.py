@@ -8,6 +8,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
+from itertools import count
 from typing import Any
 
 import rclpy
@@ -56,7 +57,7 @@ class Supervisor:
             act=self._act,
             decide=self._decide,
             look=self._look,
-            id_prefix=f"{uuid.uuid4()}/",
+            ids=(str(uuid.uuid4()) for _ in count()),
         )
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         self._decisions = node.create_publisher(
