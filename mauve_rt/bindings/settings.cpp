@@ -29,7 +29,7 @@ TaskSettings task_settings(const std::string& component, const py::kwargs& given
       throw py::type_error("add_component() has no argument '" + name + "'");
     const SettingValue usual = setting->get(settings);
     const SettingValue wanted = from_python(*setting, usual, value);
-    if (wanted != usual) check(*setting, wanted, component);
+    if (wanted != usual) check_setting(*setting, wanted, component);
     setting->assign(settings, wanted);
   }
   return settings;

@@ -207,12 +207,6 @@ def test_refusals_have_their_code_and_change_nothing(graph: Any) -> None:
     assert [Code(event.code) for event in events] == [code for _, code, _ in REFUSED.values()]
 
 
-def test_codes_are_those_of_every_service() -> None:
-    for service in (Reconfigure, ReplaceCore, Start, Stop):
-        for code in Code:
-            assert getattr(service.Response, code.name) == code
-
-
 def test_event_tells_who_what_and_why(graph: Any) -> None:
     events = graph.hear_events(NODE)
     fields = {"requested_by": "/robot_1/supervisor", "cause": "radio silent", "request_id": "one"}

@@ -132,7 +132,7 @@ def test_what_is_refused_starts_nothing(executor: ExecutorProcess, graph: Any, t
     for fields, code, message in REFUSED:
         reply = start(graph, **{"bag": "new", **fields})
         assert not reply.success, fields
-        assert reply.code == getattr(StartRecording.Response, code), reply.message
+        assert reply.code == getattr(ReplyCode, code), reply.message
         assert message in reply.message
         assert not (tmp_path / "new").exists()
     stopped = stop(graph)

@@ -97,7 +97,7 @@ void Component::show() {
 }
 
 void Component::set_settings(const TaskSettings& settings) {
-  check(settings, name_);
+  check_settings(settings, name_);
   task_.set_settings(settings);
 }
 

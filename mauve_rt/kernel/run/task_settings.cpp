@@ -21,7 +21,7 @@ void check_number(const TaskSetting& setting, std::int64_t number, const std::st
 
 }  // namespace
 
-void check(const TaskSetting& setting, const SettingValue& value, const std::string& component) {
+void check_setting(const TaskSetting& setting, const SettingValue& value, const std::string& component) {
   if (const auto* number = std::get_if<std::int64_t>(&value)) {
     check_number(setting, *number, component);
   } else if (const auto* numbers = std::get_if<std::vector<int>>(&value)) {
@@ -36,10 +36,10 @@ void check(const TaskSetting& setting, const SettingValue& value, const std::str
   }
 }
 
-void check(const TaskSettings& settings, const std::string& component) {
+void check_settings(const TaskSettings& settings, const std::string& component) {
   for (const TaskSetting& setting : kTaskSettings) {
     const SettingValue value = setting.get(settings);
-    if (value != setting.get(TaskSettings{})) check(setting, value, component);
+    if (value != setting.get(TaskSettings{})) check_setting(setting, value, component);
   }
 }
 

@@ -106,9 +106,9 @@ inline constexpr std::array kTaskSettings{
 
 /// Throws Error (out_of_range, invalid_argument) unless the value is one that the setting takes; `component` is
 /// named in it. [non-rt]
-void check(const TaskSetting& setting, const SettingValue& value, const std::string& component);
+void check_setting(const TaskSetting& setting, const SettingValue& value, const std::string& component);
 /// Likewise of all of them; the default is always taken. [non-rt]
-void check(const TaskSettings& settings, const std::string& component);
+void check_settings(const TaskSettings& settings, const std::string& component);
 /// "5", "0, 1", "skip". [non-rt]
 std::string to_string(const SettingValue& value);
 
