@@ -52,13 +52,10 @@ auto made(const std::string& what, Make&& make) -> decltype(make()) {
 
 /// A parameter's value in its own type. Throws Error: type_mismatch, out_of_range.
 PropertyValue checked(const ResourceParameter& parameter, const PropertyValue& value) {
-  const PropertyOptions options{
-      .unit = parameter.unit, .minimum = parameter.minimum, .maximum = parameter.maximum};
-  const auto check = [&]<typename T>(const T& initial) {
-    return Property<T>(parameter.name, initial, options).checked(value);
-  };
   try {
-    return std::visit(check, parameter.initial);
+    return mauve::checked(parameter.name, parameter.initial,
+                          {.unit = parameter.unit, .minimum = parameter.minimum, .maximum = parameter.maximum},
+                          value);
   } catch (const Error& error) {
     ErrorDetail detail = error.detail();
     detail.element = parameter.name;
