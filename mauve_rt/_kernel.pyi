@@ -428,6 +428,10 @@ class Transaction:
     """
 
     def __init__(self) -> None: ...
+    def add(
+        self, kind: str, target: str = "", name: str = "", value: PropertyValue | None = None
+    ) -> Transaction:
+        """A step by the name of its kind, with no object in it; the calls below are the same, typed."""
     def replace_core(self, component: str, core: str | type[Core[Any]]) -> Transaction: ...
     def replace_fsm(self, component: str, fsm: str | type[Fsm[Any, Any]]) -> Transaction:
         """The new one starts in its initial state, on its own period, on the deployment's epoch."""

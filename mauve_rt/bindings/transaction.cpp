@@ -34,6 +34,13 @@ TopicBinding topic_binding(const std::string& name) {
               {.element = "topic", .expected = "publish, subscribe or nothing", .found = name});
 }
 
+PyTransaction& add_step(Self self, const std::string& kind, const std::string& target,
+                        const std::string& name, const std::optional<PropertyValue>& value) {
+  return self.add([=](Transaction& steps, const PluginRegistry&) {
+    steps.add(kind, target, name, value ? StepValue(*value) : StepValue{});
+  });
+}
+
 bool is_name(const py::object& part) { return py::isinstance<py::str>(part); }
 
 void bind_replacements(py::class_<PyTransaction>& transaction) {
@@ -76,37 +83,24 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
           py::arg("component"), py::arg("shell"));
 }
 
+/// A call of Transaction that takes plain values, collected.
+template <typename... Arguments>
+auto collected(Transaction& (Transaction::*call)(Arguments...)) {
+  return [call](Self self, const std::decay_t<Arguments>&... arguments) -> Self {
+    return self.add([=](Transaction& steps, const PluginRegistry&) { (steps.*call)(arguments...); });
+  };
+}
+
 void bind_wiring(py::class_<PyTransaction>& transaction) {
   using Steps = Transaction&;
   using Registry = const PluginRegistry&;
   transaction
-      .def(
-          "set_property",
-          [](Self self, const std::string& component, const std::string& name,
-             const PropertyValue& value) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.set_property(component, name, value); });
-          },
-          py::arg("component"), py::arg("name"), py::arg("value"))
-      .def(
-          "connect",
-          [](Self self, const std::string& component, const std::string& port, const std::string& resource,
-             const std::string& service) -> Self {
-            return self.add(
-                [=](Steps steps, Registry) { steps.connect(component, port, resource, service); });
-          },
-          py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"))
-      .def(
-          "disconnect",
-          [](Self self, const std::string& component, const std::string& port) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.disconnect(component, port); });
-          },
-          py::arg("component"), py::arg("port"))
-      .def(
-          "remove_component",
-          [](Self self, const std::string& name) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.remove_component(name); });
-          },
-          py::arg("name"))
+      .def("set_property", collected(&Transaction::set_property), py::arg("component"), py::arg("name"),
+           py::arg("value"))
+      .def("connect", collected(&Transaction::connect), py::arg("component"), py::arg("port"),
+           py::arg("resource"), py::arg("service"))
+      .def("disconnect", collected(&Transaction::disconnect), py::arg("component"), py::arg("port"))
+      .def("remove_component", collected(&Transaction::remove_component), py::arg("name"))
       .def(
           "add_resource",
           [](Self self, const std::string& name, const py::object& resource,
@@ -127,32 +121,11 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
                 [=](Steps steps, Registry) { steps.add_resource(name, kind, type, parameters, binding); });
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "")
-      .def(
-          "remove_resource",
-          [](Self self, const std::string& name) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.remove_resource(name); });
-          },
-          py::arg("name"))
-      .def(
-          "start",
-          [](Self self, const std::string& component, std::optional<time_ns_t> clock_ns) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.start(component, clock_ns); });
-          },
-          py::arg("component"), py::arg("clock_ns") = std::nullopt)
-      .def(
-          "stop",
-          [](Self self, const std::string& component) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.stop(component); });
-          },
-          py::arg("component"))
-      .def(
-          "configure",
-          [](Self self, const std::string& component) -> Self {
-            return self.add([=](Steps steps, Registry) { steps.configure(component); });
-          },
-          py::arg("component"))
-      .def("resynchronise",
-           [](Self self) -> Self { return self.add([](Steps steps, Registry) { steps.resynchronise(); }); });
+      .def("remove_resource", collected(&Transaction::remove_resource), py::arg("name"))
+      .def("start", collected(&Transaction::start), py::arg("component"), py::arg("clock_ns") = std::nullopt)
+      .def("stop", collected(&Transaction::stop), py::arg("component"))
+      .def("configure", collected(&Transaction::configure), py::arg("component"))
+      .def("resynchronise", collected(&Transaction::resynchronise));
 }
 
 }  // namespace
@@ -189,6 +162,8 @@ void bind_transaction(py::module_& module) {
       .def("__str__", [](const ArchitectureDescription& self) { return to_string(self); });
   py::class_<PyTransaction> transaction(module, "Transaction");
   transaction.def(py::init<>())
+      .def("add", &add_step, py::arg("kind"), py::arg("target") = "", py::arg("name") = "",
+           py::arg("value") = std::nullopt)
       .def("add_component", &add_component, py::arg("name"), py::arg("shell"), py::arg("core"),
            py::arg("fsm"), py::kw_only(), py::arg("properties") = std::map<std::string, PropertyValue>{},
            py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = "",

@@ -3,9 +3,10 @@
 import math
 
 from mauve_rt._kernel import ComponentDescription
-from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Request, Step
+from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Request
 from mauve_rt.control.runtime import Runtime
-from mauve_rt.model.steps import MAX_MISSED, STEP_KINDS
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.steps import MAX_MISSED, Step
 from mauve_rt.model.words import did_you_mean, shown
 
 MAX_TIMEOUT_S = 10.0

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from mauve_rt._kernel import ComponentDescription
-from mauve_rt.control.requests import Code, Outcome, Report, Request, Step
+from mauve_rt.control.requests import Code, Outcome, Report, Request
+from mauve_rt.model.steps import Step
 
 
 class NewFault(NamedTuple):

@@ -3,7 +3,9 @@
 from dataclasses import dataclass, replace
 
 from mauve_rt._kernel import Committed, StepReport, TransactionReport, monotonic_ns
-from mauve_rt.control.requests import NOT_MEASURED, Outcome, Report, Step
+from mauve_rt.control.requests import NOT_MEASURED, Outcome, Report
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.steps import Step
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,8 @@ def reports_of(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Re
         alone, complete = measured.steps[0], measured.is_complete
         return (_report(steps[0], alone, prepare_ns=measured.prepare_ns, is_complete=complete),)
     # Lines beyond the steps' own are of components that a step for all was about.
-    for_all = [Step("resynchronise", "")] * (len(measured.steps) - len(steps))
+    more = len(measured.steps) - len(steps)
+    for_all = [step for step in steps if STEP_KINDS[step.kind].target == "all"][:1] * more
     return tuple(
         _report(step, report, prepare_ns=report.prepare_ns, is_complete=measured.is_complete)
         for step, report in zip([*steps, *for_all], measured.steps, strict=True)
@@ -70,10 +73,9 @@ def reports_of(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Re
 
 
 def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: bool) -> Report:
-    is_long = step.kind in ("add_component", "add_resource")
-    on_resource = step.kind in ("add_resource", "remove_resource")
-    words = [step.kind, step.target if on_resource else step.name]
-    if not is_long and step.kind != "replace_core":
+    kind = STEP_KINDS[step.kind]
+    words = [step.kind, step.target if kind.is_about_resource else step.name]
+    if kind.value != "section" and step.kind != "replace_core":
         words.append(step.value)
     held = measured.blackout_ns != 0
     follows = held and not is_complete and measured.phase_actual_ns == NOT_MEASURED

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from mauve_msgs.msg import ReplyCode
 from mauve_rt._kernel import ERROR_REPLIES, NOT_MEASURED
 from mauve_rt.errors import error_code
+from mauve_rt.model.steps import SHOWN_STEP, Step
 from mauve_rt.model.words import cut
 
 __all__ = [
@@ -28,8 +29,6 @@ __all__ = [
 ]
 
 KEPT_REQUESTS = 1024
-_SHOWN_VALUE = 60
-_SHOWN_STEP = 300
 _LONGEST_WORDS = 4000
 
 
@@ -59,21 +58,6 @@ class RefusalError(Exception):
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)
         self.code = code
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
-
-    kind: str
-    target: str
-    name: str = ""
-    value: str = ""
-
-    def __str__(self) -> str:
-        value = " ".join(self.value.split())
-        short = cut(value, _SHOWN_VALUE)
-        return cut(" ".join(word for word in (self.kind, self.target, self.name, short) if word), _SHOWN_STEP)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,9 +154,9 @@ class Outcome:
         return replace(
             self,
             message=cut(self.message, _LONGEST_WORDS),
-            report=tuple(replace(step, step=cut(step.step, _SHOWN_STEP)) for step in self.report),
-            from_core=cut(self.from_core, _SHOWN_STEP),
-            to_core=cut(self.to_core, _SHOWN_STEP),
+            report=tuple(replace(step, step=cut(step.step, SHOWN_STEP)) for step in self.report),
+            from_core=cut(self.from_core, SHOWN_STEP),
+            to_core=cut(self.to_core, SHOWN_STEP),
         )
 
 
@@ -206,14 +190,14 @@ class RequestLog:
     def add(self, request: Request, outcome: Outcome) -> None:
         """Remember an outcome; the oldest one is forgotten when there are too many."""
         if request.request_id:
-            self._entries[_key(request)] = (request.digest(), cut(str(request), _SHOWN_STEP), outcome)
+            self._entries[_key(request)] = (request.digest(), cut(str(request), SHOWN_STEP), outcome)
             while len(self._entries) > self._kept:
                 self._entries.popitem(last=False)
 
 
 def reused_id(request: Request, first: "Request | str") -> Outcome:
     """The refusal of a request by the id of another one."""
-    shown_id, words = cut(request.request_id, _SHOWN_STEP), cut(str(first), _SHOWN_STEP)
+    shown_id, words = cut(request.request_id, SHOWN_STEP), cut(str(first), SHOWN_STEP)
     message = f"request_id '{shown_id}' was used before, for: {words}; take a new id"
     return Outcome(code=Code.REQUEST_ID_REUSED, message=message)
 

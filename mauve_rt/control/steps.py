@@ -25,7 +25,7 @@ from mauve_rt._kernel import (
     Transaction,
 )
 from mauve_rt.control.limits import RequestLimits, bytes_of_component, bytes_of_resource
-from mauve_rt.control.requests import Code, RefusalError, Step, code_of
+from mauve_rt.control.requests import Code, RefusalError, code_of
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 from mauve_rt.model.architecture_file import ArchitectureModel
@@ -35,6 +35,8 @@ from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
+from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
+from mauve_rt.model.steps import Step
 from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.yaml.text import YamlError, read_yaml
 
@@ -101,33 +103,29 @@ class Plan:
                 raise RefusalError(code_of(error), one_line(f"{where}{_words(error)}")) from None
 
     def _take(self, step: Step) -> None:
-        transaction, name = self.transaction, step.target
-        match step.kind:
-            case "add_component":
+        kind = STEP_KINDS[step.kind]
+        match kind.target:
+            case "new component":
                 self._add_component(step)
-            case "add_resource":
+            case "new resource":
                 self._add_resource(step)
-            case "remove_resource":
-                self._remove_resource(step)
-            case "remove_component":
-                self._component(step)
-                transaction.remove_component(name)
-                del self._sketches[name]
-                self.removed.add(name)
-                self.taken.pop(name, None)
-                self.added.pop(name, None)
-            case "start" | "stop" | "configure":
-                self._component(step)
-                ask = {"stop": transaction.stop, "configure": transaction.configure}
-                ask.get(step.kind, transaction.start)(name)
-            case "resynchronise":
-                self._resynchronise(step)
-            case "connect" | "disconnect":
-                self._connect(step)
-            case "set_property":
-                transaction.set_property(name, step.name, _property_value(step, self._component(step)))
-            case _:
-                self._replace(step)
+            case "resource":
+                self._change_resource(step, kind)
+            case "all":
+                self._change_all(step)
+            case "component" if kind.name in ("core", "fsm", "shell"):
+                self._replace(step, kind.name)
+            case "component":
+                self._change_component(step, kind)
+
+    def _change_component(self, step: Step, kind: StepKind) -> None:
+        component, name = self._component(step), step.target
+        self.transaction.add(step.kind, name, step.name, _kernel_value(step, kind, component))
+        if kind.removes:
+            del self._sketches[name]
+            self.removed.add(name)
+            self.taken.pop(name, None)
+            self.added.pop(name, None)
 
     def _component(self, step: Step) -> _Sketch:
         """The component that a step is about.
@@ -148,22 +146,13 @@ class Plan:
             raise RefusalError(Code.NOT_RECONFIGURABLE, text)
         return sketch
 
-    def _connect(self, step: Step) -> None:
-        self._component(step)
-        if step.kind == "disconnect":
-            self.transaction.disconnect(step.target, step.name)
-        else:
-            resource, service = _service(step)
-            self.transaction.connect(step.target, step.name, resource, service)
-
-    def _resynchronise(self, step: Step) -> None:
+    def _change_all(self, step: Step) -> None:
         if step.target:
-            text = f"a step of kind 'resynchronise' is for all components; found target {shown(step.target)}"
+            text = f"a step of kind '{step.kind}' is for all components; found target {shown(step.target)}"
             raise RefusalError(Code.INVALID, text)
-        self.transaction.resynchronise()
+        self.transaction.add(step.kind)
 
-    def _replace(self, step: Step) -> None:
-        kind = step.kind.removeprefix("replace_")
+    def _replace(self, step: Step, kind: str) -> None:
         sketch = self._component(step)
         with self._runtime.loading() as loader:
             allowed = allowed_parts(sketch.model, kind, loader)
@@ -171,16 +160,11 @@ class Plan:
                 installed = step.name in loader.names(kind)
                 raise _undeclared(step, kind, allowed, installed=installed)
             loader.require(kind, step.name)
-        match kind:
-            case "core":
-                self.transaction.replace_core(step.target, step.name)
-            case "fsm":
-                self.transaction.replace_fsm(step.target, step.name)
-            case _:
-                self.transaction.replace_shell(step.target, step.name)
-                shell = self._runtime.registry.describe_shell(step.name)
-                _check_structs(shell)
-                sketch.properties = {item.name: item for item in shell.properties}
+        self.transaction.add(step.kind, step.target, step.name)
+        if kind == "shell":
+            shell = self._runtime.registry.describe_shell(step.name)
+            _check_structs(shell)
+            sketch.properties = {item.name: item for item in shell.properties}
 
     def _add_component(self, step: Step) -> None:
         name = step.target
@@ -215,8 +199,10 @@ class Plan:
                 self.bound.described[name] = describe_resource(resource, loader.registry)
         self._resources.add(name)
 
-    def _remove_resource(self, step: Step) -> None:
-        self.transaction.remove_resource(step.target)
+    def _change_resource(self, step: Step, kind: StepKind) -> None:
+        self.transaction.add(step.kind, step.target, step.name, _kernel_value(step, kind))
+        if not kind.removes:
+            return
         self._resources.discard(step.target)
         self.taken.pop(step.target, None)
         if self.bound.added.pop(step.target, None) is None:
@@ -275,14 +261,35 @@ def _yaml(step: Step, subject: str) -> object:
         raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
 
 
-def _service(step: Step) -> tuple[str, str]:
+def _kernel_value(step: Step, kind: StepKind, component: _Sketch | None = None) -> PropertyValue | None:
+    """What the kernel's step of this kind takes as its value."""
+    match kind.value:
+        case "scalar" if kind.name == "property" and component is not None:
+            return _property_value(step, component)
+        case "scalar":
+            return _scalar(step, f"step {step.kind} of '{step.target}'")
+        case "resource.service":
+            return _service(step)
+        case _:
+            return None
+
+
+def _service(step: Step) -> str:
     subject = f"port '{step.name}' of component '{step.target}'"
     value = _yaml(step, subject)
     resource, dot, service = value.partition(".") if isinstance(value, str) else ("", "", "")
     if not (resource and dot and service):
         text = f"{subject}: expected resource.service as the value, found {shown(step.value)}"
         raise RefusalError(Code.INVALID, text)
-    return resource, service
+    return f"{resource}.{service}"
+
+
+def _scalar(step: Step, subject: str) -> PropertyValue:
+    value = _yaml(step, subject)
+    if not isinstance(value, bool | int | float | str):
+        expected = "expected true, false, a number or text in YAML"
+        raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+    return value
 
 
 def _property_value(step: Step, component: _Sketch) -> PropertyValue:
@@ -291,10 +298,7 @@ def _property_value(step: Step, component: _Sketch) -> PropertyValue:
     if step.name not in known:
         text = f"component '{step.target}' has no property {shown(step.name)}"
         raise RefusalError(Code.INVALID, f"{text}; {did_you_mean(step.name, known)}")
-    value = _yaml(step, subject)
-    if not isinstance(value, bool | int | float | str):
-        expected = "expected true, false, a number or text in YAML"
-        raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+    value = _scalar(step, subject)
     if facts := property_mismatch(known[step.name], value):
         text = f"{subject}: expected {facts['expected']}, found {facts['found']}"
         raise RefusalError(Code.INVALID, text)

@@ -16,7 +16,7 @@ from mauve_msgs.msg import (
 )
 from mauve_rt._kernel import ComponentDescription, PortDescription
 from mauve_rt.control.checks import MAX_TEXT
-from mauve_rt.control.requests import Outcome, Report, Request
+from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.words import cut, shown
@@ -121,7 +121,7 @@ def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, erro
 
 def step_reports(outcome: Outcome) -> list[Any]:
     """StepReport of every step."""
-    return [_step_report(report) for report in outcome.report]
+    return [StepReport(**vars(report)) for report in outcome.report]
 
 
 def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:
@@ -140,21 +140,6 @@ def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, ins
         from_core=outcome.from_core,
         to_core=outcome.to_core,
         report=step_reports(outcome),
-    )
-
-
-def _step_report(report: Report) -> Any:
-    return StepReport(
-        step=report.step,
-        component=report.component,
-        prepare_ns=report.prepare_ns,
-        blackout_ns=report.blackout_ns,
-        missed_releases=report.missed_releases,
-        phase_nominal_ns=report.phase_nominal_ns,
-        phase_actual_ns=report.phase_actual_ns,
-        from_core=report.from_core,
-        to_core=report.to_core,
-        remark=report.remark,
     )
 
 

@@ -10,37 +10,35 @@ Or, where its components may miss releases for it: {max_missed: 2, steps: [...]}
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Text, Whole
+from mauve_rt.model.kinds import Choice, Fault, Faults, Kind, ListOf, Text, Whole
 from mauve_rt.model.schema import IDENTIFIER_OR_NONE
 from mauve_rt.model.schema_errors import expected
-from mauve_rt.model.section import Part, Section, setting
-from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.model.section import Section, setting
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.words import cut, did_you_mean, shown
 from mauve_rt.model.yaml_file import Location, YamlFile
 
-StepKind = Literal[
-    "replace_core",
-    "replace_fsm",
-    "replace_shell",
-    "set_property",
-    "connect",
-    "disconnect",
-    "add_component",
-    "remove_component",
-    "add_resource",
-    "remove_resource",
-    "start",
-    "stop",
-    "configure",
-    "resynchronise",
-]
-STEP_KINDS: tuple[str, ...] = get_args(StepKind)
-_NEED_NAME = ("replace_core", "replace_fsm", "replace_shell", "set_property", "connect", "disconnect")
-_FOR_ALL = ("resynchronise",)  # no target: all components
-_NEED_VALUE = ("connect", "add_component", "add_resource")  # a property's value may be an empty text
+_SHOWN_VALUE = 60
+SHOWN_STEP = 300
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
+
+    kind: str
+    target: str = ""
+    name: str = ""
+    value: str = ""  # YAML text
+
+    def __str__(self) -> str:
+        short = cut(" ".join(self.value.split()), _SHOWN_VALUE)
+        return cut(" ".join(word for word in (self.kind, self.target, self.name, short) if word), SHOWN_STEP)
 
 
 class _YamlText(Text):
@@ -51,29 +49,42 @@ class _YamlText(Text):
         return super().read(json.dumps(value) if is_value else value, place, faults)
 
 
-class Step(Section):
-    """One step of a transaction, as mauve_msgs/msg/ReconfigurationStep."""
+class _StepForm(Section):
+    """A step as files have it."""
 
-    kind: StepKind = setting(Choice(*STEP_KINDS))
+    kind: str = setting(Choice(*STEP_KINDS))
     target: str = setting(IDENTIFIER_OR_NONE, default="")
     name: str = setting(Text(), default="")
     value: str = setting(_YamlText(), default="")
 
     def misfit(self) -> Fault | None:
         """Most kinds need a target, some a name, some a value."""
-        if self.kind in _FOR_ALL and self.target:
+        kind = STEP_KINDS[self.kind]
+        if kind.target == "all" and self.target:
             return Fault((), "rule", limit=f"a step of kind '{self.kind}' takes no target")
-        if self.kind not in _FOR_ALL and not self.target:
+        if kind.target != "all" and not self.target:
             return Fault((), "missing", limit="target")
-        for key, kinds in (("name", _NEED_NAME), ("value", _NEED_VALUE)):
-            if not getattr(self, key) and self.kind in kinds:
+        for key, is_needed in (("name", kind.name), ("value", kind.needs_value)):
+            if is_needed and not getattr(self, key):
                 return Fault((), "rule", limit=f"a step of kind '{self.kind}' needs a {key}")
         return None
 
 
+class _StepPart(Kind):
+    """A step within a section."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        """As Kind."""
+        if isinstance(value, Step):
+            return value
+        before = len(faults)
+        form = _StepForm.read(value, place, faults)
+        return Step(form.kind, form.target, form.name, form.value) if len(faults) == before else form
+
+
 MAX_MISSED = 1_000_000
 MISSED = Whole(0, MAX_MISSED)
-STEPS = ListOf(Part(Step), few=1)
+STEPS = ListOf(_StepPart(), few=1)
 
 
 class Change(Section):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.inventory import Inventory
-from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, asked
+from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S
 from mauve_rt.supervision.rule import Kind, RuleLife
 
 ASK_AGAIN_S = 1.0
@@ -84,7 +84,7 @@ class Arming:
             self._next(trial)
             return
         request = Request(
-            request_id=next(self._ids), steps=asked(trial.steps()), cause=_cause(trial), dry_run=True
+            request_id=next(self._ids), steps=tuple(trial.steps()), cause=_cause(trial), dry_run=True
         )
         self._flight = (request.request_id, trial)
         self._try_again_s = now_s + ANSWER_TIMEOUT_S

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.model.step_kinds import PRESENT
 from mauve_rt.supervision.arming import Arming
 from mauve_rt.supervision.conditions import Condition
 from mauve_rt.supervision.inventory import Inventory
-from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S, asked
-from mauve_rt.supervision.rule import PRESENT, ArchitectureView, Kind, RuleLife
+from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S
+from mauve_rt.supervision.rule import ArchitectureView, Kind, RuleLife
 from mauve_rt.supervision.rules import Rule
 
 STATE_TIMEOUT_S = 2.0
@@ -170,7 +171,7 @@ class RuleEngine:
         cause = life.cause(kind, now_s)
         request = Request(
             request_id=next(self._ids),
-            steps=asked(life.steps(kind)),
+            steps=tuple(life.steps(kind)),
             expected_revision=view.revision,
             cause=cause,
             max_missed=life.max_missed(kind),

@@ -4,8 +4,8 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
+from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
-from mauve_rt.supervision.rule import PRESENT
 from mauve_rt.yaml.text import YamlError, read_yaml
 
 
@@ -22,19 +22,17 @@ class ListedComponent:
 
     def shows(self, step: Step) -> bool:
         """Whether what a step asks of this component is so already."""
-        match step.kind:
-            case "set_property":
+        kind = STEP_KINDS[step.kind]
+        match kind.name:
+            case "":
+                return self.state in kind.leaves
+            case "property":
                 return step.name in self.properties and _same(self.properties[step.name], step.value)
-            case "connect":
-                return _same(self.connections.get(step.name, ""), step.value)
-            case "disconnect":
-                return self.connections.get(step.name) == ""
-            case "start" | "stop" | "configure":
-                states = {"start": PRESENT, "stop": ("STOPPED",), "configure": ("STOPPED", *PRESENT)}
-                return self.state in states[step.kind]
-            case _:
-                parts = {"replace_core": self.core, "replace_fsm": self.fsm, "replace_shell": self.shell}
-                return parts.get(step.kind) == step.name
+            case "port":
+                wanted = step.value if kind.value else ""  # of a disconnect: nothing
+                return step.name in self.connections and _same(self.connections[step.name], wanted)
+            case part:
+                return step.name == {"core": self.core, "fsm": self.fsm, "shell": self.shell}[part]
 
 
 @dataclass(frozen=True)
@@ -50,14 +48,13 @@ class Inventory:
         return all(self._shows_step(step) for step in steps)
 
     def _shows_step(self, step: Step) -> bool:
+        kind = STEP_KINDS[step.kind]
+        if kind.is_about_resource:
+            return (step.target in self.resources) is not kind.removes
         component = self.components.get(step.target)
-        match step.kind:
-            case "add_resource" | "remove_resource":
-                return (step.target in self.resources) == (step.kind == "add_resource")
-            case "add_component" | "remove_component":
-                return (component is not None) == (step.kind == "add_component")
-            case _:
-                return component is not None and component.shows(step)
+        if kind.target == "new component" or kind.removes:
+            return (component is not None) is not kind.removes
+        return component is not None and component.shows(step)
 
 
 def _same(one: str, other: str) -> bool:

@@ -38,8 +38,7 @@ class Rehearsal:
         Raises:
             RefusedStepError: it was refused.
         """
-        asked = tuple(requests.Step(step.kind, step.target, step.name, step.value) for step in steps)
-        outcome = self._control.handle(requests.Request(steps=asked, dry_run=dry_run))
+        outcome = self._control.handle(requests.Request(steps=tuple(steps), dry_run=dry_run))
         if not outcome.success:
             raise RefusedStepError(outcome.message)
 

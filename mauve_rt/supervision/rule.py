@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from mauve_rt.model.step_kinds import PRESENT
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.conditions import Condition, Look
 from mauve_rt.supervision.rules import Rule
@@ -17,7 +18,6 @@ FIRST_RETRY_S = 0.5
 LONGEST_RETRY_S = 30.0
 REVISION_RETRY_S = 0.05  # somebody else changed the architecture meanwhile: look again soon
 
-PRESENT = ("RUNNING", "HELD")  # held: in the middle of a commit
 
 Kind = Literal["do", "undo"]
 

@@ -21,6 +21,7 @@ from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Text
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import MISSED, STEPS, Step, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
 
@@ -63,8 +64,7 @@ class Rule(Section):
 
     def targets(self) -> set[str]:
         """Components that must run before the rule is armed: those of which it replaces or sets something."""
-        kinds = ("replace_core", "replace_fsm", "replace_shell", "set_property")
-        return {step.target for step in self.do if step.kind in kinds}
+        return {step.target for step in self.do if STEP_KINDS[step.kind].needs_running}
 
 
 class Rules(Section):

@@ -48,7 +48,8 @@ struct DraftComponent {
   bool core_unready{false};  // the new core is put in as it is
   int configure_step{0};     // the last that configures it anew
   int first_step{0};
-  std::vector<std::unique_ptr<CommitAction>> actions{};  // that steps want in the commit beside all this
+  std::vector<std::unique_ptr<CommitAction>>
+      actions{};  // taken in by the commit beside all this; not of an added one
 
   const std::string& name() const noexcept { return component->name(); }
   /// The shell that will be in force.

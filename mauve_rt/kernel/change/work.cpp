@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// From the draft to the report; what is prepared stands in transaction_prepare.cpp.
+// From the draft to the report; what is prepared stands in prepare.cpp.
 #include "change/work.hpp"
 
 #include <algorithm>
@@ -264,7 +264,8 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
   }
   const auto& steps = transaction_.steps();
-  const auto for_all = std::find_if(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
+  const auto for_all =
+      std::find_if(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
   if (committed_ && for_all != steps.end()) {  // a line each, after those of the steps
     for (const auto& component : touched_) {
       StepReport& line = report.steps.emplace_back();

@@ -18,17 +18,17 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.control.control import Control
-from mauve_rt.control.requests import Outcome, RecordingOrder, Request, Step
+from mauve_rt.control.requests import Outcome, RecordingOrder, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.steps import Step
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import log_request
 from mauve_rt.node.executor.events import Event
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.shared.watch import Watch
-
-_CHANGE_PARAMETERS = {"set_property", "add_component", "remove_component", "replace_shell"}
 
 
 class Services:
@@ -90,7 +90,7 @@ class Services:
         outcome = self._control.handle(request)
         if not outcome.replayed:
             self._untold.events.append(self._state.take_down(request, outcome))
-            if outcome.success and any(step.kind in _CHANGE_PARAMETERS for step in request.steps):
+            if outcome.success and any(STEP_KINDS[step.kind].changes_parameters for step in request.steps):
                 self._follow()
         return outcome
 

@@ -8,9 +8,8 @@ namespace {
 
 Parts parts_of(const Draft& draft, NewComponent& wanted) {
   if (!wanted.by_name) {
-    return {.shell = take(wanted.parts.shell),
-            .core = take(wanted.parts.core),
-            .fsm = take(wanted.parts.fsm)};
+    return {
+        .shell = take(wanted.parts.shell), .core = take(wanted.parts.core), .fsm = take(wanted.parts.fsm)};
   }
   const PluginRegistry& registry = draft.registry();
   return {.shell = registry.make_shell(wanted.rest.shell),
@@ -26,8 +25,7 @@ const StepKind steps::add_component{
         [](const TransactionStep& step) {
           const auto* wanted = std::get_if<NewComponent>(&step.value);
           if (wanted == nullptr) return step.target;
-          return step.target + " " +
-                 (wanted->by_name ? wanted->rest.core : shown({}, wanted->parts.core));
+          return step.target + " " + (wanted->by_name ? wanted->rest.core : shown({}, wanted->parts.core));
         },
     .draft =
         [](Draft& draft, TransactionStep& step) {

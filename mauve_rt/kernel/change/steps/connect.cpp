@@ -31,18 +31,11 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
 }  // namespace
 
 const StepKind steps::connect{
-    .name = "connect",
-    .words =
-        [](const TransactionStep& step) {
-          const auto* value = std::get_if<PropertyValue>(&step.value);
-          return step.target + "." + step.name + (value != nullptr ? " " + to_string(*value) : "");
-        },
-    .draft =
-        [](Draft& draft, TransactionStep& step) {
-          const auto& value = property_value_of<std::string>(step);
-          const std::size_t dot = value.find('.');
-          const std::string service = dot != std::string::npos ? value.substr(dot + 1) : "";
-          connect_port(draft, draft.change(step.target), step.name, value.substr(0, dot), service);
-        }};
+    .name = "connect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
+      const auto& value = plain_value_of<std::string>(step);
+      const std::size_t dot = value.find('.');
+      const std::string service = dot != std::string::npos ? value.substr(dot + 1) : "";
+      connect_port(draft, draft.change(step.target), step.name, value.substr(0, dot), service);
+    }};
 
 }  // namespace mauve

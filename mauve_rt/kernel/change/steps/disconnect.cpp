@@ -6,9 +6,7 @@
 namespace mauve {
 
 const StepKind steps::disconnect{
-    .name = "disconnect",
-    .words = [](const TransactionStep& step) { return step.target + "." + step.name; },
-    .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "disconnect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
       DraftComponent& component = draft.change(step.target);
       if (component.wires.erase(step.name) != 0) {
         component.disconnected.insert_or_assign(step.name, draft.step());

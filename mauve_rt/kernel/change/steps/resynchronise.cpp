@@ -4,10 +4,9 @@
 
 namespace mauve {
 
-const StepKind steps::resynchronise{
-    .name = "resynchronise",
-    .target = StepTarget::all,
-    .words = [](const TransactionStep&) { return std::string(); },
-    .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
+const StepKind steps::resynchronise{.name = "resynchronise",
+                                    .target = StepTarget::all,
+                                    .words = [](const TransactionStep&) { return std::string(); },
+                                    .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
 
 }  // namespace mauve

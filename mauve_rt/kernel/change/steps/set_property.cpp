@@ -5,15 +5,8 @@
 namespace mauve {
 
 const StepKind steps::set_property{
-    .name = "set_property",
-    .words =
-        [](const TransactionStep& step) {
-          const auto* value = std::get_if<PropertyValue>(&step.value);
-          return step.target + "." + step.name + (value != nullptr ? " " + to_string(*value) : "");
-        },
-    .draft =
-        [](Draft& draft, TransactionStep& step) {
-          draft.set_property(draft.change(step.target), step.name, value_of<PropertyValue>(step));
-        }};
+    .name = "set_property", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
+      draft.set_property(draft.change(step.target), step.name, value_of<PropertyValue>(step));
+    }};
 
 }  // namespace mauve

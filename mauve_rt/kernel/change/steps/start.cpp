@@ -37,11 +37,10 @@ void start_component(Draft& draft, const std::string& name, std::optional<time_n
 }  // namespace
 
 const StepKind steps::start{
-    .name = "start",
-    .draft = [](Draft& draft, TransactionStep& step) { 
+    .name = "start", .draft = [](Draft& draft, TransactionStep& step) {
       const bool has_clock = !std::holds_alternative<std::monostate>(step.value);
       start_component(draft, step.target,
-                      has_clock ? std::optional(property_value_of<std::int64_t>(step)) : std::nullopt);
-     }};
+                      has_clock ? std::optional(plain_value_of<std::int64_t>(step)) : std::nullopt);
+    }};
 
 }  // namespace mauve

@@ -54,6 +54,16 @@ Transaction& Transaction::add(std::string_view kind, std::string target, std::st
   return add(kind_of(kind), std::move(target), std::move(name), std::move(value));
 }
 
+void throw_other_value(const TransactionStep& step) {
+  throw Error(ErrorCode::invalid_argument, "the step has another value than its kind takes",
+              {.element = step.text(), .remedy = "give it by the call of Transaction that bears its name"});
+}
+
+std::string element_words(const TransactionStep& step) {
+  const auto* value = std::get_if<PropertyValue>(&step.value);
+  return step.target + "." + step.name + (value != nullptr ? " " + to_string(*value) : "");
+}
+
 DraftComponent& replacing(Draft& draft, const std::string& component) {
   DraftComponent& changed = draft.change(component);
   if (changed.is_added || changed.component->is_configured()) return changed;

@@ -26,23 +26,25 @@ struct StepKind {
   void (*draft)(Draft& draft, TransactionStep& step);
 };
 
-/// The table. A file of this folder defines the kind.
+/// The table; a file of this folder defines each.
+// clang-format off
 #define MAUVE_STEP_KINDS(kind) \
-  kind(replace_core)           \
-  kind(place_core)             \
-  kind(replace_fsm)            \
-  kind(replace_shell)          \
-  kind(set_property)           \
-  kind(connect)                \
-  kind(disconnect)             \
-  kind(add_component)          \
-  kind(remove_component)       \
-  kind(add_resource)           \
-  kind(remove_resource)        \
-  kind(start)                  \
-  kind(stop)                   \
-  kind(configure)              \
+  kind(replace_core) \
+  kind(place_core) \
+  kind(replace_fsm) \
+  kind(replace_shell) \
+  kind(set_property) \
+  kind(connect) \
+  kind(disconnect) \
+  kind(add_component) \
+  kind(remove_component) \
+  kind(add_resource) \
+  kind(remove_resource) \
+  kind(start) \
+  kind(stop) \
+  kind(configure) \
   kind(resynchronise)
+// clang-format on
 
 namespace steps {
 #define MAUVE_DECLARE_STEP_KIND(name) extern const StepKind name;
@@ -50,19 +52,19 @@ MAUVE_STEP_KINDS(MAUVE_DECLARE_STEP_KIND)
 #undef MAUVE_DECLARE_STEP_KIND
 }  // namespace steps
 
+[[noreturn]] void throw_other_value(const TransactionStep& step);
+
 /// The step's value. Throws Error (invalid_argument) when it is another one.
 template <typename Value>
 Value& value_of(TransactionStep& step) {
   if (auto* value = std::get_if<Value>(&step.value)) return *value;
-  throw Error(ErrorCode::invalid_argument, "the step has another value than its kind takes",
-              {.element = step.text(), .remedy = "give it by the call of Transaction that bears its name"});
+  throw_other_value(step);
 }
+/// The same of a plain value.
 template <typename Value>
-const Value& property_value_of(const TransactionStep& step) {
-  const auto* value = std::get_if<PropertyValue>(&step.value);
-  if (const auto* found = value != nullptr ? std::get_if<Value>(value) : nullptr) return *found;
-  throw Error(ErrorCode::invalid_argument, "the step has another value than its kind takes",
-              {.element = step.text(), .remedy = "give it by the call of Transaction that bears its name"});
+const Value& plain_value_of(TransactionStep& step) {
+  if (const auto* value = std::get_if<Value>(&value_of<PropertyValue>(step))) return *value;
+  throw_other_value(step);
 }
 
 /// Objects serve one commit; a second draft of the same step finds nothing left.
@@ -86,6 +88,9 @@ template <typename Part>
 bool brings(const TransactionStep& step) noexcept {
   return std::holds_alternative<std::unique_ptr<Part>>(step.value);
 }
+
+/// "guidance.path_step 0.5": an element of a component, and a plain value if there is one.
+std::string element_words(const TransactionStep& step);
 
 /// "exploration mauve_examples/LocalExploration"
 template <typename Part>

@@ -58,7 +58,8 @@ struct StepKind;
 /// One step: checks itself against what the steps before it will have made of the architecture. All functions [non-rt].
 class TransactionStep {
  public:
-  TransactionStep(const StepKind& its_kind, std::string its_target, std::string its_name, StepValue its_value);
+  TransactionStep(const StepKind& its_kind, std::string its_target, std::string its_name,
+                  StepValue its_value);
 
   /// "connect mapping.scan lidar.read": kind, target, value.
   const std::string& text() const noexcept { return text_; }
@@ -83,7 +84,8 @@ class TransactionStep {
 class Transaction {
  public:
   /// A step by the name of its kind; the calls below are the same, typed. Throws Error (invalid_argument): no such kind.
-  Transaction& add(std::string_view kind, std::string target = {}, std::string name = {}, StepValue value = {});
+  Transaction& add(std::string_view kind, std::string target = {}, std::string name = {},
+                   StepValue value = {});
   /// A step of a kind in no table.
   Transaction& add(const StepKind& kind, std::string target, std::string name = {}, StepValue value = {});
 
