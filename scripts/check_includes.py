@@ -60,11 +60,7 @@ UPWARD = {
     ("architecture/architecture.cpp", "mauve_rt/deploy/host.hpp"),
     ("change/prepare.cpp", "mauve_rt/deploy/host.hpp"),
     ("change/work.cpp", "mauve_rt/deploy/host.hpp"),
-    ("data/client.cpp", "mauve_rt/run/task.hpp"),
     ("include/mauve_rt/architecture/architecture.hpp", "mauve_rt/change/transaction.hpp"),
-    ("include/mauve_rt/run/component.hpp", "mauve_rt/architecture/change_lock.hpp"),
-    ("include/mauve_rt/run/task.hpp", "mauve_rt/deploy/due_queue.hpp"),
-    ("parts/event_input.cpp", "mauve_rt/run/task.hpp"),
     ("run/component.cpp", "mauve_rt/architecture/architecture.hpp"),
     ("run/component.cpp", "mauve_rt/change/transaction_commit.hpp"),
 }

@@ -5,22 +5,19 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include <csignal>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "mauve_rt/base/threads.hpp"
 
 namespace mauve::bridge {
 
 /// A thread of that name, with every signal blocked. [non-rt]
 template <typename Work>
 std::thread start_thread(const char* name, Work work) {
-  sigset_t all;
-  sigset_t callers;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &callers);
+  const SignalsBlocked inherited;
   std::thread thread(std::move(work));
-  pthread_sigmask(SIG_SETMASK, &callers, nullptr);
   pthread_setname_np(thread.native_handle(), name);
   return thread;
 }

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/data/client.hpp"
 
+#include <algorithm>
+#include <mutex>
+
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
-#include "mauve_rt/run/task.hpp"
+#include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/base/waiter.hpp"
 
 namespace mauve {
 
@@ -48,7 +52,7 @@ CallCounts ClientBase::counts() const {
 CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) noexcept {
   const time_ns_t began = monotonic_now_ns();
   std::uint32_t number = 0;
-  Task* const caller = Task::of_this_thread();
+  Waiter* const caller = Waiter::of_this_thread();
   {
     const std::lock_guard lock(mutex_);
     if (is_waiting_ || !is_connected_.load(std::memory_order_relaxed)) {
@@ -75,7 +79,7 @@ CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) n
   return outcome;
 }
 
-void ClientBase::await(std::uint32_t number, time_ns_t until_ns, Task* caller) const noexcept {
+void ClientBase::await(std::uint32_t number, time_ns_t until_ns, Waiter* caller) const noexcept {
   if (caller != nullptr) return caller->await(ended_, number, until_ns);
   for (std::uint32_t seen = ended_.load(std::memory_order_acquire); seen != number;
        seen = ended_.load(std::memory_order_acquire)) {

@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/deploy/trace_collector.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-
 #include <chrono>
-#include <csignal>
 #include <utility>
+
+#include "mauve_rt/base/error.hpp"
 
 namespace mauve {
 
 TraceCollector::TraceCollector(Architecture& architecture, time_ns_t period_ns)
     : architecture_(architecture), period_ns_(period_ns) {
-  sigset_t all;
-  sigset_t callers;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &callers);  // signals are the process's business
-  thread_ = std::thread([this] { run(); });
-  pthread_sigmask(SIG_SETMASK, &callers, nullptr);
-  pthread_setname_np(thread_.native_handle(), "trace");
-  const sched_param after_components{.sched_priority = 1};
-  pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &after_components);  // or it goes on as it is
+  const auto entry = [](void* self) -> void* {
+    static_cast<TraceCollector*>(self)->run();
+    return nullptr;
+  };
+  if (thread_.start({.name = "trace", .priority = 1}, entry, this) != 0)  // after the components
+    throw Error(ErrorCode::internal, "the system refuses the thread that collects the trace");
 }
 
 TraceCollector::~TraceCollector() {

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/parts/event_input.hpp"
 
-#include "mauve_rt/run/task.hpp"
-
 namespace mauve {
 
 void EventInput::on_event(time_ns_t time_ns) noexcept {
   time_ns_t none = kNone;
   // acq_rel: the first event's time stays until it is consumed
   time_.compare_exchange_strong(none, time_ns, std::memory_order_acq_rel);
-  task_.load(std::memory_order_relaxed)->signal_event();
+  waiter_.load(std::memory_order_relaxed)->signal_event();
 }
 
 std::optional<time_ns_t> EventInput::consume() noexcept {

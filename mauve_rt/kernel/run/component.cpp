@@ -382,7 +382,7 @@ void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
 void Component::update_listening(const FsmBase& fsm) {
   for (const auto& state : fsm.states()) {
     if (state->event == nullptr) continue;
-    state->event->set_task(task_);
+    state->event->set_waiter(task_);
     state->event->listen();
   }
 }

@@ -9,8 +9,6 @@
 #include "mauve_rt/run/commit.hpp"
 #include "mauve_rt/run/task.hpp"
 
-#include "base/thread_attributes.hpp"
-
 namespace mauve {
 
 namespace {
@@ -59,16 +57,16 @@ class Claims {
 }  // namespace
 
 Conductor::Conductor() {
-  ThreadAttributes attributes(kConductorStackBytes, kConductorPriority);
-  const int result = start_thread(thread_, attributes, &Conductor::entry, this);
+  const int result = thread_.start(
+      {.name = "conductor", .priority = kConductorPriority, .stack_bytes = kConductorStackBytes},
+      &Conductor::entry, this);
   if (result != 0) throw Error(ErrorCode::internal, "the system refuses the conductor's thread");
-  pthread_setname_np(thread_, "conductor");
 }
 
 Conductor::~Conductor() {
   order_.store(kEnd, std::memory_order_release);
   futex_wake_all(order_);
-  pthread_join(thread_, nullptr);
+  thread_.join();
 }
 
 void* Conductor::entry(void* self) noexcept {

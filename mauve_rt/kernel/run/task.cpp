@@ -63,24 +63,14 @@ void ChangeSignal::bump() noexcept {
 }
 
 Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
-    : name_(std::move(name)), number_(number), changes_(changes), clock_(&MonotonicClock::instance()) {}
+    : name_(std::move(name)), number_(number), changes_(changes) {}
 
 Task::~Task() { end_thread(kForever); }
 
 void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
   shell_ = &shell;
-  fsm_ = &fsm;
   core_ = core;
-  period_ns_.store(period_ns, std::memory_order_relaxed);
-  context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
-  // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
-  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
-}
-
-time_ns_t Task::join(time_ns_t epoch_ns) noexcept {
-  const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
-  reference_ns_.store(first_ns, std::memory_order_relaxed);
-  return first_ns;
+  machine_.set_parts(fsm, core, period_ns);
 }
 
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
@@ -111,18 +101,18 @@ Fault Task::fault() const {
   return fault;
 }
 
-std::string Task::current_state() const { return TraceNames::word(current_.load(std::memory_order_relaxed)); }
+std::string Task::current_state() const { return TraceNames::word(machine_.state_name()); }
 
 StateAge Task::state_age() const {
   time_ns_t hung_after_ns = settings_.hung_after_ns;
   if (hung_after_ns == 0) {
-    const time_ns_t period = context_.period_ns.load(std::memory_order_relaxed);
+    const time_ns_t period = machine_.context().period_ns.load(std::memory_order_relaxed);
     hung_after_ns = std::max(kHungAtLeast, kHungPeriods * std::min(period, kForever / kHungPeriods));
   }
-  const std::optional<PresentState::Fact> fact = present_.look();
+  const std::optional<PresentState::Fact> fact = machine_.present().look();
   if (!fact) return {.state = current_state(), .hung_after_ns = hung_after_ns};  // it changes this moment
   return {.state = TraceNames::word(fact->name),
-          .age_ns = fact->since_ns == 0 ? 0 : std::max<time_ns_t>(0, clock_->now_ns() - fact->since_ns),
+          .age_ns = fact->since_ns == 0 ? 0 : std::max<time_ns_t>(0, clock().now_ns() - fact->since_ns),
           .bound_ns = fact->bound_ns,
           .hung_after_ns = hung_after_ns,
           .is_wait = fact->is_wait};
@@ -138,6 +128,7 @@ void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, st
 
 std::unique_ptr<TraceRing> Task::release_ring() {
   const std::lock_guard lock(ring_mutex_);
+  machine_.set_ring(nullptr);
   return std::move(ring_);
 }
 
@@ -149,20 +140,21 @@ void Task::begin_trace(bool trace) {
     const std::size_t wanted = settings_.trace_records;
     ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid().period_ns));
   }
-  if (ring_ != nullptr) ring_->set_clock(simulated_ ? clock_ : nullptr);
+  if (ring_ != nullptr) ring_->set_clock(simulated_ ? &clock() : nullptr);
+  machine_.set_ring(ring_.get());
 }
 
 void Task::simulate(const Clock& clock, bool trace) {
   simulated_ = true;
-  clock_ = &clock;
+  machine_.set_clock(clock);
   begin_trace(trace);
 }
 
 void Task::end_simulation() noexcept {
   if (!simulated_) return;
-  clock_->leave(*this);
+  clock().leave(*this);
   simulated_ = false;
-  clock_ = &MonotonicClock::instance();
+  machine_.set_clock(MonotonicClock::instance());
   if (ring_ != nullptr) ring_->set_clock(nullptr);
 }
 
@@ -181,8 +173,9 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
     if (!futex_wait_until(ended_, 0, until_ns) && ended_.load(std::memory_order_acquire) == 0) return false;
   }
   if (outputs_.load(std::memory_order_acquire) == kWriting) return false;
-  pthread_join(thread_, nullptr);
+  thread_.join();
   if (watchdog_ != nullptr) watchdog_->forget(*this);
+  machine_.set_watchdog(nullptr);
   watchdog_.reset();
   has_thread_.store(false, std::memory_order_release);
   control_.store(0, std::memory_order_relaxed);  // relaxed: no thread is left to race with
@@ -190,7 +183,7 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
 }
 
 void Task::detach_thread() noexcept {
-  if (has_thread_) pthread_detach(thread_);
+  if (has_thread_) thread_.detach();
 }
 
 void Task::start_at(time_ns_t instant_ns) {
@@ -248,7 +241,7 @@ void Task::require_startable() const {
 time_ns_t Task::next_instant(std::optional<time_ns_t> reference_ns) const noexcept {
   const Grid own = grid();
   const Grid wanted{.reference_ns = reference_ns.value_or(own.reference_ns), .period_ns = own.period_ns};
-  const time_ns_t earliest = clock_->now_ns() + kStartMargin + 1;
+  const time_ns_t earliest = clock().now_ns() + kStartMargin + 1;
   return wanted.first_not_before(std::max(earliest, wanted.reference_ns));
 }
 
@@ -289,7 +282,7 @@ void Task::order_stop() {
 }
 
 bool Task::is_called_from_own_state() const noexcept {
-  return of_this_thread() == this || (simulated_ && in_resume_);
+  return Waiter::of_this_thread() == this || (simulated_ && in_resume_);
 }
 
 void Task::stop(time_ns_t timeout_ns) {

@@ -46,7 +46,7 @@ time_ns_t Task::leaves_gate_at(const Participant& place) const noexcept {
 
 bool Task::may_commit_now() noexcept {
   if (left_gate_) return false;
-  const time_ns_t now = clock_->now_ns();
+  const time_ns_t now = clock().now_ns();
   bool may = false;
   place_.use([&](Participant& place) { may = now < std::min(due_ns(), leaves_gate_at(place)); });
   return may;
@@ -65,7 +65,7 @@ void Task::pass_commit() noexcept {
 void Task::come_to_commit() {
   place_.use([this](Participant& place) { visit(place); });
   const time_ns_t took = std::exchange(overlong_ns_, 0);
-  if (took == 0 || waiting_ == nullptr) return;
+  if (took == 0 || !machine_.is_started()) return;
   throw std::runtime_error("adopt and take took " + std::to_string(took / 1000) +
                            " us, longer than the new core declares (budget_ns)");
 }
@@ -79,15 +79,15 @@ void Task::exchange_state(ComponentState from, ComponentState to) noexcept {
 void Task::visit(Participant& place) noexcept {
   Commit& commit = *place.commit;
   const time_ns_t due = due_ns();
-  place.parked_ns = clock_->now_ns();
+  place.parked_ns = clock().now_ns();
   place.pending_ns = due;
   place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
   place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid().period_ns;
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
-  begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
+  machine_.begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
   const Commit::Answer answer = commit.meet(place);
-  if (answer == Commit::Answer::abandoned || !end_execution()) {
+  if (answer == Commit::Answer::abandoned || !machine_.end_execution()) {
     is_abandoned_ = true;
     return;
   }
@@ -106,76 +106,70 @@ void Task::visit(Participant& place) noexcept {
   commit.gone_on(answer == Commit::Answer::made_it);
 }
 
-/// Instants that passed at the gate, or in adopt and take, are skipped whatever the overrun policy; returns how many.
-/// One that it was not to miss, and that has passed by less than a period, is released late as after any wait.
+/// Skips the instants that passed at the gate, or in adopt and take; returns how many.
 std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
-  const time_ns_t period = grid().period_ns;
-  const time_ns_t late = now_ns - clock_ns();
-  if (!event_settled_ || period == 0 || late <= 0 || place.parked_ns > clock_ns()) return 0;
-  if (late < period && place.holds_until_ns == place.pending_ns) return 0;
-  const std::int64_t lost = (late + period - 1) / period;
-  set_clock_ns(clock_ns() + lost * period);
-  return lost;
+  return machine_.skip_lost(place.parked_ns, place.holds_until_ns != place.pending_ns, now_ns);
 }
 
 void Task::go_on_unchanged(Participant& place) noexcept {
-  boundary_ns_ = clock_->now_ns();
-  const std::int64_t lost = skip_lost(place, boundary_ns_);
+  const time_ns_t now = machine_.look_at_clock();
+  const std::int64_t lost = skip_lost(place, now);
   if (lost == 0) return;
   place.lost += lost;
-  const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
-  trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
-  trace_at(boundary_ns_, TraceKind::armed, wait_name, due_ns(), kInVain, lost);
+  const std::uint32_t wait_name = machine_.state_name();
+  machine_.trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
+  machine_.trace_at(now, TraceKind::armed, wait_name, due_ns(), kInVain, lost);
 }
 
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
 time_ns_t Task::restart_instant(const Participant& place) const noexcept {
   if (place.start_clock_ns) return next_instant(place.start_clock_ns);
   const time_ns_t earliest =
-      event_settled_ ? place.pending_ns : clock_->now_ns();  // an event may come any time
+      machine_.is_settled() ? place.pending_ns : clock().now_ns();  // an event may come any time
   return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
 }
 
 void Task::continue_after(Participant& place) noexcept {
   const Commit& commit = *place.commit;
-  const std::uint32_t wait_name = current_.load(std::memory_order_relaxed);
-  if (ring_ != nullptr) ring_->push_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
+  const std::uint32_t wait_name = machine_.state_name();
+  machine_.trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
   for (const CommitAction* action : commit.actions()) {
     if (action->task != this || action->trace_id() == 0) continue;  // another component's, or a mere check
-    trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
-    if (commit.committed()) trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
+    machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
+    if (commit.committed())
+      machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
   }
   const bool committed = commit.committed();
   if (committed && place.epoch_ns != nullptr) {
-    place.shift_ns = resynchronise(*place.epoch_ns);
-    if (place.afterwards == Afterwards::go_on) trace_deployment();
+    place.shift_ns = machine_.resynchronise(*place.epoch_ns);
+    if (place.afterwards == Afterwards::go_on) machine_.trace_deployment();
   }
   if (committed && place.afterwards != Afterwards::stop) {
     if (place.afterwards == Afterwards::restart) start_machine(restart_instant(place));
     place.grid = grid();
-    place.grid_place_ns = grid_place_ns_;
+    place.grid_place_ns = machine_.grid_place_ns();
     if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
       earlier->released.store(Participant::kSuperseded, std::memory_order_release);
       futex_wake_all(earlier->released);
     }
   }
-  place.armed_ns = boundary_ns_ = clock_->now_ns();
+  place.armed_ns = machine_.look_at_clock();
   const bool ends = committed && place.afterwards == Afterwards::stop;
   const std::int64_t lost = ends ? 0 : skip_lost(place, place.armed_ns);
   place.resumes_ns = due_ns();
-  trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
+  machine_.trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
   if (ends) park_stopped();
 }
 
 void Task::hold_parked(Participant& place) const noexcept {
-  place.parked_ns = place.armed_ns = clock_->now_ns();
+  place.parked_ns = place.armed_ns = clock().now_ns();
   if (place.in_flight) place.pending_ns = due_ns();
 }
 
 void Task::finish_parked(Participant& place, bool committed) noexcept {
   if (place.in_flight) {
     continue_after(place);
-    return clock_->due_changed(*this);
+    return clock().due_changed(*this);
   }
   if (committed && place.epoch_ns != nullptr) join(*place.epoch_ns);
   const bool can_start =
@@ -184,19 +178,6 @@ void Task::finish_parked(Participant& place, bool committed) noexcept {
     post_start(next_instant(place.start_clock_ns));
     wait_started();
   }
-}
-
-/// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
-/// instants come closer together. Returns by how much: less than a period.
-time_ns_t Task::resynchronise(time_ns_t epoch_ns) noexcept {
-  join(epoch_ns);
-  const Grid now = grid();
-  if (now.period_ns == 0 || clock_ns() == kForever) return 0;
-  const time_ns_t initial_ns =
-      clock_ns() - grid_place_ns_;  // the initial state is entered there, or whole periods off
-  const time_ns_t shift = now.first_not_before(initial_ns) - initial_ns;
-  set_clock_ns(clock_ns() + shift);
-  return shift;
 }
 
 void Task::refuse_commit() noexcept {

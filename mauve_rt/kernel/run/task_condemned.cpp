@@ -7,18 +7,9 @@
 
 namespace mauve {
 
-time_ns_t Task::earliest_excess_ns() const noexcept {
-  if (const auto execution = execution_.look()) return execution->end_ns();
-  const time_ns_t bound = wait_bound_ns_.load(std::memory_order_relaxed);
-  if (bound == 0) return kForever;
-  const std::optional<PresentState::Fact> fact = present_.look();
-  if (!fact || !fact->is_wait || fact->since_ns == 0) return kForever;
-  return ExecutionWord::end_ns(fact->since_ns, bound);
-}
-
 bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
-  const auto execution = execution_.look();
-  if (!execution || !execution->is_over(now_ns) || !execution_.condemn(*execution)) return false;
+  const auto execution = machine_.execution().look();
+  if (!execution || !execution->is_over(now_ns) || !machine_.execution().condemn(*execution)) return false;
   verdict_.bound_ns = execution->limit_ns;
   verdict_.when_ns = now_ns;
   carry_out_sentence();
@@ -26,10 +17,10 @@ bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
 }
 
 bool Task::condemn(std::string what, time_ns_t now_ns) {
-  const auto execution = execution_.look();
+  const auto execution = machine_.execution().look();
   if (!execution) return false;
   auto text = std::make_shared<const std::string>(std::move(what));
-  if (!execution_.condemn(*execution)) return false;
+  if (!machine_.execution().condemn(*execution)) return false;
   verdict_.what = std::move(text);
   verdict_.when_ns = now_ns;
   carry_out_sentence();
@@ -38,13 +29,13 @@ bool Task::condemn(std::string what, time_ns_t now_ns) {
 
 /// FAULTED first, so that whoever has to act can; then the processor for the others; then the outputs.
 void Task::carry_out_sentence() noexcept {
-  verdict_.where = current_.load(std::memory_order_relaxed);
+  verdict_.where = machine_.state_name();
   swap_fault(verdict_);  // the fault before this one stays there: a watchdog frees nothing
   publish_state(ComponentState::faulted);
   withdraw_commit();  // it cannot come to the gate any more
   if (has_thread_.load(std::memory_order_acquire)) {
     const sched_param ordinary{};
-    MAUVE_RT_TRUSTED(pthread_setschedparam(thread_, SCHED_OTHER, &ordinary));  // what a fault costs
+    MAUVE_RT_TRUSTED(pthread_setschedparam(thread_.handle(), SCHED_OTHER, &ordinary));  // what a fault costs
     demoted_ = true;
   }
   bool all_written = true;
@@ -54,7 +45,7 @@ void Task::carry_out_sentence() noexcept {
     outputs_.store(kLeft, std::memory_order_release);
     if (watchdog_ != nullptr) watchdog_->write_what_is_left();
   }
-  execution_.sentence();
+  machine_.execution().sentence();
 }
 
 bool Task::take_outputs_left() noexcept {
@@ -77,17 +68,17 @@ void Task::abandon() noexcept {
   control_.fetch_or(kExit, std::memory_order_acq_rel);
   std::uint32_t left = kLeft;
   outputs_.compare_exchange_strong(left, kAllWritten, std::memory_order_acq_rel);
-  execution_.abandon();
+  machine_.execution().abandon();
 }
 
 /// The thread's way out of a condemned execution.
 void Task::park_condemned() noexcept {
-  if (execution_.come_back()) {
+  if (machine_.execution().come_back()) {
     verdict_ = {};
     take_back_outputs();
     return end_in_fault();
   }
-  waiting_ = next_ = nullptr;  // removed meanwhile: kExit is set, and nobody is to hear of it
+  machine_.park();  // removed meanwhile: kExit is set, and nobody is to hear of it
   parked_.store(1, std::memory_order_release);
 }
 

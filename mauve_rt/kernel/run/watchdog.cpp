@@ -8,7 +8,7 @@
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/run/task.hpp"
 
-#include "base/thread_attributes.hpp"
+#include "base/touch_stack.hpp"
 
 namespace mauve {
 
@@ -24,18 +24,18 @@ constexpr time_ns_t kRetryOutputs = ms_to_ns(1);
 }  // namespace
 
 Watchdog::Watchdog() {
-  ThreadAttributes watching(kWatchStackBytes, kWatchPriority);
-  if (start_thread(watcher_, watching, &Watchdog::watch_entry, this) != 0)
+  const ThreadSettings watching{
+      .name = "watchdog", .priority = kWatchPriority, .stack_bytes = kWatchStackBytes};
+  if (watcher_.start(watching, &Watchdog::watch_entry, this) != 0)
     throw Error(ErrorCode::internal, "the system refuses the watchdog's thread");
-  ThreadAttributes writing(kWriterStackBytes, kWriterPriority);
-  if (start_thread(writer_, writing, &Watchdog::write_entry, this) != 0) {
+  const ThreadSettings writing{
+      .name = "safe outputs", .priority = kWriterPriority, .stack_bytes = kWriterStackBytes};
+  if (writer_.start(writing, &Watchdog::write_entry, this) != 0) {
     ending_.store(1, std::memory_order_release);
     wake();
-    pthread_join(watcher_, nullptr);
+    watcher_.join();
     throw Error(ErrorCode::internal, "the system refuses the thread that writes outputs for the watchdog");
   }
-  pthread_setname_np(watcher_, "watchdog");
-  pthread_setname_np(writer_, "safe outputs");
   runs_ = true;
 }
 
@@ -48,8 +48,8 @@ void Watchdog::stop() noexcept {
   wake();
   write_what_is_left();
   futex_wake_all(ending_);
-  pthread_join(watcher_, nullptr);
-  pthread_join(writer_, nullptr);
+  watcher_.join();
+  writer_.join();
 }
 
 void Watchdog::watch(Task& task) {

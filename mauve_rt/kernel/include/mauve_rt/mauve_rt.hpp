@@ -3,7 +3,6 @@
 #pragma once
 
 #include "mauve_rt/architecture/architecture.hpp"
-#include "mauve_rt/architecture/change_lock.hpp"
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/base/error.hpp"
@@ -34,5 +33,6 @@
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/parts/property.hpp"
 #include "mauve_rt/parts/shell.hpp"
+#include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/watchdog.hpp"

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/architecture/change_lock.hpp"
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {

@@ -16,7 +16,7 @@
 
 namespace mauve {
 
-class Task;
+class Waiter;
 
 inline constexpr time_ns_t kDefaultCallTimeout = ms_to_ns(100);
 
@@ -68,15 +68,15 @@ class ClientBase : public Resource {
   void end(std::uint32_t number, CallOutcome outcome, FunctionRef<void()> put);
 
  private:
-  void await(std::uint32_t number, time_ns_t until_ns, Task* caller) const noexcept;
+  void await(std::uint32_t number, time_ns_t until_ns, Waiter* caller) const noexcept;
   void count(CallOutcome outcome, time_ns_t lasted_ns) noexcept;
 
   const time_ns_t timeout_ns_;
   mutable PiMutex mutex_;
   std::uint32_t number_{0};
-  bool is_posted_{false};   // a request that was not taken yet
-  bool is_waiting_{false};  // a call is under way
-  Task* caller_{nullptr};   // nullptr: a thread that is no component's
+  bool is_posted_{false};    // a request that was not taken yet
+  bool is_waiting_{false};   // a call is under way
+  Waiter* caller_{nullptr};  // nullptr: a thread that is no component's
   CallOutcome outcome_{CallOutcome::answered};
   CallCounts counts_;
   std::atomic<std::uint32_t> ended_{0};  // the number of the last call that ended

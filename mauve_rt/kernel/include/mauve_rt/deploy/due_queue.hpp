@@ -7,18 +7,11 @@
 #include <vector>
 
 #include "mauve_rt/base/time.hpp"
+#include "mauve_rt/run/queue_place.hpp"
 
 namespace mauve {
 
 class Task;
-
-/// Where a task stands in its queue.
-struct QueuePlace {
-  static constexpr std::size_t kNone = SIZE_MAX;
-
-  std::size_t index{kNone};
-  bool is_late{false};  // which of the two heaps
-};
 
 /// The tasks of one virtual processor by when they can begin, then priority, then declaration. One thread.
 ///

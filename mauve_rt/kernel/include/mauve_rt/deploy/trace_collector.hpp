@@ -4,9 +4,9 @@
 
 #include <condition_variable>
 #include <mutex>
-#include <thread>
 
 #include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/base/threads.hpp"
 
 namespace mauve {
 
@@ -43,7 +43,7 @@ class TraceCollector {
   std::condition_variable end_;
   bool ending_{false};
   std::vector<TraceRecord> collected_;
-  std::thread thread_;  // last: it uses all others
+  Thread thread_;  // last: it uses all others
 };
 
 }  // namespace mauve

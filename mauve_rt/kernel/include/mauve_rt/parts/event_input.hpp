@@ -6,19 +6,18 @@
 #include <optional>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/data/resource.hpp"
 
 namespace mauve {
 
-class Task;
-
-/// Keeps the time of the first event not consumed yet, and wakes the task.
+/// Keeps the time of the first event not consumed yet, and wakes the component.
 ///
 /// | member    | written by                        | read by | order                                          |
 /// | --------- | --------------------------------- | ------- | ---------------------------------------------- |
 /// | time_     | writers, if empty; task empties   | task    | acq_rel: what was written before is visible    |
-/// | task_     | ordinary threads, the same again  | writers | relaxed: listening publishes it first          |
+/// | waiter_   | ordinary threads, the same again  | writers | relaxed: listening publishes it first          |
 /// | resource_ | ordinary threads, one at a time   | -       | -                                              |
 class EventInput final : public EventListener {
  public:
@@ -31,8 +30,8 @@ class EventInput final : public EventListener {
 
   /// [rt]
   const PortBase& port() const MAUVE_RT { return *port_; }
-  /// The task that it wakes; before it listens, and no other later. [non-rt]
-  void set_task(Task& task) noexcept { task_.store(&task, std::memory_order_relaxed); }
+  /// Whom it wakes; before it listens, and nobody else later. [non-rt]
+  void set_waiter(Waiter& waiter) noexcept { waiter_.store(&waiter, std::memory_order_relaxed); }
   /// Listens to the resource that the port is connected to now, and to no other. [non-rt]
   void listen();
   /// Listens to nothing from now on. [non-rt]
@@ -44,7 +43,7 @@ class EventInput final : public EventListener {
   static constexpr time_ns_t kNone = INT64_MIN;
 
   PortBase* port_;
-  std::atomic<Task*> task_{nullptr};
+  std::atomic<Waiter*> waiter_{nullptr};
   Resource* resource_{nullptr};
   std::atomic<time_ns_t> time_{kNone};
 };

@@ -2,14 +2,13 @@
 // A change to components that run: they meet in their waits, and the last to come makes it for all.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <exception>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "mauve_rt/base/threads.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/run/lent.hpp"
 
@@ -291,7 +290,7 @@ class Conductor {
   static void* entry(void* self) noexcept;
   void run() noexcept;
 
-  pthread_t thread_{};
+  Thread thread_;
   Commit* commit_{nullptr};
   time_ns_t timeout_ns_{0};
   Lent<Commit> under_way_;

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/architecture/change_lock.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {

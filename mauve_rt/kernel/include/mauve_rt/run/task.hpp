@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Task: runs one component's state machine on its grid, on a real-time thread of its own or in simulated time.
+// Task: one component's machine (machine.hpp) under command, on a real-time thread of its own or in simulated time.
 #pragma once
 
 #include <pthread.h>
@@ -11,16 +11,14 @@
 #include <string>
 #include <vector>
 
-#include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
-#include "mauve_rt/base/present_state.hpp"
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/statistics.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
-#include "mauve_rt/deploy/due_queue.hpp"
-#include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/run/commit.hpp"
-#include "mauve_rt/run/execution_word.hpp"
+#include "mauve_rt/run/machine.hpp"
+#include "mauve_rt/run/queue_place.hpp"
 #include "mauve_rt/run/task_settings.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
@@ -34,14 +32,6 @@ std::string_view to_string(ComponentState state) MAUVE_RT;
 constexpr ComponentState settled(ComponentState state) MAUVE_RT {
   return state == ComponentState::held ? ComponentState::running : state;
 }
-
-/// What the kernel gave the thread, read back from it.
-struct ThreadFacts {
-  std::string policy;
-  int priority{0};
-  std::vector<int> cpus;
-  std::size_t guard_bytes{0};  // below its stack
-};
 
 struct Fault {
   std::string what;
@@ -70,8 +60,11 @@ struct ChangeSignal {
 
 /// Runs one component.
 ///
-/// The machine goes from wait to wait: resume() ends a wait, runs the execution states after it and enters the next.
-/// A thread sleeps in between; in simulated time whoever simulates calls resume().
+/// The machine goes from wait to wait; the task is what lies around it: the thread, which sleeps in between, the commands,
+/// the gate of commits, the condemnation of what lasts too long. resume() takes up commands and steps the machine; in
+/// simulated time whoever simulates calls it.
+///
+/// "machine" is here whoever runs it: the component's thread, or a simulation.
 ///
 /// | member                 | written by                            | read by      | order                              |
 /// | ---------------------- | ------------------------------------- | ------------ | ---------------------------------- |
@@ -83,28 +76,22 @@ struct ChangeSignal {
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
-/// | current_               | machine                               | anyone       | relaxed: a lone fact               |
-/// | present_               | machine                               | anyone       | its own: present_state.hpp         |
-/// | execution_             | machine, who condemns, who removes    | all of these | its own: execution_word.hpp        |
-/// | wait_bound_ns_         | commanders, machine parked; commits   | watchdog     | relaxed: a hint when to look       |
 /// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
 /// | demoted_, verdict_     | who condemns, machine                 | machine      | execution_                         |
-/// | context_, statistics_  | machine                               | anyone       | relaxed: lone facts                |
-/// | shell_, fsm_, core_    | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
-/// | reference_ns_,         | the same                              | anyone       | relaxed: lone numbers              |
-/// | period_ns_             |                                       |              |                                    |
+/// | shell_, core_          | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
 /// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | condemns     |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
-/// | boundary_ns_ ...       | machine                               | machine      | its own                            |
+/// | machine_               | machine                               | machine      | its own: machine.hpp               |
+/// | deferrals_ ...         | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
 /// | command_mutex_         | ordinary threads: start, commits      | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
-class Task {
+class Task final : public Waiter {
  public:
   Task(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Task();
@@ -117,7 +104,7 @@ class Task {
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
   /// [rt]
   const TaskSettings& settings() const MAUVE_RT { return settings_; }
-  Context& context() MAUVE_RT { return context_; }
+  Context& context() MAUVE_RT { return machine_.context(); }
   /// What puts a fallback core in after a fault; nullptr: a fault is the end. [non-rt]
   void set_fallback(CommitAction* fallback) noexcept { fallback_.store(fallback, std::memory_order_release); }
   void set_fallen_back(bool fallen_back) noexcept {
@@ -146,20 +133,17 @@ class Task {
   bool is_simulated() const noexcept { return simulated_; }
   /// For the simulation's queue alone. [rt]
   QueuePlace& queue_place() MAUVE_RT { return queue_place_; }
-  const Clock& clock() const MAUVE_RT { return *clock_; }
+  const Clock& clock() const MAUVE_RT { return machine_.clock(); }
 
   /// One step of the machine: takes up commands; when its wait is over, runs to the next one. [rt] as far as the states are.
   void resume() noexcept;
   /// The instant that the wait under way ends at; kForever while parked. [rt], the machine's thread or a simulation.
-  time_ns_t due_ns() const MAUVE_RT;
+  time_ns_t due_ns() const MAUVE_RT { return machine_.due_ns(); }
 
   /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
-  time_ns_t join(time_ns_t epoch_ns) noexcept;
+  time_ns_t join(time_ns_t epoch_ns) noexcept { return machine_.join(epoch_ns); }
   /// The grid now; another commit may change it any moment. [rt]
-  Grid grid() const MAUVE_RT {
-    return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
-            .period_ns = period_ns_.load(std::memory_order_relaxed)};
-  }
+  Grid grid() const MAUVE_RT { return machine_.grid(); }
 
   /// Enters the initial state at exactly this instant; for deployment. Does not wait for the thread. [non-rt]
   void start_at(time_ns_t instant_ns);
@@ -175,7 +159,9 @@ class Task {
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
   void stop(time_ns_t timeout_ns = s_to_ns(1));
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
-  time_ns_t get_time() const MAUVE_RT { return context_.instant_ns.load(std::memory_order_relaxed); }
+  time_ns_t get_time() const MAUVE_RT {
+    return machine_.context().instant_ns.load(std::memory_order_relaxed);
+  }
 
   // ---- the task's side of a commit (commit.hpp)
 
@@ -188,7 +174,7 @@ class Task {
   void withdraw_commit() MAUVE_RT;
   /// Whether an event came that the wait under way waits for. [rt], the machine's thread
   bool has_event() const MAUVE_RT {
-    return !event_settled_ && (control_.load(std::memory_order_acquire) & kEvent) != 0;
+    return !machine_.is_settled() && (control_.load(std::memory_order_acquire) & kEvent) != 0;
   }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
@@ -209,34 +195,23 @@ class Task {
                                         const std::string& remedy) const;
 
   /// Tells the machine that an event it may wait for has come. [rt]
-  void signal_event() MAUVE_RT;
+  void signal_event() MAUVE_RT override;
 
   // ---- a wait within a state, for what another thread does
 
-  /// The task whose thread this is, or nullptr. [rt]
-  static Task* of_this_thread() MAUVE_RT;
-  /// The same, or the task whose states the calling thread runs now in a simulation. [rt]
+  /// The task whose thread this is, or whose states it runs now in a simulation, or nullptr. [rt]
   static const Task* executing_here() MAUVE_RT;
   /// By who runs a simulated task, around it; nullptr: none. [rt]
   static void set_simulated_here(const Task* task) MAUVE_RT;
-  /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
-  /// the task's thread. Who sets the word calls signal_awaited() then.
-  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) MAUVE_RT;
-  void signal_awaited() MAUVE_RT;
-  /// Whether the state under way is the last before a park. [rt]
-  bool is_to_stop() const MAUVE_RT {
+  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns)
+      MAUVE_RT override;
+  void signal_awaited() MAUVE_RT override;
+  bool is_to_stop() const MAUVE_RT override {
     return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   }
 
   // ---- watched executions (rule 11, execution_word.hpp)
 
-  /// What begins now is to last no longer than this. [rt], the machine's thread.
-  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
-    execution_.begin(began_ns, limit_ns);
-    if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
-  }
-  /// It has ended; false when it was condemned before: the thread goes to park_condemned() then. [rt], the same.
-  bool end_execution() MAUVE_RT { return execution_.end(); }
   /// Condemns the watched execution under way, whatever its bound - a state that declares one, or what the thread does and
   /// waits for at a commit's gate: tells FAULTED, takes the thread's priority away, then
   /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
@@ -245,20 +220,20 @@ class Task {
   bool condemn_if_over(time_ns_t now_ns) MAUVE_RT;
   /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
   /// thread wakes the watchdog itself. [rt]
-  time_ns_t earliest_excess_ns() const MAUVE_RT;
+  time_ns_t earliest_excess_ns() const MAUVE_RT { return machine_.earliest_excess_ns(); }
   /// Outputs that had to be left because of a lock: takes the right to write them; writes those that can be, all of them
   /// or not. [rt] as far as the resources are. By the watchdog's writer.
   bool take_outputs_left() noexcept;
   bool write_outputs_left() noexcept;
 
   /// A condemned execution's thread is not to come back from now on; false when it has. [rt], who removes the component.
-  bool claim() MAUVE_RT { return execution_.claim(); }
+  bool claim() MAUVE_RT { return machine_.execution().claim(); }
   /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
-  void give_up_claim() MAUVE_RT { execution_.give_up_claim(); }
+  void give_up_claim() MAUVE_RT { machine_.execution().give_up_claim(); }
   void abandon() MAUVE_RT;
-  bool is_abandoned() const MAUVE_RT { return execution_.is_abandoned(); }
+  bool is_abandoned() const MAUVE_RT { return machine_.execution().is_abandoned(); }
   /// Whether its thread still executes what it was condemned for. [rt]
-  bool is_left_behind() const MAUVE_RT { return execution_.is_condemned(); }
+  bool is_left_behind() const MAUVE_RT { return machine_.execution().is_condemned(); }
   /// What a person can do about a component whose thread does not come back. [rt]
   static constexpr const char* kLeftBehindRemedy =
       "its thread still executes: remove the component and add it anew, in one transaction";
@@ -287,7 +262,7 @@ class Task {
   /// The last fault, also of a core that a fallback has replaced; empty when there was none. [non-rt]
   Fault fault() const;
   const ThreadFacts& facts() const noexcept { return facts_; }
-  const TaskStatistics& statistics() const noexcept { return statistics_; }
+  const TaskStatistics& statistics() const noexcept { return machine_.statistics(); }
   /// What the thread allocated, and its page faults, since its last start. [rt]
   const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
@@ -317,22 +292,13 @@ class Task {
   static void* thread_entry(void* self) noexcept;
   void thread_main() noexcept;
   bool must_act(std::uint32_t control) noexcept;
-  void read_back_thread();
 
-  // the machine
+  // its steps around the machine's
   void take_up_start() noexcept;
   void start_machine(time_ns_t instant_ns) noexcept;
-  void warm_up() noexcept;
   void run_to_next_wait();
-  const State* execute(const State& state);
   void step();
-  const State* successor(const State& state) const;
-  const State* leave_wait();
-  static void check_locks(int held_before);
-  void enter_wait(const State& state);
-  void tell_wait() noexcept;
   void settle_event() noexcept;
-  void handle_overrun(const State& state, time_ns_t now_ns);
   void release(time_ns_t actual_ns) noexcept;
   time_ns_t leaves_gate_at(const Participant& place) const noexcept;
   bool may_commit_now() noexcept;
@@ -343,8 +309,6 @@ class Task {
   std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
   void exchange_state(ComponentState from, ComponentState to) noexcept;
   void continue_after(Participant& place) noexcept;
-  time_ns_t resynchronise(time_ns_t epoch_ns) noexcept;
-  void trace_deployment() noexcept;
   void refuse_commit() noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
@@ -357,39 +321,21 @@ class Task {
   void fall_back(CommitAction& fallback) noexcept;
   void publish_state(ComponentState state) MAUVE_RT;
 
-  void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
-             std::int64_t c = 0) noexcept {
-    if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
-  }
-  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
-                std::int64_t c = 0) noexcept {
-    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
-  }
-  time_ns_t clock_ns() const noexcept { return context_.clock_ns.load(std::memory_order_relaxed); }
-  void set_clock_ns(time_ns_t instant) noexcept {
-    context_.clock_ns.store(instant, std::memory_order_relaxed);
-  }
-
   std::string name_;
   std::uint16_t number_;
   ChangeSignal& changes_;
-  const Clock* clock_;
   TaskSettings settings_;
-  Context context_;
-  TaskStatistics statistics_;
+  Machine machine_{settings_};
   ThreadCounters counters_;
   std::mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
 
   Shell* shell_{nullptr};
-  const FsmBase* fsm_{nullptr};
   CoreBinding* core_{nullptr};
-  std::atomic<time_ns_t> reference_ns_{0};
-  std::atomic<time_ns_t> period_ns_{0};
 
   std::mutex command_mutex_;
   PiMutex order_mutex_;
-  pthread_t thread_{};
+  Thread thread_;
   pthread_barrier_t* barrier_{nullptr};
   std::atomic<bool> has_thread_{false};
   bool simulated_{false};
@@ -410,30 +356,17 @@ class Task {
   std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
   Lent<Participant> place_;
   time_ns_t start_at_ns_{0};
-  std::atomic<std::uint32_t> current_{0};  // the state's name in the trace; 0: none yet
-  ExecutionWord execution_;
-  std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
   std::atomic<std::uint32_t> outputs_{kAllWritten};
   std::atomic<Participant*> awaiting_release_{nullptr};
   std::atomic<CommitAction*> fallback_{nullptr};
   std::atomic<bool> fallen_back_{false};
-  PresentState present_;
 
   // the machine's own
-  const State* waiting_{
-      nullptr};  // the state it waits in; the initial one before its first release; nullptr: parked
-  const State* next_{nullptr};  // where a start goes on; nullptr: the wait's guards tell when it has ended
-  QueuePlace queue_place_{};    // of a simulated one
-  time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
-  bool event_settled_{true};    // whether the wait's end is fixed: no event is waited for, or it has come
-  time_ns_t boundary_ns_{0};    // when the last state, commit or wait ended, read once
-  int deferrals_{0};            // releases a commit was put off for want of time
-  time_ns_t grid_place_ns_{
-      0};                  // where the instant pending belongs: the waits since the initial state, modulo g
-  bool in_resume_{false};  // its code is on some stack: what it calls must not resume it
-  bool is_cold_{false};    // started, and not woken ahead of its first release yet
-  bool left_gate_{false};  // it came to the gate in this wait, and left for its instant
+  QueuePlace queue_place_{};  // of a simulated one
+  int deferrals_{0};          // releases a commit was put off for want of time
+  bool in_resume_{false};     // its code is on some stack: what it calls must not resume it
+  bool left_gate_{false};     // it came to the gate in this wait, and left for its instant
   bool is_abandoned_{false};  // what it did or waited for at the gate lasted too long
   time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
 };

@@ -2,14 +2,13 @@
 // The watchdog: condemns states that last longer than they declared, while they last. It does not poll.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <cstdint>
 #include <vector>
 
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/threads.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -68,8 +67,8 @@ class Watchdog {
   Task* next_left(std::size_t& place) noexcept;
   void wake() MAUVE_RT;
 
-  pthread_t watcher_{};
-  pthread_t writer_{};
+  Thread watcher_;
+  Thread writer_;
   bool runs_{false};
   PiMutex tasks_mutex_;
   std::vector<Task*> tasks_;

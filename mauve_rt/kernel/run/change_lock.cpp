@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/architecture/change_lock.hpp"
+#include "mauve_rt/run/change_lock.hpp"
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/task.hpp"

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Machine: steps one component's fsm from wait to wait, on its grid. It has no thread and waits for nobody.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <optional>
+
+#include "mauve_rt/base/context.hpp"
+#include "mauve_rt/base/present_state.hpp"
+#include "mauve_rt/base/statistics.hpp"
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/run/execution_word.hpp"
+#include "mauve_rt/run/task_settings.hpp"
+#include "mauve_rt/run/watchdog.hpp"
+
+namespace mauve {
+
+/// An execution that has ended took longer than it declared.
+struct OverBound : std::exception {
+  explicit OverBound(time_ns_t bound) : bound_ns(bound) {}
+  time_ns_t bound_ns;
+};
+
+/// One component's fsm and where it is in it: the logical clock, the grid, what it counts, what it traces.
+///
+/// Whoever runs it - a task's thread, a simulation, a test - starts it, and when the wait under way is over releases it and
+/// enters one state after the other up to the next wait:
+///
+///     machine.start(instant);
+///     if (now >= machine.due_ns()) {
+///       machine.release(now);
+///       machine.leave_wait();
+///       while (machine.enter_next() == Machine::Entered::execution) {}
+///     }
+///
+/// What a state or a guard throws, a bound that was passed, and an overrun whose policy is fault, come out of the last two;
+/// whoever runs it parks it then.
+///
+/// | member                  | written by                                | read by    | order                           |
+/// | ----------------------- | ----------------------------------------- | ---------- | ------------------------------- |
+/// | fsm_, core_             | ordinary threads, parked; commits         | who runs it| parking; the commit's gate      |
+/// | clock_, ring_, watchdog_| the same, parked                          | who runs it| parking; the thread's creation  |
+/// | reference_ns_,          | the same; commits                         | anyone     | relaxed: lone numbers           |
+/// | period_ns_              |                                           |            |                                 |
+/// | wait_bound_ns_          | the same                                  | watchdog   | relaxed: a hint when to look    |
+/// | context_, statistics_   | who runs it                               | anyone     | relaxed: lone facts             |
+/// | current_                | who runs it                               | anyone     | relaxed: a lone fact            |
+/// | present_                | who runs it                               | anyone     | its own: present_state.hpp      |
+/// | execution_              | who runs it, who condemns, who removes    | all of them| its own: execution_word.hpp     |
+/// | waiting_ ...            | who runs it                               | who runs it| its own                         |
+class Machine {
+ public:
+  /// What enter_next() has entered.
+  enum class Entered : std::uint8_t {
+    execution,  // and left again: the next state is to be entered
+    wait,       // until due_ns(), or an event
+    condemned,  // an execution, and it was condemned before it ended
+  };
+
+  /// The settings are whoever runs it's, and may change while it is parked. [setup]
+  explicit Machine(const TaskSettings& settings) noexcept
+      : settings_(settings), clock_(&MonotonicClock::instance()) {}
+  Machine(const Machine&) = delete;
+  Machine& operator=(const Machine&) = delete;
+
+  // ---- what it runs: parked, or in a commit
+
+  /// [rt]
+  void set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
+  void set_clock(const Clock& clock) MAUVE_RT { clock_ = &clock; }
+  /// Where it traces; nullptr: nowhere. [rt]
+  void set_ring(TraceRing* ring) MAUVE_RT { ring_ = ring; }
+  /// Who is told of executions that have a bound; nullptr: nobody. [rt]
+  void set_watchdog(Watchdog* watchdog) MAUVE_RT { watchdog_ = watchdog; }
+  /// Counts the grid from the epoch; returns its first instant. [rt]
+  time_ns_t join(time_ns_t epoch_ns) MAUVE_RT;
+  /// The grid now; a commit may change it any moment. [rt], anyone
+  Grid grid() const MAUVE_RT {
+    return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
+            .period_ns = period_ns_.load(std::memory_order_relaxed)};
+  }
+
+  // ---- its steps, by who runs it
+
+  /// Waits for the initial state from now on, which is due at the instant. [rt]
+  void start(time_ns_t instant_ns) MAUVE_RT;
+  /// Gives up its place. [rt]
+  void park() MAUVE_RT;
+  /// Whether it was started and not parked since. [rt]
+  bool is_started() const MAUVE_RT { return waiting_ != nullptr; }
+  /// The instant that the wait under way ends at; kForever while parked. [rt]
+  time_ns_t due_ns() const MAUVE_RT;
+  /// The wait is over, at this instant. [rt]
+  void release(time_ns_t actual_ns) MAUVE_RT;
+  /// Asks the guards of the wait that was released where it leads. [rt] as far as the guards are
+  void leave_wait();
+  /// Enters the state that follows, an execution to its end. [rt] as far as the states are
+  Entered enter_next();
+  /// Takes an event that has come, if the wait under way is for one and has none yet. [rt]
+  void take_event() MAUVE_RT;
+  /// Whether the wait's end is fixed: it is for no event, or one has come. [rt]
+  bool is_settled() const MAUVE_RT { return event_settled_; }
+  /// Started, and not woken ahead of its first release yet. [rt]
+  bool is_cold() const MAUVE_RT { return is_cold_; }
+  /// Fetches what its next release needs. [rt]
+  void warm_up() MAUVE_RT;
+
+  // ---- its part in a change that is made in its wait
+
+  /// What begins now is to last no longer than this. [rt]
+  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT;
+  /// It has ended; false when it was condemned before. [rt]
+  bool end_execution() MAUVE_RT { return execution_.end(); }
+  /// Reads the clock for what follows. [rt]
+  time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
+  /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less
+  /// than a period is released late, as after any wait, unless it may be missed. [rt]
+  std::int64_t skip_lost(time_ns_t held_since_ns, bool may_miss, time_ns_t now_ns) MAUVE_RT;
+  /// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
+  /// instants come closer together. Returns by how much: less than a period. [rt]
+  time_ns_t resynchronise(time_ns_t epoch_ns) MAUVE_RT;
+  /// Where the instant pending belongs: the waits since the initial state, modulo g. [rt]
+  time_ns_t grid_place_ns() const MAUVE_RT { return grid_place_ns_; }
+  /// The present state's name in the trace; 0: none yet. [rt], anyone
+  std::uint32_t state_name() const MAUVE_RT { return current_.load(std::memory_order_relaxed); }
+  /// Tells the present wait anew. [rt]
+  void tell_wait() MAUVE_RT;
+
+  // ---- its trace
+
+  /// [rt]
+  void trace(TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0, std::int64_t b = 0,
+             std::int64_t c = 0) MAUVE_RT {
+    if (ring_ != nullptr) ring_->push(kind, name, a, b, c);
+  }
+  void trace_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name, std::int64_t a = 0, std::int64_t b = 0,
+                std::int64_t c = 0) MAUVE_RT {
+    if (ring_ != nullptr) ring_->push_at(time_ns, kind, name, a, b, c);
+  }
+  void trace_deployment() MAUVE_RT;
+
+  // ---- what anyone may ask
+
+  /// [rt]
+  const Clock& clock() const MAUVE_RT { return *clock_; }
+  Context& context() MAUVE_RT { return context_; }
+  const Context& context() const MAUVE_RT { return context_; }
+  /// The logical clock. [rt]
+  time_ns_t clock_ns() const MAUVE_RT { return context_.clock_ns.load(std::memory_order_relaxed); }
+  const TaskStatistics& statistics() const MAUVE_RT { return statistics_; }
+  const PresentState& present() const MAUVE_RT { return present_; }
+  /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: it wakes
+  /// the watchdog itself. [rt]
+  time_ns_t earliest_excess_ns() const MAUVE_RT;
+  /// For who condemns it. [rt]
+  ExecutionWord& execution() MAUVE_RT { return execution_; }
+  const ExecutionWord& execution() const MAUVE_RT { return execution_; }
+
+ private:
+  bool execute(const State& state);
+  const State* successor(const State& state) const;
+  void enter_wait(const State& state);
+  void handle_overrun(const State& state, time_ns_t now_ns);
+  void set_clock_ns(time_ns_t instant) noexcept {
+    context_.clock_ns.store(instant, std::memory_order_relaxed);
+  }
+
+  const TaskSettings& settings_;
+  const Clock* clock_;
+  Watchdog* watchdog_{nullptr};
+  TraceRing* ring_{nullptr};
+  const FsmBase* fsm_{nullptr};
+  CoreBinding* core_{nullptr};
+  std::atomic<time_ns_t> reference_ns_{0};
+  std::atomic<time_ns_t> period_ns_{0};
+  std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
+
+  Context context_;
+  TaskStatistics statistics_;
+  std::atomic<std::uint32_t> current_{0};
+  ExecutionWord execution_;
+  PresentState present_;
+
+  // The state it waits in; the initial one before its first release; nullptr: parked.
+  const State* waiting_{nullptr};
+  const State* next_{nullptr};  // the one to be entered; nullptr: the wait's guards tell when it has ended
+  time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
+  bool event_settled_{true};
+  bool is_cold_{false};
+  time_ns_t boundary_ns_{0};  // when the last state, commit or wait ended, read once
+  time_ns_t grid_place_ns_{0};
+};
+
+}  // namespace mauve

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The steps of a machine. Everything between a start and a park is real-time code.
+#include "mauve_rt/run/machine.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// A component that waits holds no lock, and none was taken twice on the way. Lets go of the lock first: others may wait.
+void check_locks(int held_before) {
+  if (PiMutex::was_misused_by_this_thread())
+    throw std::logic_error("a lock was taken twice by its holder, or let go by who did not hold it");
+  if (PiMutex::held_by_this_thread() <= held_before) return;
+  PiMutex::let_go_of_all_but(held_before);
+  throw std::logic_error("a lock is still held at the end of the state");
+}
+
+}  // namespace
+
+void Machine::set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
+  fsm_ = &fsm;
+  core_ = core;
+  period_ns_.store(period_ns, std::memory_order_relaxed);
+  context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
+  // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
+  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
+}
+
+time_ns_t Machine::join(time_ns_t epoch_ns) noexcept {
+  const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
+  reference_ns_.store(first_ns, std::memory_order_relaxed);
+  return first_ns;
+}
+
+void Machine::start(time_ns_t instant_ns) noexcept {
+  waiting_ = next_ = &fsm_->initial();
+  is_cold_ = true;
+  event_settled_ = true;
+  set_clock_ns(instant_ns);
+  grid_place_ns_ = 0;
+  current_.store(waiting_->trace_id, std::memory_order_relaxed);
+  tell_wait();
+}
+
+void Machine::park() noexcept {
+  waiting_ = next_ = nullptr;
+  present_.tell({.name = state_name()});
+}
+
+time_ns_t Machine::due_ns() const noexcept {
+  if (waiting_ == nullptr) return kForever;
+  return event_settled_ ? clock_ns() : later_by(wait_from_ns_, waiting_->duration_ns);
+}
+
+void Machine::release(time_ns_t actual_ns) noexcept {
+  if (!event_settled_) set_clock_ns(due_ns());  // the time is up, and no event has come
+  event_settled_ = true;
+  statistics_.releases.fetch_add(1, std::memory_order_relaxed);
+  statistics_.wakeup.record(actual_ns - clock_ns());
+  boundary_ns_ = actual_ns;
+  trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns, grid_place_ns_);
+}
+
+Machine::Entered Machine::enter_next() {
+  const State& state = *next_;
+  if (&state == &fsm_->initial()) context_.instant_ns.store(clock_ns(), std::memory_order_relaxed);
+  current_.store(state.trace_id, std::memory_order_relaxed);
+  if (!state.is_wait) return execute(state) ? Entered::execution : Entered::condemned;
+  enter_wait(state);
+  return Entered::wait;
+}
+
+/// False when it was condemned before it ended.
+bool Machine::execute(const State& state) {
+  const time_ns_t began = boundary_ns_;
+  present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
+  trace_at(began, TraceKind::state_begin, state.trace_id);
+  if (state.max_execution_ns != 0) begin_execution(began, state.max_execution_ns);
+  const auto& methods = fsm_->methods();
+  const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
+  methods[state.action].run(*core_);
+  next_ = successor(state);
+  clock_->spend(state.simulated_ns());
+  boundary_ns_ = clock_->now_ns();
+  const bool was_condemned = state.max_execution_ns != 0 && !end_execution();
+  trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
+  state.execution_time->record(boundary_ns_ - began);
+  check_locks(held_before);
+  if (was_condemned) return false;
+  if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
+    throw OverBound(state.max_execution_ns);
+  return true;
+}
+
+/// Where the state leads: where its first transition does whose guard holds.
+const State* Machine::successor(const State& state) const {
+  const auto& methods = fsm_->methods();
+  for (const Transition& transition : state.transitions) {
+    if (methods[transition.guard].test(*core_)) return transition.to;
+  }
+  return state.next;
+}
+
+void Machine::leave_wait() {
+  if (next_ != nullptr) return;  // just started: it goes on in the initial state itself
+  if (waiting_->transitions.empty()) {
+    next_ = waiting_->next;
+    return;
+  }
+  present_.tell({.since_ns = boundary_ns_, .name = waiting_->trace_id});
+  const auto held_before = PiMutex::held_by_this_thread();
+  next_ = successor(*waiting_);
+  check_locks(held_before);
+  boundary_ns_ = clock_->now_ns();
+}
+
+void Machine::enter_wait(const State& state) {
+  waiting_ = &state;
+  next_ = nullptr;
+  if (state.event == nullptr) {
+    set_clock_ns(later_by(clock_ns(), state.duration_ns));
+    if (const time_ns_t period = grid().period_ns; period != 0) {
+      grid_place_ns_ += state.duration_ns % period;
+      if (grid_place_ns_ >= period) grid_place_ns_ -= period;
+    }
+    trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
+    if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
+    return tell_wait();
+  }
+  wait_from_ns_ = clock_ns();
+  event_settled_ = false;
+  trace_at(boundary_ns_, TraceKind::wait, state.trace_id, due_ns());
+  take_event();  // one may have come meanwhile
+  if (!event_settled_ && boundary_ns_ > due_ns()) {
+    set_clock_ns(due_ns());
+    event_settled_ = true;
+    handle_overrun(state, boundary_ns_);
+  }
+  tell_wait();
+}
+
+void Machine::tell_wait() noexcept {
+  present_.tell({.since_ns = due_ns(), .name = waiting_->trace_id, .is_wait = true});
+}
+
+/// An event fixes the end of the wait: not before min_interarrival has passed since the last release.
+void Machine::take_event() noexcept {
+  if (event_settled_) return;
+  const std::optional<time_ns_t> came = waiting_->event->consume();
+  if (!came) return;
+  set_clock_ns(std::max(wait_from_ns_ + waiting_->min_interarrival_ns, *came));
+  event_settled_ = true;
+  tell_wait();
+}
+
+void Machine::handle_overrun(const State& state, time_ns_t now_ns) {
+  const time_ns_t missed = clock_ns();
+  const time_ns_t period = grid().period_ns;
+  statistics_.overruns.fetch_add(1, std::memory_order_relaxed);
+  std::int64_t skipped = 0;
+  if (settings_.overrun == OverrunPolicy::skip) {
+    if (period == 0) {
+      set_clock_ns(now_ns);  // a sporadic component has no grid to keep
+    } else {
+      skipped = (now_ns - missed + period - 1) / period;
+      set_clock_ns(missed + skipped * period);
+    }
+    statistics_.skipped.fetch_add(static_cast<std::uint64_t>(skipped), std::memory_order_relaxed);
+  }
+  trace(TraceKind::overrun, state.trace_id, missed, now_ns, skipped);
+  if (settings_.overrun == OverrunPolicy::fault) throw std::runtime_error("overrun, and its policy is fault");
+  if (settings_.overrun == OverrunPolicy::catch_up && period != 0 &&
+      (now_ns - missed) / period + 1 > settings_.max_backlog) {
+    throw std::runtime_error("overrun: more instants are owed than max_backlog allows");
+  }
+}
+
+void Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+  execution_.begin(began_ns, limit_ns);
+  if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
+}
+
+time_ns_t Machine::earliest_excess_ns() const noexcept {
+  if (const auto execution = execution_.look()) return execution->end_ns();
+  const time_ns_t bound = wait_bound_ns_.load(std::memory_order_relaxed);
+  if (bound == 0) return kForever;
+  const std::optional<PresentState::Fact> fact = present_.look();
+  if (!fact || !fact->is_wait || fact->since_ns == 0) return kForever;
+  return ExecutionWord::end_ns(fact->since_ns, bound);
+}
+
+std::int64_t Machine::skip_lost(time_ns_t held_since_ns, bool may_miss, time_ns_t now_ns) noexcept {
+  const time_ns_t period = grid().period_ns;
+  const time_ns_t late = now_ns - clock_ns();
+  if (!event_settled_ || period == 0 || late <= 0 || held_since_ns > clock_ns()) return 0;
+  if (late < period && !may_miss) return 0;
+  const std::int64_t lost = (late + period - 1) / period;
+  set_clock_ns(clock_ns() + lost * period);
+  return lost;
+}
+
+time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {
+  join(epoch_ns);
+  const Grid now = grid();
+  if (now.period_ns == 0 || clock_ns() == kForever) return 0;
+  const time_ns_t initial_ns =
+      clock_ns() - grid_place_ns_;  // the initial state is entered there, or whole periods off
+  const time_ns_t shift = now.first_not_before(initial_ns) - initial_ns;
+  set_clock_ns(clock_ns() + shift);
+  return shift;
+}
+
+void Machine::trace_deployment() noexcept {
+  const Grid now = grid();
+  trace(TraceKind::deployment, 0, now.reference_ns - settings_.offset_ns, settings_.offset_ns, now.period_ns);
+}
+
+void Machine::warm_up() noexcept {
+  is_cold_ = false;
+  const auto fetch = [](const auto* object) {
+    constexpr std::size_t kCacheLine = 64;
+    const auto* bytes = reinterpret_cast<const std::byte*>(object);
+    for (std::size_t at = 0; at < sizeof(*object); at += kCacheLine) __builtin_prefetch(bytes + at, 1);
+  };
+  fetch(this);
+  if (ring_ != nullptr) ring_->warm_up();
+  for (const auto& state : fsm_->states()) {
+    fetch(state.get());
+    if (state->execution_time != nullptr) fetch(state->execution_time);
+  }
+}
+
+}  // namespace mauve

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A task's steps around its machine's: commands, events, faults. Everything between a start and a park is real-time code.
+#include <stdexcept>
+#include <utility>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/run/task.hpp"
+
+namespace mauve {
+
+void Task::resume() noexcept {
+  if (in_resume_) return;  // in virtual time a state may stop its own component, or raise an event for it
+  in_resume_ = true;
+  const auto held_before = PiMutex::held_by_this_thread();
+  PiMutex::was_misused_by_this_thread();  // what others did on a simulation's thread is not this component's
+  try {
+    step();
+  } catch (const OverBound& failure) {
+    park_faulted(nullptr, failure.bound_ns);
+  } catch (const std::exception& failure) {
+    PiMutex::let_go_of_all_but(held_before);
+    park_faulted(failure.what());
+  } catch (...) {
+    PiMutex::let_go_of_all_but(held_before);
+    park_faulted("an exception that is no std::exception");
+  }
+  in_resume_ = false;
+  if (simulated_) clock().due_changed(*this);
+}
+
+void Task::step() {
+  if (!machine_.is_started()) return take_up_start();
+  const std::uint32_t control = control_.load(std::memory_order_acquire);
+  if ((control & kStop) != 0) return park_stopped();
+  if ((control & kCommit) != 0 && may_commit_now()) {
+    come_to_commit();
+    if (std::exchange(is_abandoned_, false)) return park_condemned();
+    if (!machine_.is_started()) return;
+    machine_.tell_wait();
+  }
+  if ((control & kEvent) != 0) settle_event();
+  const time_ns_t now = clock().now_ns();
+  if (now < due_ns()) return;
+  release(now);
+  run_to_next_wait();
+}
+
+void Task::take_up_start() noexcept {
+  const std::uint32_t control = control_.load(std::memory_order_acquire);
+  if ((control & kCommit) != 0) refuse_commit();  // posted just before the park, too late for park() to see
+  if ((control & kStart) == 0) return;
+  control_.fetch_and(~kStart, std::memory_order_acq_rel);
+  if (!simulated_) counters_.mark();
+  regain_priority();
+  start_machine(start_at_ns_);
+  started_.store(1, std::memory_order_release);
+  futex_wake_all(started_);
+}
+
+void Task::start_machine(time_ns_t instant_ns) noexcept {
+  machine_.start(instant_ns);
+  parked_.store(0, std::memory_order_release);
+  publish_state(ComponentState::running);
+  machine_.trace_deployment();
+  machine_.trace(TraceKind::start, 0, instant_ns);
+}
+
+void Task::release(time_ns_t actual_ns) noexcept {
+  machine_.release(actual_ns);
+  if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) pass_commit();
+  left_gate_ = false;
+  if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
+  if (Participant* place = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
+    place->release_nominal_ns = machine_.clock_ns();
+    place->release_actual_ns = actual_ns;
+    place->released.store(Participant::kReleased, std::memory_order_release);
+    futex_wake_all(place->released);
+  }
+}
+
+void Task::run_to_next_wait() {
+  machine_.leave_wait();
+  for (;;) {
+    if ((control_.load(std::memory_order_acquire) & kStop) != 0) return park_stopped();
+    switch (machine_.enter_next()) {
+      case Machine::Entered::execution:
+        continue;
+      case Machine::Entered::wait:
+        if ((control_.load(std::memory_order_relaxed) & kEvent) != 0) settle_event();
+        return;
+      case Machine::Entered::condemned:
+        return park_condemned();
+    }
+  }
+}
+
+void Task::settle_event() noexcept {
+  if (machine_.is_settled()) return;
+  // The bit goes first: an event that comes after the look at its time sets it again and is not lost.
+  control_.fetch_and(~kEvent, std::memory_order_acq_rel);
+  machine_.take_event();
+}
+
+void Task::signal_event() noexcept {
+  const std::uint32_t before = control_.fetch_or(kEvent, std::memory_order_acq_rel);
+  if (simulated_) {
+    if (!machine_.is_started() || machine_.is_settled()) return;
+    settle_event();
+    clock().due_changed(*this);
+  } else if ((before & kEvent) == 0) {
+    futex_wake_all(control_);
+    if (place_.is_lent()) place_.use([](Participant& place) { place.commit->poke(); });
+  }
+}
+
+void Task::await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept {
+  for (;;) {
+    const std::uint32_t control = control_.load(std::memory_order_acquire);
+    if (word.load(std::memory_order_acquire) == number || (control & (kStop | kExit)) != 0) return;
+    if ((control & kAwaited) != 0) {
+      // Of an earlier wait, or the word was set since the look at it; cleared, the next signal changes control_.
+      control_.fetch_and(~kAwaited, std::memory_order_acq_rel);
+    } else if (!futex_wait_until(control_, control, until_ns)) {
+      return;
+    }
+  }
+}
+
+void Task::signal_awaited() noexcept {
+  control_.fetch_or(kAwaited, std::memory_order_acq_rel);
+  futex_wake_all(control_);
+}
+
+void Task::park_stopped() noexcept {
+  write_outputs(false);
+  machine_.trace(TraceKind::stop, machine_.state_name(), machine_.clock_ns());
+  park(ComponentState::stopped);
+}
+
+void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
+  if (!machine_.end_execution()) return park_condemned();
+  FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
+                 .bound_ns = bound_ns,
+                 .where = machine_.state_name(),
+                 .when_ns = clock().now_ns()};
+  swap_fault(note);
+  end_in_fault();
+}
+
+void Task::end_in_fault() noexcept {
+  machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
+  write_outputs(false);
+  const bool stays = (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
+  if (fallback == nullptr) return park(ComponentState::faulted);
+  // Not parked in between: nobody may take parts away that are put in this moment.
+  publish_state(ComponentState::faulted);
+  refuse_commit();
+  fall_back(*fallback);
+}
+
+void Task::fall_back(CommitAction& fallback) noexcept {
+  fallback.take();
+  machine_.trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
+  for (const auto& port : shell_->ports()) port->reopen();
+  regain_priority();
+  start_machine(next_instant(std::nullopt));
+}
+
+void Task::park(ComponentState state) noexcept {
+  machine_.park();
+  deferrals_ = 0;
+  left_gate_ = false;
+  overlong_ns_ = 0;
+  control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);
+  parked_.store(1, std::memory_order_release);
+  publish_state(state);
+  refuse_commit();  // last: who is refused finds the state that tells why
+}
+
+void Task::publish_state(ComponentState state) noexcept {
+  state_.store(static_cast<std::uint32_t>(state), std::memory_order_release);
+  futex_wake_all(state_);
+  changes_.bump();
+}
+
+}  // namespace mauve
