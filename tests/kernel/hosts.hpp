@@ -28,6 +28,11 @@ class OnThreads {
       wait_until(is_done, "the component's releases");
     }
   }
+  template <typename Condition>
+  void until(Condition&& condition, const char* what) {
+    wait_until(condition, what);
+  }
+  void shutdown() { deployer_.shutdown(); }
 
  private:
   static time_ns_t clock_of(Component& component) {
@@ -49,6 +54,16 @@ class InVirtualTime {
     return *host_;
   }
   void run_for(time_ns_t duration_ns) { simulation_.run_until(simulation_.now_ns() + duration_ns); }
+  /// Time passes while the test waits.
+  template <typename Condition>
+  void until(Condition&& condition, const char* what) {
+    const time_ns_t latest = simulation_.now_ns() + s_to_ns(60);
+    while (!condition()) {
+      ASSERT_LT(simulation_.now_ns(), latest) << "gave up waiting for: " << what;
+      run_for(us_to_ns(100));
+    }
+  }
+  void shutdown() { simulation_.shutdown(); }
 
  private:
   Architecture& architecture_;
@@ -128,6 +143,64 @@ class Hosted : public ::testing::Test {
   PluginRegistry registry;
   Architecture architecture{&registry};
   Way way{architecture};
+};
+
+/// What tests ask of a host of any kind, told shortly.
+template <typename Way>
+class AnyHost : public Way {
+ public:
+  using Way::Way;
+  Host& operator*() { return this->host(); }
+  void start(const std::string& name, std::optional<time_ns_t> clock_ns = {}) {
+    this->host().start(name, clock_ns);
+  }
+  void stop(const std::string& name, time_ns_t timeout_ns = s_to_ns(10)) {
+    this->host().stop(name, timeout_ns);
+  }
+  TransactionReport commit(Transaction transaction) {
+    return this->host().commit(std::move(transaction),
+                               {.timeouts = {.commit_ns = s_to_ns(30), .phase_ns = s_to_ns(30)}});
+  }
+  time_ns_t now_ns() { return this->host().now_ns(); }
+};
+
+/// An architecture on a host of any kind.
+template <typename Way>
+class OnBothHosts : public ::testing::Test {
+ protected:
+  ~OnBothHosts() override { host.shutdown(); }
+  Component& add(const std::string& name, std::int64_t period_ms = 1, const TaskSettings& settings = {}) {
+    Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name, settings);
+    component.set_property("period_ms", period_ms);
+    core(component).instants.reserve(10'000);
+    return component;
+  }
+  static TestCore& core(Component& component) { return component.core_as<TestCore>(); }
+  void deploy() {
+    architecture.configure();
+    (*host).deploy();
+  }
+  void wait_runs(Component& component, int runs) {
+    host.until([&] { return core(component).runs.load() >= runs; }, "the component to run");
+  }
+  void wait_state(Component& component, ComponentState state) {
+    host.until([&] { return settled(component.task().state()) == state; }, "the component's state");
+  }
+  /// The code of the error that the action throws; a failure when it throws none.
+  template <typename Action>
+  static ErrorCode code_of(Action&& action, std::string* text = nullptr) {
+    try {
+      action();
+    } catch (const Error& error) {
+      if (text != nullptr) *text = error.what();
+      return error.code();
+    }
+    ADD_FAILURE() << "it was not refused";
+    return ErrorCode::internal;
+  }
+
+  Architecture architecture;
+  AnyHost<Way> host{architecture};
 };
 
 }  // namespace mauve::testing

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A new common epoch for an architecture that runs.
-#include "both_hosts.hpp"
+#include "free_fsm.hpp"
+#include "hosts.hpp"
 
 namespace mauve::testing {
 namespace {
@@ -22,7 +23,7 @@ class Resynchronise : public OnBothHosts<Host> {
   }
   time_ns_t epoch_ns() const { return this->architecture.deployment_epoch_ns(); }
 };
-TYPED_TEST_SUITE(Resynchronise, BothHosts);
+TYPED_TEST_SUITE(Resynchronise, EveryHost, HostNames);
 
 TYPED_TEST(Resynchronise, AllGoOnOnTheGridsOfTheNewEpoch) {
   Component& fast = this->add("fast", 3);

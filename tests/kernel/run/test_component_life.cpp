@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The edges of a component's life: each works as it is documented, or is refused with a typed error, and nothing hangs.
-#include "both_hosts.hpp"
+#include "free_fsm.hpp"
+#include "hosts.hpp"
 
 namespace mauve::testing {
 namespace {
@@ -25,7 +26,7 @@ class ComponentLife : public OnBothHosts<Host> {
     EXPECT_EQ(ComponentState::stopped, component.task().state());
   }
 };
-TYPED_TEST_SUITE(ComponentLife, BothHosts);
+TYPED_TEST_SUITE(ComponentLife, EveryHost, HostNames);
 
 struct OtherShell : Shell {};
 struct OtherCore : Core<OtherShell> {};
@@ -74,7 +75,7 @@ TYPED_TEST(ComponentLife, AnArchitectureWithAnUnconfiguredCoreIsNotDeployed) {
   Component& component = this->add("c");
   this->architecture.configure();
   component.cleanup_core();
-  EXPECT_EQ(ErrorCode::not_configured, this->code_of([&] { this->host.deploy(this->architecture); }));
+  EXPECT_EQ(ErrorCode::not_configured, this->code_of([&] { (*this->host).deploy(); }));
   EXPECT_EQ(0, this->core(component).runs);
 }
 
@@ -113,50 +114,6 @@ TYPED_TEST(ComponentLife, AWaitForEverIsAPlaceToPutANewCoreIn) {
   EXPECT_TRUE(report.is_complete) << "no release follows that could be waited for";
   EXPECT_EQ(0, report.steps.front().missed_releases);
   EXPECT_EQ(ComponentState::running, settled(component.task().state()));
-}
-
-TEST(LongWaits, AreRefusedWhereTheirSumWouldOverflow) {
-  const auto two_of = [](time_ns_t length) {
-    return [=](FreeFsm& fsm) {
-      State& first = fsm.wait("First", length);
-      State& second = fsm.wait("Second", length + 1);
-      fsm.set_initial(first);
-      fsm.next(first, second);
-      fsm.next(second, first);
-    };
-  };
-  std::string text;
-  EXPECT_EQ(ErrorCode::bad_fsm, error_of(two_of(INT64_MAX / 2), &text));
-  EXPECT_THAT(text, HasSubstr("state Second"));
-  EXPECT_THAT(text, HasSubstr("kForever"));
-  EXPECT_EQ(2 * s_to_ns(86'400) + 1, period_of(two_of(s_to_ns(86'400))));
-}
-
-TEST(LongWaits, AGuardAfterAWaitForEverIsRefused) {
-  std::string text;
-  EXPECT_EQ(ErrorCode::bad_fsm, error_of(
-                                    [](FreeFsm& fsm) {
-                                      State& run = fsm.run("Run");
-                                      State& rest = fsm.wait("Rest", kForever);
-                                      fsm.set_initial(run);
-                                      fsm.next(run, rest);
-                                      fsm.when_set(rest, run);
-                                    },
-                                    &text));
-  EXPECT_THAT(text, HasSubstr("state Rest"));
-}
-
-TEST(LongWaits, TheGridKnowsNoOverflow) {
-  const Grid grid{.reference_ns = 1'000'003, .period_ns = 1'000};
-  for (const time_ns_t instant : {INT64_MIN, INT64_MIN + 1, time_ns_t{-7}, time_ns_t{0}, INT64_MAX - 2'000}) {
-    const time_ns_t next = grid.first_not_before(instant);
-    EXPECT_GE(next, instant);
-    EXPECT_LT(static_cast<std::uint64_t>(next) - static_cast<std::uint64_t>(instant), 1'000U);
-    EXPECT_EQ(0, grid.phase_error(next));
-  }
-  EXPECT_EQ(kForever, grid.first_not_before(INT64_MAX));
-  EXPECT_EQ(kForever, later_by(5, kForever));
-  EXPECT_EQ(INT64_MIN, later_by(-5, INT64_MIN));
 }
 
 // ---- guards on waits
@@ -392,54 +349,6 @@ TYPED_TEST(ComponentLife, ALockDestroyedOrLetGoUnheldIsAFault) {
   this->wait_state(unlocks, ComponentState::faulted);
   this->host.shutdown();
   EXPECT_EQ(0, PiMutex::held_by_this_thread());
-}
-
-// ---- names
-
-TEST(Names, FollowOneRuleEverywhere) {
-  const std::vector<std::string> bad{"",     "a b", "x/y.z", std::string(300, 'a'), "a\nb", "1a", "_a",
-                                     "a__b", "é",   "a-b"};
-  const auto code_of = [](const std::function<void()>& action) {
-    try {
-      action();
-    } catch (const Error& error) {
-      return error.code();
-    }
-    return ErrorCode::internal;
-  };
-  struct OfName : Shell {
-    OfName(const std::string& port, const std::string& given) {
-      read_port<Number>(port);
-      property(given, 1.0);
-    }
-  };
-  for (const std::string& name : bad) {
-    SCOPED_TRACE(name);
-    Architecture architecture;
-    constexpr ErrorCode kRefused = ErrorCode::invalid_argument;
-    EXPECT_EQ(kRefused, code_of([&] { architecture.add_component<TestShell, TestCore, TestFsm>(name); }));
-    EXPECT_EQ(kRefused, code_of([&] { architecture.add_resource<SharedData<Number>>(name); }));
-    EXPECT_TRUE(architecture.components().empty() && architecture.resources().empty());
-    EXPECT_EQ(kRefused, code_of([&] { OfName(name, "p"); }));
-    EXPECT_EQ(kRefused, code_of([&] { OfName("p", name); }));
-    EXPECT_EQ(kRefused, error_of([&](FreeFsm& fsm) { fsm.run(name); }));
-    architecture.configure();
-    Deployer deployer(architecture);
-    deployer.deploy();
-    EXPECT_EQ(kRefused, code_of([&] {
-                Transaction add;
-                add.add_component<TestShell, TestCore, TestFsm>(name);
-                deployer.commit(std::move(add));
-              }));
-    EXPECT_EQ(kRefused, code_of([&] {
-                Transaction add;
-                add.add_resource(name, std::make_unique<SharedData<Number>>());
-                deployer.commit(std::move(add));
-              }));
-  }
-  Architecture architecture;
-  architecture.add_component<TestShell, TestCore, TestFsm>(std::string(100, 'a'));
-  architecture.add_component<TestShell, TestCore, TestFsm>("Arm_2_");
 }
 
 // ---- instants
