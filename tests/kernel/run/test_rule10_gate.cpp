@@ -481,7 +481,9 @@ TEST_F(Rule10Gate, StopsStartsAndCommitsAtRandomPhasesAllEnd) {
   while (left > 0) {
     const auto refused = error_of(set_both(), {.timeouts = {.commit_ns = s_to_ns(20), .phase_ns = 0}});
     if (!refused) continue;
-    EXPECT_TRUE(refused->code() == ErrorCode::wrong_revision || refused->code() == ErrorCode::timeout)
+    // Adopt is late where who makes the change loses its processor.
+    EXPECT_TRUE(refused->code() == ErrorCode::wrong_revision || refused->code() == ErrorCode::timeout ||
+                refused->code() == ErrorCode::adopt_refused)
         << refused->what();
     std::this_thread::sleep_for(std::chrono::microseconds(100));
   }
@@ -490,7 +492,9 @@ TEST_F(Rule10Gate, StopsStartsAndCommitsAtRandomPhasesAllEnd) {
     if (component->task().state() == ComponentState::stopped) component->task().start();
     expect_going_on(*component);
   }
-  const auto refused = error_of(set_both(), kPatient);
+  TransactionOptions options = kPatient;
+  options.max_missed = 1000;  // on a busy machine they need not be in their waits together for long
+  const auto refused = error_of(set_both(), options);
   EXPECT_FALSE(refused) << refused->what();
 }
 
