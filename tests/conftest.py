@@ -1,22 +1,14 @@
-"""What stages share: how Hypothesis tries, and a small package of plug-ins, compiled once a session."""
+"""What stages share: a small package of plug-ins, compiled once a session."""
 
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
-
-sys.path.insert(0, str(Path(__file__).parent))  # for bag_rules
 
 from mauve_rt import _kernel
-
-# What an example may take depends on what else the machine does.
-settings.register_profile("mauve", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("mauve")
 
 PLUGINS = Path(__file__).parent / "plugins"
 INSTALLED = (

@@ -1,12 +1,13 @@
 """What README claims, and what fails when a claim is false.
 
-A claim is quoted in README's own words. Its proofs are tests, `stage/test_file.py::test_name` below tests/ or
-`Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows of scripts/bench, `bench: WORDS`.
+A claim is quoted in README's own words. Its proofs are tests, `stage/room/test_file.py::test_name` below
+tests/ or mauve_examples/tests/, or `Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows
+of scripts/bench, `bench: WORDS`.
 test_readme_claims.py holds this table to README and to what there is, and README to this table.
 """
 
-_REPORT = "python/test_trace_report"
-_KERNEL_ALONE = "python/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
+_REPORT = "python/trace/report/test"
+_KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
 
 CLAIMS: dict[str, tuple[str, ...]] = {
     # ---- the beginning
@@ -24,77 +25,79 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
     ),
     "replaces a component's algorithm in flight": (
-        "ros/test_executor_services.py::test_replace_core_in_flight_takes_over_the_count",
+        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
     "supervisor that degrades gracefully": (
-        "ros/test_supervisor_executor.py::test_a_core_is_replaced_in_flight_and_back",
+        "ros/supervisor/test_executor.py::test_a_core_is_replaced_in_flight_and_back",
     ),
     "rosbags from which timing is proved": (
-        "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
+        "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
     "A change has no component held past its next release": (
-        "ros/test_stop_wins.py::test_nobody_is_held_for_who_still_executes",
+        "ros/executor/test_stop_wins.py::test_nobody_is_held_for_who_still_executes",
     ),
     "where each may miss some for it, `--max-missed 2` says how many": (
         "Rule10Missed.AllowedReleasesAreSkippedAndReportedAndAreNoOverrun",
-        "python/test_cli.py::test_a_steps_file_may_allow_releases_to_be_missed",
+        "python/cli/test_verbs.py::test_a_steps_file_may_allow_releases_to_be_missed",
     ),
     "Whoever missed one is named in the outcome": (
-        "python/test_executor_control.py::test_releases_that_were_missed_are_in_the_message",
+        "python/control/test_control.py::test_releases_that_were_missed_are_in_the_message",
     ),
     "A stop waits for nobody": (
-        "ros/test_executor_beside.py::test_a_stop_by_reconfigure_waits_for_no_preparation",
-        "ros/test_executor_beside.py::test_a_stop_waits_for_no_stop_of_another_component",
+        "ros/executor/test_beside.py::test_a_stop_by_reconfigure_waits_for_no_preparation",
+        "ros/executor/test_beside.py::test_a_stop_waits_for_no_stop_of_another_component",
     ),
     "a change under way that the component takes part in is called off": (
-        "ros/test_stop_wins.py::test_a_stop_calls_off_a_commit_that_waits_for_another_component",
-        "ros/test_executor_beside.py::test_a_stop_of_its_own_component_calls_the_change_off",
+        "ros/executor/test_stop_wins.py::test_a_stop_calls_off_a_commit_that_waits_for_another_component",
+        "ros/executor/test_beside.py::test_a_stop_of_its_own_component_calls_the_change_off",
     ),
     "any other goes on beside it": (
-        "ros/test_executor_beside.py::test_stop_start_and_list_wait_for_no_preparation",
+        "ros/executor/test_beside.py::test_stop_start_and_list_wait_for_no_preparation",
     ),
     "Deactivation and the end of the process call all off, and who asked is told so": (
-        "ros/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
-        "ros/test_stop_wins.py::test_the_end_waits_for_no_change",
+        "ros/executor/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
+        "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
     "one that finds another under way for 10 s is refused": (
-        "ros/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
+        "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
     ),
     "a faulted component gets a new core": (
-        "ros/test_faulted_component.py::test_by_a_new_core_and_a_start",
-        "ros/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
-        "ros/test_faulted_component.py::test_by_the_command_line",
+        "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
+        "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
+        "ros/executor/test_faulted_component.py::test_by_the_command_line",
     ),
     # ---- two commands
-    "nothing comes by pip": ("python/test_package_xml.py::test_the_door_opens_with_rosdep_and_apt_alone",),
+    "nothing comes by pip": (
+        "python/project/test_package_xml.py::test_the_door_opens_with_rosdep_and_apt_alone",
+    ),
     "the Python packages of Ubuntu 24.04 do as they are": (
         "doors/test_apt_versions.py::test_a_run_is_started_changed_recorded_checked_and_reported",
     ),
-    "YAML 1.2, where `on` and `yes` are text": ("python/test_yaml_text.py::test_scalars_of_yaml_1_2",),
+    "YAML 1.2, where `on` and `yes` are text": ("python/yaml/test_text.py::test_scalars_of_yaml_1_2",),
     "system packages through apt": (
-        "python/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
+        "python/project/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
     ),
     "The first run takes a few minutes": (
-        "python/test_scripts.py::test_progress_says_how_far_what_and_how_long",
+        "python/project/test_scripts.py::test_progress_says_how_far_what_and_how_long",
     ),
     "A sourced ROS 2 Jazzy is used when there is one": (
-        "python/test_readme_scripts.py::test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one",
+        "python/project/test_readme_scripts.py::test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one",
     ),
     "otherwise they say which": (
-        "python/test_scripts.py::test_without_a_terminal_the_command_to_type_is_told",
+        "python/project/test_scripts.py::test_without_a_terminal_the_command_to_type_is_told",
     ),
     "sets everything up, builds, runs the mission, prints the story, writes the report": (
         "system/test_demo_mission.py::test_it_succeeds_and_says_so",
         "system/test_demo_mission.py::test_it_writes_what_it_promises",
     ),
     "scripts/test # sets everything up, builds, runs every test": (
-        "python/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
+        "python/project/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
     ),
     "`--help` of either answers at once": (
-        "python/test_scripts.py::test_help_needs_nothing_that_is_built_or_installed",
+        "python/project/test_scripts.py::test_help_needs_nothing_that_is_built_or_installed",
     ),
     "`scripts/setup` says what it needs before it begins": (
-        "python/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",
+        "python/project/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",
     ),
     "a package that uses any of them says `<depend>mauve_rt</depend>`": (
         "doors/test_colcon.py::test_who_depends_on_mauve_rt_has_the_messages",
@@ -135,7 +138,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     # ---- other ways in
     "then `rosdep install --from-paths src -i` and `colcon build`": (
         "doors/test_colcon.py::test_everything_is_where_ros_puts_it",
-        "python/test_package_xml.py::test_what_runs_is_listed_exactly",
+        "python/project/test_package_xml.py::test_what_runs_is_listed_exactly",
     ),
     "With pip, in a fresh virtual environment": (
         "doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",
@@ -144,40 +147,40 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "passes CMake options": ("doors/test_pip.py::test_environment_is_an_ament_prefix",),
     # ---- from another terminal
     "what runs, on which CPU, at which priority, connected to what": (
-        "python/test_list_view.py::test_what_runs_on_which_cpu_at_which_priority_and_its_cores",
-        "ros/test_executor_list.py::test_mauve_list_shows_what_is_connected",
+        "python/cli/test_list_view.py::test_what_runs_on_which_cpu_at_which_priority_and_its_cores",
+        "ros/cli/test_list.py::test_mauve_list_shows_what_is_connected",
     ),
     "mauve replace-core /robot_1/executor exploration mauve_examples/LocalExploration": (
-        "ros/test_executor_cli.py::test_verbs_do_what_they_say",
-        "python/test_readme_examples.py::test_every_command_is_one_that_mauve_takes",
+        "ros/cli/test_verbs.py::test_verbs_do_what_they_say",
+        "python/project/test_readme_examples.py::test_every_command_is_one_that_mauve_takes",
     ),
     "mauve reconfigure /robot_1/executor steps.yaml": (
-        "ros/test_executor_cli.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
-        "python/test_readme_examples.py::test_the_steps_fit_the_mission",
+        "ros/cli/test_verbs.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
+        "python/project/test_readme_examples.py::test_the_steps_fit_the_mission",
     ),
-    "mauve stop /robot_1/executor guidance": ("ros/test_executor_cli.py::test_verbs_do_what_they_say",),
-    "mauve start /robot_1/executor guidance": ("ros/test_executor_cli.py::test_verbs_do_what_they_say",),
-    "mauve events /robot_1/executor": ("ros/test_executor_cli.py::test_events_are_followed",),
+    "mauve stop /robot_1/executor guidance": ("ros/cli/test_verbs.py::test_verbs_do_what_they_say",),
+    "mauve start /robot_1/executor guidance": ("ros/cli/test_verbs.py::test_verbs_do_what_they_say",),
+    "mauve events /robot_1/executor": ("ros/cli/test_verbs.py::test_events_are_followed",),
     "every verb is one of `ros2 mauve` too": (
-        "ros/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
-        "python/test_ros2_entry_points.py::test_the_verbs_are_those_of_mauve",
+        "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
+        "python/cli/test_ros2_entry_points.py::test_the_verbs_are_those_of_mauve",
     ),
     "with completion, the same output and the same exit status": (
-        "ros/test_ros2_command.py::test_verbs_are_completed",
-        "ros/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
+        "ros/cli/test_ros2_command.py::test_verbs_are_completed",
+        "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
     ),
     "ros2 service call /robot_1/executor/replace_core mauve_msgs/srv/ReplaceCore": (
-        "python/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
+        "python/project/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
     ),
-    "are a YAML list of steps": ("python/test_readme_examples.py::test_the_steps_fit_the_mission",),
+    "are a YAML list of steps": ("python/project/test_readme_examples.py::test_the_steps_fit_the_mission",),
     "a report per step, or the step that failed and why": (
-        "ros/test_executor_cli.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
+        "ros/cli/test_verbs.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
     ),
     "`ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-p bag:=DIR]`": (
-        "ros/test_ros2_command.py::test_ros2_run_starts_an_executor",
+        "ros/cli/test_ros2_command.py::test_ros2_run_starts_an_executor",
     ),
     "Its interface is in `mauve_msgs`": (
-        "ros/test_executor_list.py::test_the_interface_is_the_one_that_readme_lists",
+        "ros/cli/test_list.py::test_the_interface_is_the_one_that_readme_lists",
     ),
     "with its supervisor and everything remapped as you like": (
         "ros/test_launch.py::test_an_executor_with_its_supervisor",
@@ -185,10 +188,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "ros2 launch mauve_rt executor.launch.py": ("ros/test_launch.py::test_an_executor_with_its_supervisor",),
     "ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office": (
         "ros/test_launch.py::test_the_mission_loses_its_link_and_gets_it_back",
-        "python/test_readme_examples.py::test_launch_arguments_are_declared",
+        "python/project/test_readme_examples.py::test_launch_arguments_are_declared",
     ),
     "`--show-args` lists all arguments": (
-        "python/test_launch_files.py::test_every_argument_is_declared_once_and_used",
+        "python/node/test_launch_files.py::test_every_argument_is_declared_once_and_used",
     ),
     "Both files are checked before anything starts": (
         "ros/test_launch.py::test_bad_arguments_start_nothing",
@@ -200,155 +203,159 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/test_names.py::test_a_supervisor_s_names_are_remapped",
     ),
     "is a parameter `<component>.<property>` of its executor, with type, unit, range and description": (
-        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+        "ros/executor/test_parameters.py::test_parameters_are_the_properties",
     ),
     "a change is checked and carried out by the kernel, all or none, and told on `~/events`": (
-        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+        "ros/executor/test_parameters.py::test_parameters_are_the_properties",
     ),
     "ros2 param set /robot_1/executor control.max_speed 0.5": (
-        "ros/test_executor_parameters.py::test_parameters_are_the_properties",
+        "ros/executor/test_parameters.py::test_parameters_are_the_properties",
     ),
     "--params-file robots.yaml": (
-        "python/test_executor_arguments.py::test_parameters_of_one_file_for_several_robots",
+        "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
     ),
     "A parameter file may have a section for each robot": (
-        "python/test_executor_arguments.py::test_parameters_of_one_file_for_several_robots",
+        "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
     ),
     "an unknown name or a bad value starts nothing and says why": (
-        "ros/test_executor_process.py::test_bad_parameters",
-        "python/test_executor_arguments.py::test_an_unknown_parameter_is_refused",
-        "python/test_executor_arguments.py::test_bad_properties",
+        "ros/executor/test_process.py::test_bad_parameters",
+        "python/node/test_arguments.py::test_an_unknown_parameter_is_refused",
+        "python/node/test_arguments.py::test_bad_properties",
     ),
     "What is read only once is read-only": (
-        "ros/test_executor_settings.py::test_what_is_read_once_is_read_only",
-        "ros/test_executor_settings.py::test_a_structural_property_is_set_beside_its_reader",
+        "ros/executor/test_settings.py::test_what_is_read_once_is_read_only",
+        "ros/executor/test_settings.py::test_a_structural_property_is_set_beside_its_reader",
     ),
-    "`executor --help` lists them": ("ros/test_executor_settings.py::test_help_starts_nothing",),
+    "`executor --help` lists them": ("ros/executor/test_settings.py::test_help_starts_nothing",),
     "set it in the transaction that replaces its reader": (
         "StructuralThreads.BesideTheFsmThatReadsItItTakesEffectInEitherOrder",
-        "ros/test_executor_settings.py::test_a_structural_property_is_set_beside_its_reader",
+        "ros/executor/test_settings.py::test_a_structural_property_is_set_beside_its_reader",
     ),
     "A state that does not end": (
-        "ros/test_executor_hung.py::test_a_hung_component_is_told_until_it_goes_on",
+        "ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",
     ),
     "What requests may take is limited by the executor's parameters": (
-        "ros/test_request_limits.py::test_memory_and_priority_that_requests_may_take",
-        "ros/test_request_limits.py::test_limits_are_parameters",
+        "ros/executor/test_request_limits.py::test_memory_and_priority_that_requests_may_take",
+        "ros/executor/test_request_limits.py::test_limits_are_parameters",
     ),
     "A port has to be connected unless its shell declares it optional": (
-        "ros/test_required_ports.py::test_a_required_port_stays_connected",
-        "python/test_misfits.py::test_an_unconnected_call_port_is_refused",
+        "ros/executor/test_required_ports.py::test_a_required_port_stays_connected",
+        "python/model/test_misfits.py::test_an_unconnected_call_port_is_refused",
     ),
     "which is held against that one field by field": (
-        "python/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
-        "python/test_misfits.py::test_a_services_response_is_held_against_the_service",
+        "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
+        "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
     ),
     "It has the executor check its rules when it arms them": (
-        "ros/test_supervisor_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
+        "ros/supervisor/test_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
     ),
     "undoes what a supervisor before it did": (
-        "ros/test_supervisor_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
+        "ros/supervisor/test_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
     ),
     "A class installed meanwhile is found": (
-        "ros/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
+        "ros/executor/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
     ),
     "Code that was rebuilt since the executor loaded it is refused": (
-        "ros/test_plugins_installed_anew.py::test_a_library_that_was_rebuilt_is_told",
-        "ros/test_plugins_installed_anew.py::test_a_python_module_that_was_changed_is_told",
+        "ros/executor/test_plugins_installed_anew.py::test_a_library_that_was_rebuilt_is_told",
+        "ros/executor/test_plugins_installed_anew.py::test_a_python_module_that_was_changed_is_told",
     ),
-    "The executor is a managed node": ("ros/test_executor_process.py::test_lifecycle_step_by_step",),
+    "The executor is a managed node": ("ros/executor/test_process.py::test_lifecycle_step_by_step",),
     "A transition that fails for a reason you can correct leaves everything as it was": (
-        "ros/test_executor_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
+        "ros/executor/test_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
     ),
     "`~/state` has the reason in `error`": (
-        "ros/test_executor_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
+        "ros/executor/test_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
     ),
     "`/diagnostics` warns from the figures on that the file names": (
-        "ros/test_executor_diagnostics.py::test_figures_are_held_against_the_thresholds_of_the_file",
-        "python/test_readme_examples.py::test_the_pieces_of_architecture_files_are_accepted",
+        "ros/executor/test_diagnostics.py::test_figures_are_held_against_the_thresholds_of_the_file",
+        "python/project/test_readme_examples.py::test_the_pieces_of_architecture_files_are_accepted",
     ),
     "stay on this machine unless `ROS_AUTOMATIC_DISCOVERY_RANGE` says otherwise": (
         "ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",
         "ros/test_discovery.py::test_another_machine_sees_an_executor_only_where_it_was_opened",
     ),
     # ---- record a run
-    "From the start with `-p bag:=DIR`": ("ros/test_executor_process.py::test_signal_seals_the_bag",),
-    "mauve record start": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
-    "mauve record stop": ("ros/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
+    "From the start with `-p bag:=DIR`": ("ros/executor/test_process.py::test_signal_seals_the_bag",),
+    "mauve record start": (
+        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    ),
+    "mauve record stop": (
+        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    ),
     "start_recording mauve_msgs/srv/StartRecording": (
-        "python/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
+        "python/project/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
     ),
     "every record of every component's thread, the messages of bound topics": (
-        "python/test_trace_recorder.py::test_records_and_words_are_in_the_bag",
-        "ros/test_executor_process.py::test_further_topics_are_recorded",
+        "python/trace/test_recorder.py::test_records_and_words_are_in_the_bag",
+        "ros/executor/test_process.py::test_further_topics_are_recorded",
     ),
     "all on one time base": (
-        "python/test_trace_recorder.py::test_messages_lie_on_the_time_base_of_the_records",
+        "python/trace/test_recorder.py::test_messages_lie_on_the_time_base_of_the_records",
     ),
     "with the definitions of all types": (
-        "python/test_trace_definitions.py::test_the_text_is_enough_to_read_the_message",
-        "python/test_trace_reader.py::test_a_bag_moved_elsewhere_needs_nothing_installed",
+        "python/trace/test_definitions.py::test_the_text_is_enough_to_read_the_message",
+        "python/trace/test_reader.py::test_a_bag_moved_elsewhere_needs_nothing_installed",
     ),
     "each of which can be read alone": (
-        "python/test_trace_repair.py::test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone",
+        "python/trace/test_repair.py::test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone",
     ),
     "Ten times a second it becomes a finished bag": (
-        "python/test_trace_bag.py::test_every_flush_leaves_a_finished_bag",
+        "python/trace/test_bag.py::test_every_flush_leaves_a_finished_bag",
     ),
     "after `kill -9`, whenever that comes": (
-        "python/test_trace_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
-        "ros/test_executor_process.py::test_killed_executor_leaves_a_bag_that_opens",
+        "python/trace/test_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
+        "ros/executor/test_process.py::test_killed_executor_leaves_a_bag_that_opens",
     ),
     "what is missing is less than the last 200 ms": (
         "bench: lost by kill -9 while recording 100,000 records a second, worst",
     ),
     "A full disk ends the recording, with an error on `/diagnostics`, never the executor": (
-        "ros/test_recording.py::test_a_full_disk_ends_the_recording_with_a_diagnostic",
+        "ros/executor/test_recording.py::test_a_full_disk_ends_the_recording_with_a_diagnostic",
     ),
     "Losses are counted in the bag, never silent": (
         "TraceRing.CountsWhatItCannotKeep",
-        "python/test_trace_recorder.py::test_what_exceeds_the_queue_is_dropped_and_counted",
-        "python/test_trace_reader.py::test_loss_is_known_from_sequences_and_counters",
+        "python/trace/test_recorder.py::test_what_exceeds_the_queue_is_dropped_and_counted",
+        "python/trace/test_reader.py::test_loss_is_known_from_sequences_and_counters",
     ),
-    "mauve trace info": ("python/test_trace_cli.py::test_info",),
-    "mauve trace check": ("python/test_trace_cli.py::test_check_tells_losses",),
-    "mauve trace repair": ("python/test_trace_cli.py::test_check_and_repair",),
-    "mauve trace stats": ("python/test_trace_cli.py::test_stats",),
+    "mauve trace info": ("python/cli/test_trace.py::test_info",),
+    "mauve trace check": ("python/cli/test_trace.py::test_check_tells_losses",),
+    "mauve trace repair": ("python/cli/test_trace.py::test_check_and_repair",),
+    "mauve trace stats": ("python/cli/test_trace.py::test_stats",),
     "mauve trace export": (
-        "python/test_trace_export.py::test_perfetto_is_the_default",
-        "python/test_trace_export.py::test_csv",
+        "python/cli/test_trace_export.py::test_perfetto_is_the_default",
+        "python/cli/test_trace_export.py::test_csv",
     ),
     "From Python, also of a bag that is being written, and of one that needs repair": (
-        "python/test_readme_examples.py::test_the_python_example_reads_a_bag",
-        "python/test_trace_reader.py::test_a_bag_cut_off_anywhere_gives_what_is_whole",
+        "python/project/test_readme_examples.py::test_the_python_example_reads_a_bag",
+        "python/trace/test_reader.py::test_a_bag_cut_off_anywhere_gives_what_is_whole",
     ),
     # ---- look at a run
     "mauve report DIR": (
-        "python/test_trace_report_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
+        "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
     ),
-    "mauve report bag": ("python/test_trace_report_page.py::test_bags_are_named_by_what_tells_them_apart",),
+    "mauve report bag": ("python/trace/report/test_page.py::test_bags_are_named_by_what_tells_them_apart",),
     "One page that needs no network and no server": (
-        "python/test_trace_report_page.py::test_a_page_needs_nothing_but_itself",
+        "python/trace/report/test_page.py::test_a_page_needs_nothing_but_itself",
     ),
     "It begins with a yes or a no": (
-        "python/test_trace_report_page.py::test_the_verdict_comes_first_then_the_tiles_then_the_rest",
+        "python/trace/report/test_page.py::test_the_verdict_comes_first_then_the_tiles_then_the_rest",
         f"{_REPORT}_verdict.py::test_overruns_that_a_stall_brought_about_are_told_apart_from_those_of_a_component",
     ),
     "a timeline to zoom from minutes to microseconds": (
         f"{_REPORT}_browser.py::test_a_view_goes_down_to_single_microseconds_and_no_further_than_the_trace",
-        "python/test_trace_report_browser.py::test_the_page_works_and_nobody_complains",
+        "python/trace/report/test_browser.py::test_the_page_works_and_nobody_complains",
     ),
     "it keeps every detail around what is interesting and merges the rest, and says so": (
-        "python/test_trace_report_data.py::test_the_neighbourhood_of_what_is_interesting_stays_whole",
-        "python/test_trace_report_browser.py::test_what_is_merged_says_so",
+        "python/trace/report/test_data.py::test_the_neighbourhood_of_what_is_interesting_stays_whole",
+        "python/trace/report/test_browser.py::test_what_is_merged_says_so",
     ),
     "mauve_rt.trace.report.write_report(": (
-        "python/test_readme_examples.py::test_the_report_is_written_from_python",
+        "python/project/test_readme_examples.py::test_the_report_is_written_from_python",
     ),
     # ---- concepts: components and time
     "All three are replaceable parts (`package/Class`)": (
         "Rule9Parts.AllThreePartsAndAnotherTwoBack",
-        "python/test_executor_control.py::test_all_parts_are_replaced_as_one",
+        "python/control/test_control.py::test_all_parts_are_replaced_as_one",
     ),
     "which take no logical time": ("Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",),
     "`wait(d)` adds d to the clock and sleeps until it": ("Rule1Clock.EachWaitAdvancesItByItsLength",),
@@ -382,51 +389,51 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "Kind and type have to be equal": ("PortsFixture.UnequalKindsAndTypesAreRefused",),
     "of any installed message type": (
-        "ros/test_bound_topics.py::test_a_type_nobody_registered_is_received_and_written",
+        "ros/bridge/test_topics.py::test_a_type_nobody_registered_is_received_and_written",
     ),
     "the messages travel in C++, the interpreter has no part in them": (
         "bench: CPU of an executor that sends ",
         "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
     ),
     "Names are relative to the executor's namespace": (
-        "ros/test_executor_list.py::test_resources_have_the_names_that_ros_sees",
+        "ros/cli/test_list.py::test_resources_have_the_names_that_ros_sees",
     ),
     "Quality of service is a profile's name or fields of your own": (
-        "ros/test_bound_topics.py::test_qualities_of_service_by_field_are_those_of_the_topic",
-        "ros/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
-        "python/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
+        "ros/bridge/test_topics.py::test_qualities_of_service_by_field_are_those_of_the_topic",
+        "ros/executor/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
+        "python/model/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
     ),
     "a file sets and checks it as a `ring_buffer`'s `capacity`": (
-        "python/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
-        "python/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
+        "python/model/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
+        "python/model/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
     ),
     "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
-        "ros/test_bound_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
+        "ros/bridge/test_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
     ),
     "counts what passed, what was refused": (
-        "ros/test_bound_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
-        "ros/test_bound_topics.py::test_missed_deadlines_are_counted",
+        "ros/bridge/test_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
+        "ros/bridge/test_topics.py::test_missed_deadlines_are_counted",
     ),
     "says when another node's type or quality of service does not fit": (
-        "ros/test_bound_topics.py::test_another_type_that_comes_to_the_topic_is_told",
-        "ros/test_bound_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
+        "ros/bridge/test_topics.py::test_another_type_that_comes_to_the_topic_is_told",
+        "ros/bridge/test_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
     ),
     "A thread of its own sends them: real-time, at the lowest priority": (
-        "ros/test_bound_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
+        "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
     ),
     "Where a message must not wait for other components' work": (
-        "ros/test_bound_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
+        "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
         "bench: the same, sent on the component's CPU, p",
     ),
     "the calls of a `client` are answered by one": (
-        "ros/test_bound_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
-        "ros/test_bound_calls.py::test_a_resources_call_is_a_ros_service",
+        "ros/bridge/test_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
+        "ros/bridge/test_calls.py::test_a_resources_call_is_a_ros_service",
     ),
     "never blocks longer than `timeout_ms`": ("ClientCall.TimesOutAndIsNotAnsweredByALateReply",),
     "a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
     "bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
     "What a transaction adds may be bound as well": (
-        "ros/test_bound_calls.py::test_topics_and_services_come_and_go_while_all_runs",
+        "ros/bridge/test_calls.py::test_topics_and_services_come_and_go_while_all_runs",
     ),
     # ---- concepts: deployment and change
     "meets all of them at a barrier and only then publishes one epoch": (
@@ -448,11 +455,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
     ),
     "is prepare, commit, retire": (
-        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
-        "python/test_python_components.py::test_replaced_cores_are_let_go",
+        "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+        "python/parts/test_components.py::test_replaced_cores_are_let_go",
     ),
     "is built, bound and configured on an ordinary thread while the old one runs": (
-        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+        "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
     ),
     "The commit happens on the component's own thread, inside a wait": (
         "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
@@ -489,7 +496,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "what they write meanwhile goes nowhere": ("PreparedFuture.WhatIsWrittenInPreparationGoesNowhere",),
     "The time between the thread's `parked` and `armed` records is the **blackout**": (
-        "python/test_trace_kernel.py::test_swaps_are_as_the_kernel_reported_them",
+        "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
     "that come into force together or not at all": (
         "Rule10Random.TransactionsDoWhatTheModelSaysOrNothing",
@@ -520,11 +527,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "leaves the architecture as it was, and the error names the step": (
         "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
-        "python/test_executor_control.py::test_a_refusal_names_the_step_and_changes_nothing",
+        "python/control/test_control.py::test_a_refusal_names_the_step_and_changes_nothing",
     ),
     "parks it `FAULTED`, its outputs safe; all others run on": (
         "Rule11Faults.AnExceptionParksItsComponentAndWritesItsOutputs",
-        "ros/test_executor_process.py::test_fault_is_told_at_once_and_the_others_run_on",
+        "ros/executor/test_process.py::test_fault_is_told_at_once_and_the_others_run_on",
     ),
     "faults its component when it ends": ("Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",),
     "and while it lasts by a real-time watchdog": (
@@ -547,7 +554,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "equal seeds give equal traces, bit for bit": (
         "Rule13SimulationSeeds.EqualSeedsGiveEqualTracesBitForBit",
-        "python/test_simulation.py::test_two_runs_leave_the_same_trace_byte_by_byte",
+        "python/bindings/test_simulation.py::test_two_runs_leave_the_same_trace_byte_by_byte",
     ),
     "save writing the usual": (
         "Elements.AFilterIsOneMethod",
@@ -555,21 +562,21 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "with which a component is one method `update()`": (
         "Elements.AFilterIsOneMethod",
-        "python/test_elements.py::test_a_core_in_python_needs_but_one_method",
+        "python/parts/test_elements.py::test_a_core_in_python_needs_but_one_method",
     ),
     "a multiplexer switched by a property in flight": (
         "Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",
     ),
     "passes the first input that is fresh": (
         "Elements.APriorityMultiplexerPassesTheFirstThatIsFresh",
-        "python/test_elements.py::test_a_person_s_command_goes_before_the_robot_s",
+        "python/parts/test_elements.py::test_a_person_s_command_goes_before_the_robot_s",
     ),
     "`mauve_rt/TwistPriorityMultiplexer`": (
-        "python/test_elements.py::test_what_is_listed_is_what_is_registered",
+        "python/parts/test_elements.py::test_what_is_listed_is_what_is_registered",
     ),
     "*when* nothing was heard for so long, *do* this transaction, and *undo* it": (
-        "ros/test_supervisor_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
-        "python/test_rules_engine.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
+        "ros/supervisor/test_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
+        "python/supervision/test_rules_engine.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
     ),
     "fixed-size records that component threads put into wait-free rings": (
         "TraceRing.LosesNothingBetweenTwoThreads",
@@ -580,49 +587,51 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "HygieneOfTheKernel.NoAllocationAfterTheStart",
     ),
     "a track per component, with states as slices and reconfigurations as flows": (
-        "python/test_trace_perfetto.py::test_one_process_and_its_components",
-        "python/test_trace_perfetto.py::test_a_reconfiguration_flows_from_the_request_to_the_next_release",
+        "python/trace/test_perfetto.py::test_one_process_and_its_components",
+        "python/trace/test_perfetto.py::test_a_reconfiguration_flows_from_the_request_to_the_next_release",
     ),
     "`mauve check FILE...` says what is wrong with architecture, rules and steps files": (
-        "python/test_check.py::test_an_architecture_file",
-        "python/test_check.py::test_a_rules_file_by_itself",
-        "python/test_check.py::test_a_steps_file_by_itself",
+        "python/cli/test_check.py::test_an_architecture_file",
+        "python/cli/test_check.py::test_a_rules_file_by_itself",
+        "python/cli/test_check.py::test_a_steps_file_by_itself",
     ),
     "Beside an architecture file, rules and steps are tried on it": (
-        "python/test_check.py::test_steps_beside_an_architecture_are_tried_on_it",
-        "python/test_check.py::test_rules_beside_an_architecture_do_and_undo",
+        "python/cli/test_check.py::test_steps_beside_an_architecture_are_tried_on_it",
+        "python/cli/test_check.py::test_rules_beside_an_architecture_do_and_undo",
     ),
     "It warns of a subscription that ordinary publishers will not match": (
-        "python/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",
+        "python/cli/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",
     ),
     # ---- write a core
-    "a shell, a core, an fsm": ("python/test_readme_examples.py::test_listings_stand_in_the_sources",),
+    "a shell, a core, an fsm": (
+        "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
+    ),
     "a method for each action and guard of the fsm, whichever language that was written in": (
-        "python/test_python_core.py::test_it_takes_the_place_of_a_core_in_cpp_and_gives_it_back",
+        "python/parts/test_cores.py::test_it_takes_the_place_of_a_core_in_cpp_and_gives_it_back",
     ),
     "It runs in the component's own thread too": (
-        "python/test_python_core.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+        "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
     ),
     "accepts what its architecture file names among its `alternatives`": (
-        "python/test_model_plugins.py::test_lines_of_an_index",
+        "python/model/test_plugins.py::test_lines_of_an_index",
         "Rule9Replace.OnlyDeclaredCoresByName",
     ),
     "install/lib/mauve_rt/executor --ros-args -p architecture:=": (
-        "python/test_python_core.py::test_the_tutorial_s_architecture_file_takes_it",
+        "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
     ),
     "mauve replace-core /executor metronome": (
-        "python/test_python_core.py::test_the_tutorial_s_architecture_file_takes_it",
+        "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
     ),
     "that need neither ROS nor a file": (
-        "python/test_readme_examples.py::test_architecture_and_deployer_need_no_ros",
+        "python/project/test_readme_examples.py::test_architecture_and_deployer_need_no_ros",
         _KERNEL_ALONE,
     ),
     "has the paper's Listings 1 to 3 as a program": ("ctest: listings",),
     "Whole components can be written in Python": (
-        "python/test_python_components.py::test_python_and_cpp_exchange_data_both_ways",
+        "python/parts/test_components.py::test_python_and_cpp_exchange_data_both_ways",
     ),
     "`mauve_examples/tutorials/python_component.py` has a shell, a core and an fsm": (
-        "python/test_python_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",
+        "python/parts/test_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",
     ),
     "a laser's driver faults and the robot stands still": ("ctest: sensor_breaks",),
     "removes the old chain, and the robot drives again": ("ctest: sensor_breaks",),
@@ -633,14 +642,14 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     # ---- real time
     "Without the rights to it everything runs all the same": (
-        "ros/test_executor_process.py::test_without_real_time_rights_it_runs_and_says_so",
+        "ros/executor/test_process.py::test_without_real_time_rights_it_runs_and_says_so",
     ),
     "`require_realtime: true` in the architecture file refuses instead": (
-        "ros/test_executor_process.py::test_require_realtime_refuses_to_run_without",
+        "ros/executor/test_process.py::test_require_realtime_refuses_to_run_without",
     ),
     "Every figure stands beside a reference measured in turn with it in the same run": (
-        "python/test_bench_statistics.py::test_every_round_begins_with_another_side",
-        "python/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
+        "python/project/test_bench_statistics.py::test_every_round_begins_with_another_side",
+        "python/project/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
     ),
     "| wake-up of a 1 kHz component, machine idle": (
         "bench: wake-up latency of a 1 kHz component, machine idle",
@@ -737,11 +746,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     # ---- the house
     "`scripts/lint` checks style, types, layers and includes": (
-        "python/test_readme_scripts.py::test_ci_runs_every_tool_and_every_test",
+        "python/project/test_readme_scripts.py::test_ci_runs_every_tool_and_every_test",
     ),
     "Knows neither ROS nor Python": (_KERNEL_ALONE,),
-    "| folder | what |": ("python/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
-    "LGPL-3.0-or-later": ("python/test_readme_examples.py::test_the_licence_is_the_one_named",),
+    "| folder | what |": ("python/project/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
+    "LGPL-3.0-or-later": ("python/project/test_readme_examples.py::test_the_licence_is_the_one_named",),
 }
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.

@@ -1,6 +1,6 @@
 """The launch files, run for real where `launch` is installed.
 
-tests/python/test_launch_files.py reads them anywhere.
+tests/python/node/test_launch_files.py reads them anywhere.
 """
 
 import os

@@ -31,7 +31,7 @@ from mauve_examples.mission.summary import build_summary, failure_reasons
 @pytest.fixture(scope="module")
 def installed_messages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     prefix = tmp_path_factory.mktemp("prefix")
-    sources = Path(__file__).parents[2] / "mauve_msgs" / "msg"
+    sources = Path(__file__).parents[3] / "mauve_msgs" / "msg"
     shutil.copytree(sources, prefix / "share" / "mauve_msgs" / "msg")
     with pytest.MonkeyPatch.context() as patch:
         before = os.environ.get("AMENT_PREFIX_PATH", "")

@@ -13,7 +13,7 @@ from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure
 
 NODE = "/robot_1/executor"
-README = Path(__file__).parents[2] / "README.md"
+README = Path(__file__).parents[3] / "README.md"
 LAMP = """\
   lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp}}
   spare: {kind: shared_data, type: std_msgs/msg/Float64}

@@ -1,6 +1,6 @@
 """What the ros2 command line finds of `ros2 mauve`.
 
-Where ros2cli is installed, tests/ros/test_ros2_command.py runs it.
+Where ros2cli is installed, tests/ros/cli/test_ros2_command.py runs it.
 """
 
 import ast

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "check_tags.py"
+SCRIPT = Path(__file__).resolve().parents[3] / "scripts" / "check_tags.py"
 HEADERS = "mauve_rt/kernel/include/mauve_rt/base"
 
 

@@ -12,7 +12,7 @@ from mauve_rt.trace import TraceError
 from mauve_rt.trace.format.cdr import Batch, decode_batch, encode_batch, encode_names
 from mauve_rt.trace.format.records import RECORD
 
-MESSAGES = Path(__file__).parents[2] / "mauve_msgs" / "msg"
+MESSAGES = Path(__file__).parents[3] / "mauve_msgs" / "msg"
 STORE = get_typestore(Stores.EMPTY)
 for _name in ("TraceRecord", "TraceBatch", "TraceNames"):
     STORE.register(get_types_from_msg((MESSAGES / f"{_name}.msg").read_text(), f"mauve_msgs/msg/{_name}"))

@@ -24,7 +24,7 @@ HELLO = b"\0\1\0\0\6\0\0\0hello\0"
 @pytest.fixture(autouse=True)
 def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     share = tmp_path / "prefix" / "share"
-    shutil.copytree(Path(__file__).parents[2] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    shutil.copytree(Path(__file__).parents[3] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
     (share / "mauve_test_msgs" / "msg").mkdir(parents=True)
     (share / "mauve_test_msgs" / "msg" / "Text.msg").write_text("string data\n")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))

@@ -31,7 +31,7 @@ TABLES = {
 @pytest.fixture(autouse=True)
 def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     share = tmp_path / "prefix" / "share"
-    shutil.copytree(Path(__file__).parents[2] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    shutil.copytree(Path(__file__).parents[3] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")

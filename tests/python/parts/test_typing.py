@@ -8,7 +8,7 @@ from pathlib import Path
 import mauve_rt
 from mauve_rt import _kernel, api
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def mypy(module: str, *arguments: str) -> str:

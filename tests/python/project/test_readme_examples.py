@@ -21,7 +21,7 @@ from mauve_rt.model.resource_kinds import given_kinds
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 INSTALLED = Path(_kernel.__file__).resolve().parents[4]
 ROBOT = ROOT / "mauve_examples" / "architecture" / "robot.yaml"

@@ -239,7 +239,7 @@ def test_it_sees_clock_period_and_properties_in_force(stage: Stage, made: list[C
 @pytest.mark.parametrize(
     ("core", "words"),
     [
-        ("FailsInTick", ["ZeroDivisionError", "test_python_core.py", ": tick"]),
+        ("FailsInTick", ["ZeroDivisionError", "test_cores.py", ": tick"]),
         ("WritesAPoint", ["TypeError", "port 'beat' takes std_msgs/msg/Float64, not Point"]),
         ("AsksForMore", ["AttributeError", "no port or property 'loudness'", "period_us"]),
     ],

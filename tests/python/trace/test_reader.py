@@ -22,7 +22,7 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 @pytest.fixture(autouse=True)
 def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     share = tmp_path / "prefix" / "share"
-    shutil.copytree(Path(__file__).parents[2] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    shutil.copytree(Path(__file__).parents[3] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
 
 

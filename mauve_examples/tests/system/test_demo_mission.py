@@ -160,7 +160,7 @@ def test_the_command_it_offers_works_in_another_terminal(start: Starter):
 
 def shared_map(name: str) -> Path:
     """A map of the folder beside the clone, where there is one."""
-    path = Path(__file__).resolve().parents[2].parent / "shared" / "maps" / name
+    path = Path(__file__).resolve().parents[3].parent / "shared" / "maps" / name
     if not path.exists():
         pytest.skip(f"no {name} in shared/maps beside the clone")
     return path

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))  # at the end: it hides nothing
+sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))  # at the end: it hides nothing
 
 import machine
 import native

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from readme_claims import CLAIMS, PROMISE_NOTHING
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMAND = re.compile(r"(mauve|ros2|scripts/\w+|install/lib/\S+) ")
 
@@ -74,8 +74,8 @@ def _is_there(proof: str) -> bool:
         return f"add_test(NAME {name} " in text or ("add_test(NAME ${name} " in text and name in text)
     file, is_python, name = proof.partition("::")
     if is_python:
-        path = ROOT / "tests" / file
-        return path.is_file() and name in _tests_of(path)
+        paths = (ROOT / "tests" / file, ROOT / "mauve_examples" / "tests" / file)
+        return any(path.is_file() and name in _tests_of(path) for path in paths)
     return proof in _kernel_cases()
 
 
@@ -98,8 +98,8 @@ def test_each_sentence_of_readme_is_in_the_table() -> None:
 
 def test_a_proof_that_is_not_there_is_found_out() -> None:
     for proof in (
-        "python/test_none.py::test_x",
-        "python/test_check.py::test_none",
+        "python/cli/test_none.py::test_x",
+        "python/cli/test_check.py::test_none",
         "Rule1Clock.None",
         "bench: none",
     ):

@@ -20,7 +20,7 @@ from mauve_rt.yaml import text as yaml_text
 from mauve_rt.yaml.text import MAX_BYTES, MAX_DEPTH, YamlError, parse_yaml, read_yaml
 from mauve_rt.yaml.writer import write_yaml
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 WORDS = ["true", "False", "TRUE", "tRue", "on", "off", "yes", "No", "y", "n", "null", "~", "Null", "nULL"]
 NUMBERS = ["010", "0o17", "0x1F", "0b101", "-0", "+5", "1_000", "1e-3", "1.5E+3", "1.", "-.5", ".5"]
 SPECIAL = [

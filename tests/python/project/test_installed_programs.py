@@ -13,7 +13,7 @@ from mauve_rt import _kernel
 
 SITE = Path(_kernel.__file__).resolve().parents[1]
 PREFIX = SITE.parents[2]
-DOWNSTREAM = Path(__file__).parents[1] / "downstream"
+DOWNSTREAM = Path(__file__).parents[2] / "downstream"
 PROGRAMS = ["bin/mauve", "lib/mauve_rt/executor", "lib/mauve_rt/supervisor", "lib/mauve_examples/radio"]
 
 

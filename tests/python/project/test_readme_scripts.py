@@ -6,15 +6,17 @@ import shutil
 import subprocess
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCRIPTS = ROOT / "scripts"
 
 
 def test_every_folder_of_tests_is_a_stage() -> None:
     stages = re.search(r"^readonly ALL_STAGES=\((.*)\)$", (SCRIPTS / "test").read_text("utf-8"), re.MULTILINE)
     assert stages is not None
-    folders = {file.parent.relative_to(ROOT / "tests").parts[0] for file in ROOT.glob("tests/*/**/test_*.*")}
-    assert folders <= set(stages[1].split())
+    for tests in (ROOT / "tests", ROOT / "mauve_examples" / "tests"):
+        folders = {file.relative_to(tests).parts[0] for file in tests.glob("*/**/test_*.*")}
+        assert folders
+        assert folders <= set(stages[1].split())
 
 
 def test_ci_runs_every_tool_and_every_test() -> None:

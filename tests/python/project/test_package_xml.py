@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mauve_rt
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PRODUCT = ("mauve_rt", "mauve_examples", "mauve_msgs", "cmake")
 OF_TESTS = ("tests", "mauve_examples/tests", "benchmarks")
 ON_THE_PATH_OF_TESTS = ("tests", "tests/plugins", "benchmarks")
@@ -56,9 +56,12 @@ def _version(package: Path) -> str:
 
 
 def _files(folders: tuple[str, ...], *patterns: str) -> Iterator[Path]:
+    """What is in these folders; of a part of the product without its tests."""
     for folder in folders:
         for pattern in patterns:
-            yield from (ROOT / folder).rglob(pattern)
+            for file in (ROOT / folder).rglob(pattern):
+                if folder not in PRODUCT or "tests" not in file.relative_to(ROOT).parts:
+                    yield file
 
 
 def _imports(file: Path) -> set[str]:
@@ -75,7 +78,9 @@ def _imports(file: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and not node.level:
             found.add((node.module or "").partition(".")[0])
         pending += ast.iter_child_nodes(node)
-    beside = {path.stem for path in _files((str(file.parent), *ON_THE_PATH_OF_TESTS), "*.py")}
+    is_test = any(file.is_relative_to(ROOT / folder) for folder in OF_TESTS)
+    folders = (str(file.parent), *ON_THE_PATH_OF_TESTS) if is_test else ()
+    beside = {path.stem for path in _files(folders, "*.py")}
     return found - set(sys.stdlib_module_names) - OWN - beside
 
 

@@ -95,8 +95,8 @@ class FailsInTake(CountCore):
 @pytest.mark.parametrize(
     ("core", "fsm", "words"),
     [
-        (FailsInAct, ActFsm, ["ValueError: five is too many", "test_python_faults.py", "deeper", "act"]),
-        (FailsInGuard, GuardedFsm, ["LookupError: no answer", "test_python_faults.py", "is_five"]),
+        (FailsInAct, ActFsm, ["ValueError: five is too many", "test_faults.py", "deeper", "act"]),
+        (FailsInGuard, GuardedFsm, ["LookupError: no answer", "test_faults.py", "is_five"]),
         (FailsInSurrogates, ActFsm, ["RuntimeError: no text: \\udcff"]),
         (FailsWithoutWords, ActFsm, ["_WordlessError"]),
         (FailsInAnOddPlace, ActFsm, ["SystemExit: left", "/odd/\\udcff.py"]),
@@ -131,7 +131,7 @@ def test_what_take_raises_is_a_fault_of_the_new_core(built: Stage):
     built.until(lambda: component.state == "FAULTED")
     fault = component.describe().fault
     assert "take failed: MemoryError: no room" in fault
-    assert "test_python_faults.py" in fault
+    assert "test_faults.py" in fault
     assert component.core.count > 3, "adopt had been carried out, and nothing ran after take"
 
 
