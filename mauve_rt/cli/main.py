@@ -13,8 +13,9 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
-from mauve_rt import __version__
+import mauve_rt
 from mauve_rt.cli.pipe import piped
 from mauve_rt.cli.verb import run
 from mauve_rt.cli.verbs import VERBS
@@ -36,11 +37,20 @@ def _parse_and_run(parser: argparse.ArgumentParser, arguments: Sequence[str] | N
     return run(args.verb, args)
 
 
+class _Version(argparse.Action):
+    """As argparse's own, but that the version is looked up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        """Print it and leave."""
+        print(mauve_rt.__version__)
+        parser.exit()
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The command's arguments."""
     description = "Look at MAUVE executors and reconfigure them while they run."
     parser = argparse.ArgumentParser(prog="mauve", description=description)
-    parser.add_argument("--version", action="version", version=__version__)
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for verb in VERBS:
         subparser = verbs.add_parser(verb.name, help=verb.help, description=verb.help)

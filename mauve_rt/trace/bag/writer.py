@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mauve_rt import __version__
+import mauve_rt
 from mauve_rt.trace.bag.mcap_file import McapFile
 from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
 from mauve_rt.trace.bag.recorded import TopicQos
@@ -215,7 +215,7 @@ class BagWriter:
 
     def _new_file(self, directory: Path) -> McapFile:
         path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
-        return McapFile(path, profile="ros2", library=f"mauve_rt {__version__}")
+        return McapFile(path, profile="ros2", library=f"mauve_rt {mauve_rt.__version__}")
 
     def _write_metadata(self, directory: Path) -> None:
         topics = [_counted(topic, self._files()) for topic in self._topics.values()]

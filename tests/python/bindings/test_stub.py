@@ -1,6 +1,6 @@
 """`_kernel.pyi` is written by hand; here its signatures are held against those of the compiled module.
 
-Its names are: mypy's stubtest looks at them (tests of parts: test_typing), but knows no signatures of pybind11.
+Its names are: mypy's stubtest looks at them (parts/test_typing), but knows no signatures of pybind11.
 """
 
 import ast

@@ -5,9 +5,11 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import mauve_rt
+from mauve_rt import _kernel
 
 ROOT = Path(__file__).resolve().parents[3]
 PRODUCT = ("mauve_rt", "mauve_examples", "mauve_msgs", "cmake")
@@ -172,5 +174,6 @@ def test_requirements_name_the_same_modules() -> None:
 
 
 def test_there_is_one_version() -> None:
-    assert mauve_rt.__version__ == _version(ROOT) == _version(ROOT / "mauve_msgs")
+    assert mauve_rt.__version__ == _kernel.__version__ == _version(ROOT) == _version(ROOT / "mauve_msgs")
+    assert version("mauve_rt") == _version(ROOT), "the metadata of the installation"
     assert re.fullmatch(r"\d+\.\d+\.\d+", mauve_rt.__version__)
