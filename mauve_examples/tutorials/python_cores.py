@@ -2,7 +2,7 @@
 
 from std_msgs.msg import Float64
 
-from mauve_rt.parts.cores import Core
+from mauve_rt.api import Core
 
 
 class Metronome(Core):

@@ -750,6 +750,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "Knows neither ROS nor Python": (_KERNEL_ALONE,),
     "| folder | what |": ("python/project/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
+    "reading needs no native library": (
+        "python/trace/test_without_the_library.py::test_a_bag_is_read_and_shown",
+    ),
+    "lists what programs may rely on; everything else may change": (
+        "python/project/test_public_api.py::test_what_a_module_offers_is_listed",
+        "python/project/test_public_api.py::test_the_headers_are_those_of_the_one_door",
+        "python/project/test_public_api.py::test_readme_shows_what_is_listed",
+    ),
+    "says how to build and test one thing": (
+        "python/project/test_contributing.py::test_files_that_it_names_are_there",
+    ),
     "LGPL-3.0-or-later": ("python/project/test_readme_examples.py::test_the_licence_is_the_one_named",),
 }
 

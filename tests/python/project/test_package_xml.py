@@ -19,6 +19,7 @@ OWN = {"mauve_rt", "mauve_examples", "mauve_msgs"}
 # Of modules that are no ROS packages: rosdep's key (rosdep/python.yaml) and the name in requirements/.
 MODULES = {
     "argcomplete": ("python3-argcomplete", "argcomplete"),
+    "catkin_pkg": ("python3-catkin-pkg-modules", "catkin-pkg"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "mcap": ("", "mcap"),  # no distribution packages it: the tests' only
