@@ -750,6 +750,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "Knows neither ROS nor Python": (_KERNEL_ALONE,),
     "| folder | what |": ("python/project/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
+    "is tagged `[rt]` in the C++ headers": (
+        "python/project/test_check_tags.py::test_what_is_missing_or_untrue_is_named",
+    ),
+    "clang from 20 on then checks them": ("Rt.SanitizerEndsWhoAllocates",),
     "reading needs no native library": (
         "python/trace/test_without_the_library.py::test_a_bag_is_read_and_shown",
     ),
