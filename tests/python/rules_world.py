@@ -1,0 +1,133 @@
+"""A world for the rule engine: a model of an executor, in virtual time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import count
+
+from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.supervision.conditions import SilenceCondition
+from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.rule import ArchitectureView, ComponentView
+from mauve_rt.supervision.rules import Rule
+
+TICK_S = 0.05
+LOCAL = "mauve_examples/LocalExploration"
+USUAL = "mauve_examples/Exploration"
+
+
+def rule(
+    name: str = "link_lost",
+    *,
+    target: str = "exploration",
+    undo: bool | list[dict[str, object]] = True,
+    undo_for_s: float = 3.0,
+    undo_max_missed: int = 0,
+    usual: str = USUAL,
+    **changes: object,
+) -> Rule:
+    content: dict[str, object] = {
+        "name": name,
+        "when": {"silence": {"topic": "in", "type": "mauve_msgs/msg/PeerMessage", "longer_than_s": 1.0}},
+        "do": [{"kind": "replace_core", "target": target, "name": LOCAL}],
+    }
+    if undo:
+        back = [{"kind": "replace_core", "target": target, "name": usual}]
+        do = back if undo is True else undo
+        content["undo"] = {"for_s": undo_for_s, "do": do, "max_missed": undo_max_missed}
+    return Rule(**content | changes)
+
+
+@dataclass
+class World:
+    """Virtual time, a peer that speaks every 0.2 s while `talking`, and an executor that answers at once."""
+
+    rules: list[Rule]
+    now_s: float = 100.0
+    talking: bool = True
+    answering: bool = True
+    telling: bool = True  # the executor publishes ~/state
+    listing: bool = True  # the executor answers ~/list_components
+    inactive: bool = False
+    properties: dict[str, str] = field(default_factory=dict)  # of every component
+    known: set[str] = field(default_factory=lambda: {LOCAL, USUAL})  # cores it would take
+    trials: list[Request] = field(default_factory=list)  # dry runs
+    refusals: list[Outcome] = field(default_factory=list)  # one for each of the next requests
+    decisions: list[Decision] = field(default_factory=list)
+    requests: list[Request] = field(default_factory=list)
+    asked_at_s: list[float] = field(default_factory=list)
+    revision: int = 5
+    instance_id: str = "first"
+    components: dict[str, ComponentView] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.conditions = [SilenceCondition("/in", longer_than_s=1.0) for _ in self.rules]
+        pairs = list(zip(self.rules, self.conditions, strict=True))
+        ids = map(str, count(1))
+        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look, ids=ids)
+        self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
+        self._last_word_s = self.now_s
+
+    def tell(self, components: Mapping[str, ComponentView] | None = None) -> None:
+        """The executor publishes its state, changed."""
+        self.components.update(components or {})
+        self.revision += 1
+        if self.telling:
+            view = ArchitectureView(self.instance_id, self.revision, dict(self.components))
+            self.engine.on_state(self.now_s, view)
+
+    def run(self, seconds: float) -> None:
+        end_s = self.now_s + seconds - TICK_S / 2
+        while self.now_s < end_s:
+            self.now_s += TICK_S
+            if self.talking and self.now_s - self._last_word_s >= 0.2:
+                self._last_word_s = self.now_s
+                for condition in self.conditions:
+                    condition.hear(self.now_s)
+            self.engine.tick(self.now_s)
+
+    def _look(self) -> None:
+        if not self.listing:
+            return
+        components = {
+            name: ListedComponent(state=view.state, core=view.core, properties=self.properties)
+            for name, view in self.components.items()
+        }
+        self.engine.on_inventory(self.now_s, Inventory(self.instance_id, components))
+
+    def _try(self, request: Request) -> None:
+        self.trials.append(request)
+        cores = [step.name for step in request.steps if step.kind == "replace_core"]
+        strange = [core for core in cores if core not in self.known]
+        words = "not active" if self.inactive else f"no core {strange[0]}" if strange else ""
+        code = Code.NOT_ACTIVE if self.inactive else Code.UNKNOWN_CORE if words else Code.OK
+        outcome = Outcome(code=code, message=words)
+        self.engine.on_outcome(self.now_s, request.request_id, outcome)
+
+    def _act(self, request: Request) -> None:
+        if request.dry_run:
+            self._try(request)
+            return
+        self.requests.append(request)
+        self.asked_at_s.append(self.now_s)
+        if not self.answering:
+            return
+        if self.refusals:
+            self.engine.on_outcome(self.now_s, request.request_id, self.refusals.pop(0))
+            return
+        step = request.steps[0]
+        self.tell({step.target: ComponentView("RUNNING", step.name)})
+        outcome = Outcome(code=Code.OK, message="done", revision=self.revision)
+        self.engine.on_outcome(self.now_s, request.request_id, outcome)
+
+    def said(self) -> list[str]:
+        return [decision.decision for decision in self.decisions]
+
+    def cores(self) -> list[str]:
+        return [request.steps[0].name for request in self.requests]
+
+
+def started(*rules: Rule) -> World:
+    world = World(list(rules) or [rule()])
+    world.tell()
+    return world
