@@ -57,9 +57,6 @@ STOREYS = ("base", "data", "parts", "run", "architecture", "change", "deploy", "
 # Includes that still point up: (file, included path).
 UPWARD = {
     ("architecture/architecture.cpp", "mauve_rt/change/transaction_commit.hpp"),
-    ("architecture/architecture.cpp", "mauve_rt/deploy/host.hpp"),
-    ("change/prepare.cpp", "mauve_rt/deploy/host.hpp"),
-    ("change/work.cpp", "mauve_rt/deploy/host.hpp"),
     ("include/mauve_rt/architecture/architecture.hpp", "mauve_rt/change/transaction.hpp"),
     ("run/component.cpp", "mauve_rt/architecture/architecture.hpp"),
     ("run/component.cpp", "mauve_rt/change/transaction_commit.hpp"),

@@ -5,10 +5,10 @@
 #include <deque>
 
 #include "mauve_rt/architecture/plugin.hpp"
+#include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
-#include "mauve_rt/deploy/host.hpp"
 
 #include "base/prefault.hpp"
 #include "parts/lookup.hpp"
@@ -72,7 +72,7 @@ void Architecture::cleanup() {
 std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
                                                       const TransactionOptions& options) {
   const std::lock_guard change(change_lock_);
-  Host* host = nullptr;
+  Runner* host = nullptr;
   std::unique_lock<std::mutex> use;
   {
     const std::lock_guard lock(host_mutex_);
@@ -106,12 +106,12 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
   return make_one(std::move(transaction), timeouts)->report(timeouts.phase_ns).steps.front();
 }
 
-Host* Architecture::host() const {
+Runner* Architecture::host() const {
   const std::lock_guard lock(host_mutex_);
   return host_;
 }
 
-void Architecture::set_host(Host& host) {
+void Architecture::set_host(Runner& host) {
   const std::lock_guard lock(host_mutex_);
   if (host_ != nullptr) {
     throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
@@ -120,7 +120,7 @@ void Architecture::set_host(Host& host) {
   host_ = &host;
 }
 
-void Architecture::release_host(const Host& host) noexcept {
+void Architecture::release_host(const Runner& host) noexcept {
   const std::lock_guard lock(host_mutex_);
   if (host_ == &host) host_ = nullptr;
 }

@@ -53,9 +53,9 @@ auto made(const std::string& what, Make&& make) -> decltype(make()) {
 /// A parameter's value in its own type. Throws Error: type_mismatch, out_of_range.
 PropertyValue checked(const ResourceParameter& parameter, const PropertyValue& value) {
   try {
-    return mauve::checked(parameter.name, parameter.initial,
-                          {.unit = parameter.unit, .minimum = parameter.minimum, .maximum = parameter.maximum},
-                          value);
+    return mauve::checked(
+        parameter.name, parameter.initial,
+        {.unit = parameter.unit, .minimum = parameter.minimum, .maximum = parameter.maximum}, value);
   } catch (const Error& error) {
     ErrorDetail detail = error.detail();
     detail.element = parameter.name;

@@ -2,7 +2,7 @@
 // What a transaction makes ready before its commit, and throws away when there is none.
 #include <algorithm>
 
-#include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/architecture/runner.hpp"
 
 #include "base/prefault.hpp"
 #include "change/work.hpp"

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
-#include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/architecture/runner.hpp"
 
 namespace mauve {
 
-TransactionCommit::TransactionCommit(Architecture& architecture, Host* host,
+TransactionCommit::TransactionCommit(Architecture& architecture, Runner* host,
                                      const TransactionOptions& options)
     : work_(std::make_unique<Work>(architecture, host, options)) {}
 TransactionCommit::~TransactionCommit() = default;
@@ -17,7 +17,7 @@ TransactionReport TransactionCommit::report(time_ns_t phase_timeout_ns) {
   return work_->report(phase_timeout_ns);
 }
 
-TransactionCommit::Work::Work(Architecture& architecture, Host* host, const TransactionOptions& options)
+TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const TransactionOptions& options)
     : architecture_(architecture),
       host_(host),
       deployed_(host != nullptr && host->is_deployed()),

@@ -16,7 +16,7 @@ namespace mauve {
 
 class TransactionCommit::Work {
  public:
-  Work(Architecture& architecture, Host* host, const TransactionOptions& options);
+  Work(Architecture& architecture, Runner* host, const TransactionOptions& options);
 
   void make(Transaction transaction);
   TransactionReport report(time_ns_t phase_timeout_ns);
@@ -71,7 +71,7 @@ class TransactionCommit::Work {
   Action& keep(const Component& component, std::unique_ptr<Action> action);
 
   Architecture& architecture_;
-  Host* host_;  // while it is made; nullptr: nobody runs the architecture
+  Runner* host_;  // while it is made; nullptr: nobody runs the architecture
   bool deployed_;
   bool is_simulated_;
   TransactionOptions options_;

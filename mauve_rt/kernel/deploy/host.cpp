@@ -46,7 +46,7 @@ time_ns_t Host::get_time(const std::string& component) const {
 }
 
 void Host::require_own() const {
-  const Host* present = architecture_.host();
+  const Runner* present = architecture_.host();
   if (present == nullptr || present == this) return;
   throw Error(ErrorCode::already_running, "another host runs the architecture",
               {.remedy = "ask that one for the change, or shut it down first"});

@@ -19,7 +19,7 @@
 
 namespace mauve {
 
-class Host;
+class Runner;
 class PluginRegistry;
 class TransactionCommit;
 
@@ -174,11 +174,11 @@ class Architecture final : public Configurable {
   /// Under it all changes are made. [non-rt]
   ChangeLock& change_lock() noexcept { return change_lock_; }
   /// Who runs it; nullptr: nobody. [non-rt]
-  Host* host() const;
+  Runner* host() const;
   /// [non-rt], the change lock held. Throws Error (already_running) when it has a host.
-  void set_host(Host& host);
+  void set_host(Runner& host);
   /// Returns at once: a change that uses the host goes on, and finds it shut down. [non-rt]
-  void release_host(const Host& host) noexcept;
+  void release_host(const Runner& host) noexcept;
 
   // ---- for transactions
 
@@ -219,7 +219,7 @@ class Architecture final : public Configurable {
   PluginRegistry* registry_;
   ChangeLock change_lock_;
   mutable std::mutex host_mutex_;
-  Host* host_{nullptr};
+  Runner* host_{nullptr};
   ChangeSignal changes_;
   Notifier publications_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};

@@ -9,14 +9,14 @@
 
 namespace mauve {
 
-class Host;
+class Runner;
 
 /// Carries out one transaction; made by Architecture::make(). Ordinary threads. make() is called once, under the
 /// architecture's change lock. report() takes no part in that: while it waits, others may change what this one did.
 class TransactionCommit {
  public:
   /// `host`: who runs the architecture, if anybody does; used by make() only.
-  TransactionCommit(Architecture& architecture, Host* host, const TransactionOptions& options);
+  TransactionCommit(Architecture& architecture, Runner* host, const TransactionOptions& options);
   ~TransactionCommit();
   TransactionCommit(const TransactionCommit&) = delete;
   TransactionCommit& operator=(const TransactionCommit&) = delete;

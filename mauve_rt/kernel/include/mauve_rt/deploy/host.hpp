@@ -2,35 +2,24 @@
 // Host: what runs an architecture, on threads or in virtual time, and the way to command and change it there.
 #pragma once
 
-#include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/realtime.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 namespace mauve {
 
-class Conductor;
-
 /// Runs one architecture, which has at most one host at a time. All functions [non-rt] unless told.
 ///
-/// | member    | written by           | read by | under                                                  |
-/// | --------- | -------------------- | ------- | ------------------------------------------------------ |
-/// | deployed_ | deploy(), shutdown() | anyone  | seq_cst: a commit that shutdown() does not see, sees it |
-/// | in_use_   | changes              | the end | -                                                      |
-///
 /// start(), stop(), shutdown() and what only looks take no part in changes: a long preparation keeps nobody from them.
-class Host {
+class Host : public Runner {
  public:
   explicit Host(Architecture& architecture) : architecture_(architecture) {}
-  virtual ~Host() = default;
-  Host(const Host&) = delete;
-  Host& operator=(const Host&) = delete;
 
   Architecture& architecture() const noexcept { return architecture_; }
 
@@ -58,7 +47,6 @@ class Host {
   StepReport set_property(const std::string& component, const std::string& name, const PropertyValue& value,
                           const CommitTimeouts& timeouts = {});
 
-  bool is_deployed() const noexcept { return deployed_.load(std::memory_order_seq_cst); }
   /// The instant that all grids are counted from; 0 before deployment.
   time_ns_t epoch_ns() const noexcept { return architecture_.deployment_epoch_ns(); }
   /// Now, as the components see it.
@@ -75,21 +63,6 @@ class Host {
   /// Waits until a component changed its state or core after `seen`; returns the word to pass next. [non-rt]
   std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
 
-  virtual const Clock& clock() const noexcept = 0;
-  /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
-  virtual bool is_simulated() const noexcept = 0;
-
-  // ---- for transactions
-
-  /// Gives a parked task what it runs on. [non-rt] Throws Error.
-  virtual void attach(Task& task) = 0;
-  /// The reverse; false when its thread would not end in time. [non-rt]
-  virtual bool detach(Task& task) noexcept = 0;
-  /// Who conducts commits of running components; nullptr: nobody, or nobody any more. [non-rt]
-  virtual std::shared_ptr<Conductor> conductor() noexcept = 0;
-  /// Held while a change uses the host. [non-rt], the architecture's change lock held.
-  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
-
  protected:
   /// Throws Error: not_configured; already_running when it is deployed. [setup]
   void require_deployable() const;
@@ -98,17 +71,11 @@ class Host {
   void start_all(time_ns_t epoch_ns);
   /// Stops all, the last one first; who does not come to rest soon keeps none of the others running. [non-rt]
   void stop_all(time_ns_t until_ns) noexcept;
-  /// From here on nobody starts anything, and no change of a running architecture is made.
-  void set_deployed(bool deployed) noexcept { deployed_.store(deployed, std::memory_order_seq_cst); }
-  /// Waits for a change that uses the host; after shutdown(), at the host's end. [non-rt]
-  void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
 
  private:
   void require_own() const;
 
   Architecture& architecture_;
-  std::atomic<bool> deployed_{false};
-  std::mutex in_use_;
 };
 
 }  // namespace mauve

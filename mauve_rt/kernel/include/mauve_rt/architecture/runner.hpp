@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Runner: what a change asks of whom that runs the architecture.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+
+#include "mauve_rt/base/time.hpp"
+
+namespace mauve {
+
+class Conductor;
+class Task;
+
+/// A host, as architectures and changes see it. All functions [non-rt].
+///
+/// | member    | written by           | read by | under                                                  |
+/// | --------- | -------------------- | ------- | ------------------------------------------------------ |
+/// | deployed_ | deploy(), shutdown() | anyone  | seq_cst: a commit that shutdown() does not see, sees it |
+/// | in_use_   | changes              | the end | -                                                      |
+class Runner {
+ public:
+  Runner() = default;
+  virtual ~Runner() = default;
+  Runner(const Runner&) = delete;
+  Runner& operator=(const Runner&) = delete;
+
+  bool is_deployed() const noexcept { return deployed_.load(std::memory_order_seq_cst); }
+  virtual const Clock& clock() const noexcept = 0;
+  /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
+  virtual bool is_simulated() const noexcept = 0;
+
+  /// Gives a parked task what it runs on. [non-rt] Throws Error.
+  virtual void attach(Task& task) = 0;
+  /// The reverse; false when its thread would not end in time. [non-rt]
+  virtual bool detach(Task& task) noexcept = 0;
+  /// Who conducts commits of running components; nullptr: nobody, or nobody any more. [non-rt]
+  virtual std::shared_ptr<Conductor> conductor() noexcept = 0;
+  /// Held while a change uses the runner. [non-rt], the architecture's change lock held.
+  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
+
+ protected:
+  /// From here on nobody starts anything, and no change of a running architecture is made.
+  void set_deployed(bool deployed) noexcept { deployed_.store(deployed, std::memory_order_seq_cst); }
+  /// Waits for a change that uses the runner; after shutdown(), at its end. [non-rt]
+  void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
+
+ private:
+  std::atomic<bool> deployed_{false};
+  std::mutex in_use_;
+};
+
+}  // namespace mauve
