@@ -69,7 +69,7 @@ def test_a_killed_executor_leaves_a_bag_that_opens(start: Starter):
     demo = start(*SHORT)
     demo.wait_for("4.")
     architecture = demo.out / "architecture" / "robot_1.yaml"
-    os.kill(demo.pid_of(f"node.executor --ros-args -p architecture:={architecture}"), signal.SIGKILL)
+    os.kill(demo.pid_of(f"node.executor.main --ros-args -p architecture:={architecture}"), signal.SIGKILL)
     assert demo.finish() == 1
     text = "\n".join(demo.lines)
     assert "robot_1_executor ended (SIGKILL)" in text

@@ -192,7 +192,7 @@ def test_a_structural_property_is_set_beside_its_reader(executor: ExecutorProces
 
 def test_the_supervisor_s_parameters(domain: int, graph: Any, tmp_path: Path) -> None:
     (tmp_path / "rules.yaml").write_text(RULES, encoding="utf-8")
-    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main.main"]
+    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main"]
     rules = ["--ros-args", "-p", f"rules:={tmp_path / 'rules.yaml'}"]
     file = tmp_path / "parameters.yaml"
     file.write_text("supervisor: {ros__parameters: {rulse: x}}\n", encoding="utf-8")
@@ -226,7 +226,7 @@ def test_the_supervisor_s_parameters(domain: int, graph: Any, tmp_path: Path) ->
 def test_help_starts_nothing(program: str, word: str) -> None:
     table = PARAMETERS if program == "executor" else OF_SUPERVISOR
     ended = subprocess.run(
-        [sys.executable, "-m", f"mauve_rt.node.{program}", word],
+        [sys.executable, "-m", f"mauve_rt.node.{program}.main", word],
         capture_output=True,
         text=True,
         timeout=PATIENCE_S,

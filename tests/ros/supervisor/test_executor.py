@@ -77,7 +77,7 @@ class Band:
                 sys.executable,
                 "-P",
                 "-m",
-                f"mauve_rt.node.{node}",
+                f"mauve_rt.node.{node}.main",
                 "--ros-args",
                 "-r",
                 "__ns:=/band",

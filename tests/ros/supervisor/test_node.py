@@ -211,7 +211,7 @@ def test_a_message_type_that_is_not_installed_is_refused(graph: Graph, rules: Pa
 
 def run(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "mauve_rt.node.supervisor.main.main", "--ros-args", *arguments],
+        [sys.executable, "-m", "mauve_rt.node.supervisor.main", "--ros-args", *arguments],
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311
