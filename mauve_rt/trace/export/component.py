@@ -56,7 +56,7 @@ class ComponentTrack:
                     self._tell_loss(index)
                 if kind in draw:
                     draw[kind](index, *fields)
-                elif kind in self._trace.kinds:
+                elif kind != Kind.WAIT and kind in self._trace.kinds:
                     self._happen(kind, *fields)
             progress(int(some[-1]))
         self._end_all(int(self._rows["time_ns"][-1]) if len(self._rows) else 0)

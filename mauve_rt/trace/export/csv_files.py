@@ -54,7 +54,10 @@ def export_csv(trace: Trace, folder: Path, *, force: bool = False, progress: Pro
 
 def _newer_frames(trace: Trace) -> dict[str, Callable[[Trace], pd.DataFrame]]:
     newer = sorted(set(trace.kinds) - set(Kind))
-    return {trace.kinds[kind].name: partial(frames.of_kind, kind=kind) for kind in newer}
+    names = {kind: trace.kinds[kind].name for kind in newer}
+    taken = {*_FRAMES, "components", "statistics"}
+    files = {kind: f"{name}_records" if name in taken else name for kind, name in names.items()}
+    return {files[kind]: partial(frames.of_kind, kind=kind) for kind in newer}
 
 
 def _write_parts(frame: pd.DataFrame, path: Path, progress: Progress) -> None:

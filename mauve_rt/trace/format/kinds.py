@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from mauve_rt.trace.format.records import Kind
 
+_MARK = "# The kinds are a table"
 _KIND = re.compile(
     r"^uint16 (?P<name>[A-Z][A-Z0-9_]*)=(?P<number>\d+)[ \t]*(?:#(?P<fields>.*))?$", re.MULTILINE
 )
@@ -35,7 +36,12 @@ class RecordKind(NamedTuple):
 
 
 def kinds_told(definition: str) -> dict[int, RecordKind]:
-    """Return the kinds that the text of TraceRecord.msg tells of, by their numbers."""
+    """Return the kinds that the text of TraceRecord.msg tells of, by their numbers.
+
+    Bags from before it was a table have prose there: their fields are called as they are.
+    """
+    if _MARK not in definition:
+        return kinds_known()
     return {
         int(told["number"]): RecordKind(
             told["name"].lower(), dict(_FIELD.findall(_IN_BRACKETS.sub("", told["fields"] or "")))
@@ -45,5 +51,6 @@ def kinds_told(definition: str) -> dict[int, RecordKind]:
 
 
 def kinds_known() -> dict[int, RecordKind]:
-    """Return the kinds that this reader knows, of a trace without a definition."""
-    return {kind: RecordKind(kind.name.lower(), {}) for kind in Kind}
+    """Return the kinds that this reader knows, of a trace without a table."""
+    fields = {field: field for field in ("name", "a", "b", "c")}
+    return {kind: RecordKind(kind.name.lower(), fields) for kind in Kind}

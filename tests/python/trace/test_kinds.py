@@ -2,12 +2,13 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from perfetto_decoding import Decoded
-from synthetic_traces import record
+from synthetic_traces import record, trace_of
 
 import mauve_rt.trace
 from mauve_rt.trace.export.csv_files import export_csv
@@ -58,6 +59,31 @@ def test_the_table_names_what_each_kind_uses():
     assert told[Kind.DEPLOYMENT].fields == {"a": "epoch_ns", "b": "offset_ns", "c": "period_ns"}
     assert told[Kind.STATE_BEGIN].figures == {}
     assert all(kind.fields for kind in told.values())
+
+
+def test_the_prose_of_bags_from_before_the_table_is_no_table():
+    told = kinds_told("uint16 START=2   # a: first nominal instant\nuint16 MARK=16  # a, b, c: the user's\n")
+    assert told == kinds_known()
+    assert told[Kind.MARK] == RecordKind("mark", {"name": "name", "a": "a", "b": "b", "c": "c"})
+
+
+def test_a_newer_kind_takes_no_other_file_s_name(later: Trace, tmp_path: Path):
+    kinds = dict(later.kinds) | {HEARTBEAT: later.kinds[HEARTBEAT]._replace(name="states")}
+    export_csv(replace(later, kinds=kinds), tmp_path / "csv")
+    assert len(pd.read_csv(tmp_path / "csv" / "states_records.csv")) == 2
+    assert pd.read_csv(tmp_path / "csv" / "states.csv").empty
+
+
+def test_a_wait_behind_a_loss_is_not_drawn(tmp_path: Path):
+    source = SyntheticSource(["a"])
+    source.add("a", Kind.MARK, 1, name="word")
+    source.drop("a", 3)
+    source.add("a", Kind.WAIT, 2, name="wait", a=5)
+    source.add("a", Kind.MARK, 3, name="word")
+    export_perfetto({"lost": trace_of(source)}, tmp_path / "lost.pftrace")
+    decoded = Decoded(tmp_path / "lost.pftrace")
+    drawn = [event.name for events in decoded.events.values() for event in events]
+    assert drawn == ["word", "records lost", "word"]
 
 
 def test_a_trace_made_without_a_bag_has_the_kinds_that_the_reader_knows():

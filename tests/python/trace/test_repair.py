@@ -7,7 +7,6 @@ import struct
 import subprocess
 import sys
 import textwrap
-import time
 from pathlib import Path
 
 import pytest
@@ -300,6 +299,7 @@ RUN = """
         flush()
         with open(acknowledged, "w") as file:  # what the bag holds for sure: all up to this drain
             file.write(f"{recorder._bag._last.written[0] - recorder._bag._last.dropped[0]}\\n")
+        print("flushed", flush=True)
     recorder._bag.flush = acknowledge
     recorder.start()
     deployer.deploy()
@@ -317,8 +317,9 @@ def test_after_a_kill_everything_flushed_is_there(tmp_path: Path, plugin_prefix:
             [sys.executable, "-c", textwrap.dedent(RUN), library, bag, acknowledged], stdout=subprocess.PIPE
         )
         assert process.stdout is not None
-        assert process.stdout.readline() == b"runs\n"
-        time.sleep(random.uniform(0.1, 0.4))  # noqa: S311 - no cryptography
+        assert b"runs\n" in process.stdout
+        for _ in range(random.randint(1, 60)):  # noqa: S311 - no cryptography
+            assert process.stdout.readline() == b"flushed\n"
         process.kill()
         process.wait()
         process.stdout.close()
