@@ -65,6 +65,7 @@ PropertyValue checked(const ResourceParameter& parameter, const PropertyValue& v
 
 std::vector<std::string> names_of(const std::vector<ResourceParameter>& parameters) {
   std::vector<std::string> names;
+  names.reserve(parameters.size());
   for (const ResourceParameter& parameter : parameters) names.push_back(parameter.name);
   return names;
 }

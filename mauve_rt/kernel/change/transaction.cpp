@@ -58,7 +58,7 @@ Transaction& Transaction::add_resource(const std::string& name, const std::strin
                                        const std::string& type, ResourceParameters parameters,
                                        TopicBinding topic) {
   return add(steps::add_resource, name, {},
-             NewResource{.kind = kind, .type = type, .parameters = parameters, .topic = topic});
+             NewResource{.kind = kind, .type = type, .parameters = std::move(parameters), .topic = topic});
 }
 Transaction& Transaction::add_resource(const std::string& name, std::unique_ptr<Resource> resource,
                                        TopicBinding topic) {

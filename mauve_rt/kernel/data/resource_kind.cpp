@@ -9,7 +9,7 @@ ResourceParameter max_bytes_parameter() {
           .description = "how large a message may be where no plug-in registered its type",
           .unit = "bytes",
           .minimum = 1,
-          .maximum = 1 << 28};
+          .maximum = 268'435'456};
 }
 
 }  // namespace mauve

@@ -349,7 +349,7 @@ TEST_F(Rule10Gate, AnAdoptThatDoesNotEndGivesUpItsComponentOnly) {
   deploy();
   auto fresh = std::make_unique<ToldCore>();
   fresh->adopting = [this] { latch.wait(); };
-  error = error_of(replace("c", std::move(fresh)), {.timeouts = {.commit_ns = ms_to_ns(50)}});
+  error = error_of(replace("c", std::move(fresh)), {.timeouts = {.commit_ns = s_to_ns(1)}});
   ASSERT_TRUE(error);
   EXPECT_EQ(ErrorCode::faulted, error->code()) << error->what();
   EXPECT_EQ("c", error->detail().component);
@@ -373,7 +373,7 @@ TEST_F(Rule10Gate, ATakeThatDoesNotEndGivesUpAllThatWaitForIt) {
   fresh->taking = [this] { latch.wait(); };
   Transaction change = replace("fast", std::move(fresh));
   change.set_property("slow", "gain", 2.0);
-  error = error_of(std::move(change), {.timeouts = {.commit_ns = s_to_ns(1)}});
+  error = error_of(std::move(change), {.timeouts = {.commit_ns = s_to_ns(2)}, .max_missed = 2000});
   ASSERT_TRUE(error);
   EXPECT_EQ(ErrorCode::faulted, error->code()) << error->what();
   EXPECT_EQ(ComponentState::faulted, fast->task().state());

@@ -19,7 +19,7 @@ Parts parts_of(const Draft& draft, NewComponent& wanted) {
 
 }  // namespace
 
-const StepKind steps::add_component{
+constexpr StepKind steps::add_component{
     .name = "add_component",
     .words =
         [](const TransactionStep& step) {

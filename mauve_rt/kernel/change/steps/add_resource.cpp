@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::add_resource{
+constexpr StepKind steps::add_resource{
     .name = "add_resource",
     .target = StepTarget::resource,
     .words =

@@ -21,8 +21,8 @@ void configure_component(Draft& draft, const std::string& name) {
 
 }  // namespace
 
-const StepKind steps::configure{.name = "configure", .draft = [](Draft& draft, TransactionStep& step) {
-                                  configure_component(draft, step.target);
-                                }};
+constexpr StepKind steps::configure{.name = "configure", .draft = [](Draft& draft, TransactionStep& step) {
+                                      configure_component(draft, step.target);
+                                    }};
 
 }  // namespace mauve

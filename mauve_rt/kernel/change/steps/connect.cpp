@@ -30,7 +30,7 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
 
 }  // namespace
 
-const StepKind steps::connect{
+constexpr StepKind steps::connect{
     .name = "connect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
       const auto& value = plain_value_of<std::string>(step);
       const std::size_t dot = value.find('.');

@@ -5,7 +5,7 @@
 
 namespace mauve {
 
-const StepKind steps::disconnect{
+constexpr StepKind steps::disconnect{
     .name = "disconnect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
       DraftComponent& component = draft.change(step.target);
       if (component.wires.erase(step.name) != 0) {

@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::place_core{
+constexpr StepKind steps::place_core{
     .name = "place_core", .words = part_words<CoreBase>, .draft = [](Draft& draft, TransactionStep& step) {
       std::unique_ptr<CoreBase> core = take(value_of<std::unique_ptr<CoreBase>>(step));
       DraftComponent& changed = draft.touch(step.target);

@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::remove_component{
+constexpr StepKind steps::remove_component{
     .name = "remove_component",
     .draft = [](Draft& draft, TransactionStep& step) { draft.remove_component(step.target); }};
 

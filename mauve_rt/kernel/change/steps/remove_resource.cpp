@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::remove_resource{
+constexpr StepKind steps::remove_resource{
     .name = "remove_resource",
     .target = StepTarget::resource,
     .draft = [](Draft& draft, TransactionStep& step) { draft.remove_resource(step.target); }};

@@ -19,7 +19,7 @@ void allow_first_core(DraftComponent& added, const CoreBase& core) {
 
 }  // namespace
 
-const StepKind steps::replace_core{
+constexpr StepKind steps::replace_core{
     .name = "replace_core", .words = part_words<CoreBase>, .draft = [](Draft& draft, TransactionStep& step) {
       const bool by_name = !brings<CoreBase>(step);
       std::unique_ptr<CoreBase> core =

@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::replace_fsm{
+constexpr StepKind steps::replace_fsm{
     .name = "replace_fsm", .words = part_words<FsmBase>, .draft = [](Draft& draft, TransactionStep& step) {
       const bool by_name = !brings<FsmBase>(step);
       std::unique_ptr<FsmBase> fsm =

@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::replace_shell{
+constexpr StepKind steps::replace_shell{
     .name = "replace_shell", .words = part_words<Shell>, .draft = [](Draft& draft, TransactionStep& step) {
       std::unique_ptr<Shell> shell = brings<Shell>(step) ? take(value_of<std::unique_ptr<Shell>>(step))
                                                          : draft.registry().make_shell(step.name);

@@ -4,9 +4,10 @@
 
 namespace mauve {
 
-const StepKind steps::resynchronise{.name = "resynchronise",
-                                    .target = StepTarget::all,
-                                    .words = [](const TransactionStep&) { return std::string(); },
-                                    .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
+constexpr StepKind steps::resynchronise{
+    .name = "resynchronise",
+    .target = StepTarget::all,
+    .words = [](const TransactionStep&) { return std::string(); },
+    .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
 
 }  // namespace mauve

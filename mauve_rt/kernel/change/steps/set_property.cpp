@@ -4,7 +4,7 @@
 
 namespace mauve {
 
-const StepKind steps::set_property{
+constexpr StepKind steps::set_property{
     .name = "set_property", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
       draft.set_property(draft.change(step.target), step.name, value_of<PropertyValue>(step));
     }};

@@ -36,7 +36,7 @@ void start_component(Draft& draft, const std::string& name, std::optional<time_n
 
 }  // namespace
 
-const StepKind steps::start{
+constexpr StepKind steps::start{
     .name = "start", .draft = [](Draft& draft, TransactionStep& step) {
       const bool has_clock = !std::holds_alternative<std::monostate>(step.value);
       start_component(draft, step.target,

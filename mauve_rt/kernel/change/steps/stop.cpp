@@ -18,7 +18,7 @@ void stop_component(Draft& draft, const std::string& name) {
 
 }  // namespace
 
-const StepKind steps::stop{
+constexpr StepKind steps::stop{
     .name = "stop", .draft = [](Draft& draft, TransactionStep& step) { stop_component(draft, step.target); }};
 
 }  // namespace mauve

@@ -136,7 +136,8 @@ class PluginRegistry {
   /// Every given kind that can be of the type, of data or of calls; false: it was registered before.
   template <typename Type>
   bool add_given(const std::string& type) {
-    return std::apply([&](auto... kinds) { return (add_given<Type>(kinds, type) | ...); }, GivenResources{});
+    return std::apply([&](auto... kinds) { return ((add_given<Type>(kinds, type) ? 1U : 0U) | ...) != 0U; },
+                      GivenResources{});
   }
   template <typename Type, typename Given>
   bool add_given(Given, const std::string& type) {

@@ -96,7 +96,7 @@ inline constexpr std::array kTaskSettings{
                     }},
     number_setting<&TaskSettings::max_backlog>("max_backlog", 1, INT64_MAX,
                                                "the default of 10 does for most"),
-    number_setting<&TaskSettings::stack_bytes>("stack_bytes", 65'536, std::int64_t{1} << 30,
+    number_setting<&TaskSettings::stack_bytes>("stack_bytes", 65'536, 1'073'741'824,
                                                "the default of 524288 does for most components"),
     number_setting<&TaskSettings::trace_records>("trace_records", 2, 1'048'576,
                                                  "leave the key out to have room by the period"),
