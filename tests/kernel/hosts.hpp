@@ -168,7 +168,11 @@ class AnyHost : public Way {
 template <typename Way>
 class OnBothHosts : public ::testing::Test {
  protected:
-  ~OnBothHosts() override { host.shutdown(); }
+  ~OnBothHosts() override {
+    if constexpr (!is_virtual) run_on_where_sanitized();
+    host.shutdown();
+  }
+  static constexpr bool is_virtual = std::is_same_v<Way, InVirtualTime>;
   Component& add(const std::string& name, std::int64_t period_ms = 1, const TaskSettings& settings = {}) {
     Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name, settings);
     component.set_property("period_ms", period_ms);

@@ -207,6 +207,7 @@ TYPED_TEST(ComponentLife, AStateMayStopItsOwnComponent) {
   const int runs = core.runs;
   this->host.start("c");
   this->wait_runs(component, runs + 2);
+  this->host.shutdown();  // before what the state uses is gone
 }
 
 TYPED_TEST(ComponentLife, AStateMayNotStartItsOwnComponent) {
@@ -226,6 +227,7 @@ TYPED_TEST(ComponentLife, AStateMayNotStartItsOwnComponent) {
   is_deployed = true;
   this->host.until([&] { return code >= 0; }, "the refusal");
   EXPECT_EQ(static_cast<int>(ErrorCode::already_running), code);
+  this->host.shutdown();  // before what the state uses is gone
 }
 
 TYPED_TEST(ComponentLife, AStateMayStopAndStartAnotherComponent) {
@@ -245,6 +247,7 @@ TYPED_TEST(ComponentLife, AStateMayStopAndStartAnotherComponent) {
   const int seen = this->core(other).runs;
   this->wait_runs(other, seen + 2);
   EXPECT_EQ(ComponentState::running, settled(component.task().state()));
+  this->host.shutdown();  // before what the state uses is gone
 }
 
 // ---- throw 42
