@@ -117,11 +117,11 @@ void conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
   constexpr time_ns_t kLook = ms_to_ns(20);  // only while an adopt or take lasts
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   for (Participant* place : commit.in_order()) {
-    if (place->in_flight) place->task->post(*place);
+    if (place->is_called()) place->task->post(*place);
   }
   if (!commit.wait_settled(until)) commit.call_off(Commit::Off::timed_out);
   for (Participant& place : commit.participants()) {
-    while (place.in_flight && !place.task->retract(monotonic_now_ns() + kLook)) {
+    while (place.is_called() && !place.task->retract(monotonic_now_ns() + kLook)) {
       if (monotonic_now_ns() < commit.patience_ends_ns(until)) continue;
       if (commit.abandon() && commit.maker() == &place)
         break;  // its place is empty; it comes back from there or not
@@ -143,6 +143,8 @@ namespace {
   for (Participant& place : commit.participants()) {
     if (place.task == &stuck || (commit.is_taking() && place.in_flight)) {
       place.task->condemn(what, place.task->clock().now_ns());
+    } else if (commit.is_taking() && !place.in_flight) {
+      place.task->fault_parked(what);
     }
   }
   throw Error(
@@ -223,6 +225,17 @@ void throw_if_off(Commit& commit, time_ns_t timeout_ns) {
   }
 }
 
+/// Where all are parked and new parts come in, one of their threads makes the change, so that an adopt that does not end
+/// keeps that thread and nobody else; how many are called.
+std::uint32_t call_parked(Commit& commit) {
+  for (Participant& place : commit.participants()) {
+    if (!place.replaces_parts || place.left_behind || !place.task->has_thread()) continue;
+    place.makes_parked = true;
+    return 1;
+  }
+  return 0;
+}
+
 }  // namespace
 
 bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
@@ -243,9 +256,12 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
     place.in_flight = !place.left_behind && !place.task->is_parked();
     if (place.in_flight && !place.task->is_simulated()) ++running;
   }
+  for (Participant& place : commit.participants()) {
+    if (running == 0) place.task->hold_parked(place);
+  }
+  if (running == 0 && conductor != nullptr) running = call_parked(commit);
   commit.expect(running);
   if (running == 0) {
-    for (Participant& place : commit.participants()) place.task->hold_parked(place);
     if (conductor != nullptr) {
       conductor->make_alone(commit);
     } else {

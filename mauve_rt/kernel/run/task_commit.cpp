@@ -106,6 +106,25 @@ void Task::visit(Participant& place) noexcept {
   commit.gone_on(answer == Commit::Answer::made_it);
 }
 
+/// Makes a change of which all participants are parked, when this one is to.
+bool Task::make_parked() noexcept {
+  bool is_mine = false;
+  place_.use([&](Participant& place) {
+    if (!place.makes_parked) return;
+    is_mine = true;
+    place.leaves_at_ns.store(kForever, std::memory_order_relaxed);
+    parked_.store(0, std::memory_order_release);
+    machine_.begin_execution(clock().now_ns(), kForever);  // who conducts the commit watches it
+    const Commit::Answer answer = place.commit->meet(place);
+    is_abandoned_ = !machine_.end_execution();
+    if (is_abandoned_) return;
+    parked_.store(1, std::memory_order_release);
+    control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+    place.commit->gone_on(answer == Commit::Answer::made_it);
+  });
+  return is_mine;
+}
+
 /// Skips the instants that passed at the gate, or in adopt and take; returns how many.
 std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
   return machine_.skip_lost(place.parked_ns, place.holds_until_ns != place.pending_ns, now_ns);
@@ -178,6 +197,12 @@ void Task::finish_parked(Participant& place, bool committed) noexcept {
     post_start(next_instant(place.start_clock_ns));
     wait_started();
   }
+}
+
+void Task::fault_parked(const std::string& what) {
+  FaultNote note{.what = std::make_shared<const std::string>(what), .when_ns = clock().now_ns()};
+  swap_fault(note);
+  publish_state(ComponentState::faulted);
 }
 
 void Task::refuse_commit() noexcept {

@@ -49,7 +49,8 @@ void Task::step() {
 
 void Task::take_up_start() noexcept {
   const std::uint32_t control = control_.load(std::memory_order_acquire);
-  if ((control & kCommit) != 0) refuse_commit();  // posted just before the park, too late for park() to see
+  if ((control & kCommit) != 0 && !make_parked()) refuse_commit();  // posted just before the park
+  if (std::exchange(is_abandoned_, false)) return park_condemned();
   if ((control & kStart) == 0) return;
   control_.fetch_and(~kStart, std::memory_order_acq_rel);
   if (!simulated_) counters_.mark();
@@ -152,7 +153,8 @@ void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
 void Task::end_in_fault() noexcept {
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   write_outputs(false);
-  const bool stays = (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  const bool stays =
+      !machine_.is_started() || (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
   if (fallback == nullptr) return park(ComponentState::faulted);
   // Not parked in between: nobody may take parts away that are put in this moment.

@@ -94,8 +94,7 @@ TEST_F(HostShutdown, WaitsForNoAdoptOfAStoppedComponent) {
   CoreBase* const old = &changed.core();
   Transaction change;
   change.replace_core("changed", std::make_unique<SlowToAdopt>(latch)).start("changed");
-  std::thread other =
-      prepare(std::move(change));  // the adopt runs on that thread, the component being parked
+  std::thread other = prepare(std::move(change));  // the adopt runs on the stopped component's thread
   deployer.stop("drive");
   deployer.start("drive");
   wait_runs(drive, core(drive).runs + 2);
@@ -103,15 +102,16 @@ TEST_F(HostShutdown, WaitsForNoAdoptOfAStoppedComponent) {
   EXPECT_FALSE(latch.open);
   EXPECT_FALSE(drive.task().has_thread());
   EXPECT_EQ(nullptr, architecture.host());
-  latch.open = true;
-  other.join();
+  other.join();  // nor does who asked for it
   EXPECT_EQ(ErrorCode::not_configured, refusal);
   EXPECT_EQ(old, &changed.core());
-  EXPECT_EQ(ComponentState::stopped, changed.task().state());
-  EXPECT_FALSE(changed.task().has_thread());
-  const int runs = core(changed).runs;
+  EXPECT_EQ(ComponentState::faulted, changed.task().state()) << "its thread was given up";
+  latch.open = true;
+  wait_until([&] { return changed.task().has_ended(); }, "the thread to come back");
+  const int runs = core(drive).runs;
   deployer.deploy();
-  wait_runs(changed, runs + 2);
+  wait_runs(drive, runs + 2);
+  EXPECT_EQ(ComponentState::faulted, changed.task().state());
   deployer.shutdown();
 }
 

@@ -382,6 +382,79 @@ TEST_F(Rule10Gate, ATakeThatDoesNotEndGivesUpAllThatWaitForIt) {
   wait_until([&] { return fast->task().is_parked() && slow->task().is_parked(); }, "both threads");
 }
 
+TEST_F(Rule10Gate, AnAdoptThatDoesNotEndHoldsNobodyWhoAsksItOfAStoppedComponent) {
+  Component& c = add("c", 2);
+  Component& other = add("other", 2);
+  deploy();
+  deployer.stop("c", s_to_ns(50));
+  auto fresh = std::make_unique<ToldCore>();
+  fresh->adopting = [this] { latch.wait(); };
+  error = error_of(replace("c", std::move(fresh)), {.timeouts = {.commit_ns = ms_to_ns(200)}});
+  ASSERT_TRUE(error);
+  EXPECT_EQ(ErrorCode::faulted, error->code()) << error->what();
+  EXPECT_THAT(error->what(), HasSubstr("adopt of c's new part does not end, on the thread of c"));
+  EXPECT_EQ(ComponentState::faulted, c.task().state());
+  EXPECT_TRUE(c.task().is_left_behind());
+  EXPECT_THROW(deployer.start("c"), Error);
+  Transaction next;
+  next.set_property("other", "gain", 2.0);
+  const auto refused = error_of(std::move(next), kPatient);
+  EXPECT_FALSE(refused) << refused->what();
+  expect_going_on(other);
+  latch.open();
+  wait_until([&] { return c.task().is_parked(); }, "the thread to come back");
+  EXPECT_EQ(ComponentState::faulted, c.task().state());
+  EXPECT_EQ(nullptr, dynamic_cast<ToldCore*>(&c.core())) << "nothing was changed";
+  EXPECT_FALSE(c.task().is_left_behind());
+}
+
+TEST_F(Rule10Gate, AStoppedComponentWhoseAdoptDoesNotEndCanBeRemoved) {
+  add("c", 2);
+  deploy();
+  deployer.stop("c", s_to_ns(50));
+  auto fresh = std::make_unique<ToldCore>();
+  fresh->adopting = [this] { latch.wait(); };
+  ASSERT_TRUE(error_of(replace("c", std::move(fresh)), {.timeouts = {.commit_ns = ms_to_ns(200)}}));
+  Transaction removal;
+  removal.remove_component("c");
+  const auto refused = error_of(std::move(removal), kPatient);
+  EXPECT_FALSE(refused) << refused->what();
+  EXPECT_EQ(nullptr, architecture.find_component("c"));
+  latch.open();
+}
+
+TEST_F(Rule10Gate, ATakeThatDoesNotEndGivesUpAllTheStoppedOnesOfItsChange) {
+  deploy_two();
+  deployer.stop("fast", s_to_ns(50));
+  deployer.stop("slow", s_to_ns(50));
+  auto fresh = std::make_unique<ToldCore>();
+  fresh->taking = [this] { latch.wait(); };
+  Transaction change = replace("fast", std::move(fresh));
+  change.set_property("slow", "gain", 2.0);
+  error = error_of(std::move(change), {.timeouts = {.commit_ns = ms_to_ns(200)}});
+  ASSERT_TRUE(error);
+  EXPECT_EQ(ErrorCode::faulted, error->code()) << error->what();
+  EXPECT_EQ(ComponentState::faulted, fast->task().state());
+  EXPECT_EQ(ComponentState::faulted, slow->task().state());
+  latch.open();
+  wait_until([&] { return fast->task().is_parked(); }, "its thread");
+}
+
+TEST_F(Rule10Gate, AChangeOfAStoppedComponentIsMadeAndItStartsWithIt) {
+  Component& c = add("c", 2);
+  deploy();
+  for (int i = 0; i < 50; ++i) {
+    deployer.stop("c", s_to_ns(50));
+    const auto refused = error_of(replace("c", std::make_unique<ToldCore>()), kPatient);
+    ASSERT_FALSE(refused) << refused->what();
+    EXPECT_EQ(ComponentState::stopped, c.task().state());
+    EXPECT_TRUE(c.task().is_parked());
+    EXPECT_NE(nullptr, dynamic_cast<ToldCore*>(&c.core()));
+    deployer.start("c");
+    wait_runs(c, core(c).runs + 1);
+  }
+}
+
 TEST_F(Rule10Gate, AnAdoptOverItsDeclaredBudgetIsRefused) {
   Component& c = add("c", 20, {.overrun = OverrunPolicy::fault});
   deploy();

@@ -76,6 +76,7 @@ struct Participant {
   time_ns_t budget_ns{0};              // what adopt and take of its own core need
   bool replaces_parts{false};          // its outputs are written as the ports' on_commit says
   bool in_flight{false};               // it was running when the commit began
+  bool makes_parked{false};            // it is parked, as all are, and its thread makes the change
   bool repairs{false};                 // it was FAULTED, and the change mends it
   const time_ns_t* epoch_ns{nullptr};  // the new one, once the change is made; nullptr: the epoch stays
   bool left_behind{false};  // to be removed, while its thread still executes what it was condemned for
@@ -101,6 +102,8 @@ struct Participant {
   time_ns_t release_actual_ns{0};
   std::atomic<std::uint32_t> released{0};
 
+  /// Whether its thread has to do with the change. [rt]
+  bool is_called() const MAUVE_RT { return in_flight || makes_parked; }
   /// After the commit was made: whether a release follows; none does in a wait that only a stop ends. [non-rt]
   bool is_followed_by_release() const noexcept {
     if (afterwards == Afterwards::go_on && pending_ns == kForever) return false;

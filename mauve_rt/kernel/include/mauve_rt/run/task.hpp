@@ -178,6 +178,8 @@ class Task final : public Waiter {
   }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
+  /// FAULTED, without a state that did it. [non-rt], the machine parked, command mutex held.
+  void fault_parked(const std::string& what);
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
   void write_outputs(bool commit) MAUVE_RT;
   /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
@@ -305,6 +307,7 @@ class Task final : public Waiter {
   void pass_commit() noexcept;
   void come_to_commit();
   void visit(Participant& place) noexcept;
+  bool make_parked() noexcept;
   void go_on_unchanged(Participant& place) noexcept;
   std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
   void exchange_state(ComponentState from, ComponentState to) noexcept;
