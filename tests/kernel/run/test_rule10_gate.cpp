@@ -343,6 +343,24 @@ TEST_F(Rule10Gate, WhileAnAdoptLastsTheOthersGoOn) {
   expect_going_on(*slow);
 }
 
+TEST_F(Rule10Gate, ACommitThatOverranIsPutDownToWhoWasOverItsBudget) {
+  deploy_two();
+  auto over = std::make_unique<ToldCore>();
+  over->adopting = pause_ms(60);
+  auto within = std::make_unique<ToldCore>();
+  within->adopting = pause_ms(90);
+  within->reckoned = ms_to_ns(120);
+  Transaction change = replace("fast", std::move(over));
+  change.replace_core("slow", std::move(within));
+  error = error_of(std::move(change), kPatient);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(ErrorCode::adopt_refused, error->code()) << error->what();
+  EXPECT_EQ("fast", error->detail().component) << error->what();
+  EXPECT_THAT(error->what(), HasSubstr("reckoned at 200 us"));
+  expect_going_on(*fast);
+  expect_going_on(*slow);
+}
+
 TEST_F(Rule10Gate, AnAdoptThatDoesNotEndGivesUpItsComponentOnly) {
   Component& c = add("c", 2);
   Component& other = add("other", 2);

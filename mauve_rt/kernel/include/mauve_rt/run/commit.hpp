@@ -229,6 +229,7 @@ class Commit {
   Answer wait_others(Participant& place) noexcept;
   Answer make_change() noexcept;
   bool adopt_all(const Clock& clock) noexcept;
+  const CommitAction* most_over_budget() const noexcept;
   bool begin_taking() noexcept;
   void take_all(const Clock& clock) noexcept;
   void borrow_priority() noexcept;
