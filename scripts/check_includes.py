@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Check the dependencies that no other tool sees.
 
-C++ includes point one way: kernel <- bindings, bridge; in the kernel a storey includes only those below it.
+C++ includes point one way: kernel <- rules <- bindings, bridge; in the kernel a storey includes only those below it.
 Examples and benchmarks use what is public only: the headers <mauve_rt/*.hpp>, and of the Python package
 nothing whose name starts with an underscore. import-linter checks the layers inside the Python packages; it
 sees no compiled module.
@@ -45,9 +45,14 @@ RULES = (
     rule("mauve_rt/kernel", ROS, "the kernel does not know ROS"),
     rule("mauve_rt/kernel", PYTHON, "the kernel does not know Python"),
     rule("mauve_rt/kernel", r"mauve_examples/", "the kernel does not know the examples"),
+    rule("mauve_rt/kernel", r"mauve_rt/rules/", "rules stand on the kernel, not the kernel on them"),
+    rule("mauve_rt/rules", ROS, "rules are at work where there is no ROS"),
+    rule("mauve_rt/rules", PYTHON, "rules are at work where there is no Python"),
+    rule("mauve_rt/rules", r"mauve_examples/", "rules do not know the examples"),
     rule("mauve_rt/bindings", ROS, "bindings translate the kernel only; ROS belongs in the bridge"),
     rule("mauve_rt/bindings", r"mauve_examples/", "bindings do not know the examples"),
     rule("mauve_rt/bridge", r"mauve_examples/", "the bridge does not know the examples"),
+    rule("tests/rules", ROS + "|" + PYTHON, "tests of rules run where there is neither ROS nor Python"),
     rule("tests/kernel", ROS + "|" + PYTHON, "kernel tests run where there is neither ROS nor Python"),
 )
 

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "conditions/kinds.hpp"
+
+namespace mauve::rules {
+
+ConditionKind overruns_kind() {
+  return {.name = "overruns",
+          .summary = "a component has overrun so often within a time",
+          .parameters = often_parameters(),
+          .hears =
+              [](const Parameters& told) {
+                return std::vector{SignalSpec{SignalKind::overruns, text(told, "component")}};
+              },
+          .make = make_often};
+}
+
+}  // namespace mauve::rules

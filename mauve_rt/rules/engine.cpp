@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/rules/engine.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+
+namespace mauve::rules {
+
+namespace {
+
+constexpr time_ns_t kFirstRetry = ms_to_ns(500);
+constexpr time_ns_t kLongestRetry = s_to_ns(30);
+constexpr time_ns_t kFirstAfterChange =
+    ms_to_ns(10);  // somebody else changed the architecture: look again soon
+constexpr int kMostDoublings = 12;
+
+Why why_of(Ended how) noexcept {
+  switch (how) {
+    case Ended::stale:
+      return Why::stale;
+    case Ended::withdrawn:
+      return Why::withdrawn;
+    case Ended::timed_out:
+      return Why::timed_out;
+    case Ended::done:
+    case Ended::refused:
+      break;
+  }
+  return Why::refused;
+}
+
+constexpr std::size_t index_of(Act act) noexcept { return static_cast<std::size_t>(act); }
+constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : Act::do_; }
+
+}  // namespace
+
+/// One rule at work.
+struct Engine::Life {
+  std::size_t index{0};
+  Rule rule;
+  std::unique_ptr<Condition> condition;
+  std::vector<bool> contends;  // with the rule of that number: both are about one component
+  Look last{};
+  bool armed{false};
+  bool in_effect{false};
+  bool left_alone{false};
+  std::array<std::optional<bool>, 2> in_place{};  // by Act; empty: nobody knows
+  std::array<bool, 2> ready{true, true};
+  time_ns_t not_before_ns{INT64_MIN};
+  int failures{0};
+  std::optional<std::pair<Act, Why>> excused{};  // the last reason given, so that it is given once
+
+  /// When the condition will have been as it is for long enough.
+  time_ns_t due_ns() const noexcept {
+    return later_by(last.since_ns, last.holds ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
+  }
+};
+
+Engine::Engine(std::vector<Rule> rules) {
+  for (Rule& rule : rules) {
+    auto life = std::make_unique<Life>();
+    life->index = lives_.size();
+    const GiveSignal give = [this](const SignalSpec& spec) -> Signal& {
+      signals_.push_back(std::make_unique<Signal>(word_));
+      heard_.push_back({.spec = spec, .signal = signals_.back().get()});
+      return *signals_.back();
+    };
+    try {
+      life->condition = make_condition(rule.when, give);
+    } catch (const Error& failure) {
+      ErrorDetail detail = failure.detail();
+      detail.component = "rule " + rule.name;
+      throw Error(failure.code(), failure.what(), detail);
+    }
+    life->rule = std::move(rule);
+    lives_.push_back(std::move(life));
+  }
+  for (const auto& life : lives_) {
+    by_rank_.push_back(life.get());
+    for (const auto& other : lives_) {
+      const auto& theirs = other->rule.about;
+      life->contends.push_back(other != life && std::any_of(life->rule.about.begin(), life->rule.about.end(),
+                                                            [&](const auto& name) {
+                                                              return std::find(theirs.begin(), theirs.end(),
+                                                                               name) != theirs.end();
+                                                            }));
+    }
+  }
+  std::stable_sort(by_rank_.begin(), by_rank_.end(),
+                   [](const Life* a, const Life* b) { return a->rule.priority > b->rule.priority; });
+}
+
+Engine::~Engine() = default;
+
+void Engine::wake() noexcept {
+  word_.fetch_add(1, std::memory_order_release);
+  futex_wake_all(word_);
+}
+
+// ---- what is found of the architecture
+
+void Engine::set_present(std::size_t rule, bool present, time_ns_t now_ns) noexcept {
+  Life& life = *lives_[rule];
+  if (life.armed == present) return;
+  life.armed = present;
+  life.last = {.since_ns = now_ns};
+  life.excused.reset();
+  if (present) {
+    life.condition->arm(now_ns);
+    if (life.in_effect) life.condition->assume();
+  }
+  tell(life, {.stamp_ns = now_ns, .decided = present ? Decided::armed : Decided::disarmed});
+}
+
+void Engine::arm(time_ns_t now_ns) noexcept {
+  for (const auto& life : lives_) set_present(life->index, true, now_ns);
+}
+
+void Engine::set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) noexcept {
+  Life& life = *lives_[rule];
+  life.in_place[index_of(act)] = in_place;
+  const bool is_undone = act == Act::do_ && !in_place && life.in_effect && !under_way_;
+  if (!is_undone) return;
+  life.in_effect = false;
+  life.left_alone = true;
+  suppress(life, Act::do_, Why::other_hand, now_ns);
+}
+
+void Engine::set_ready(std::size_t rule, Act act, bool ready) noexcept {
+  lives_[rule]->ready[index_of(act)] = ready;
+}
+
+void Engine::adopt(std::size_t rule, time_ns_t now_ns) noexcept {
+  Life& life = *lives_[rule];
+  if (life.in_effect) return;
+  life.in_effect = true;
+  life.in_place = {true, false};
+  life.condition->assume();
+  tell(life, {.stamp_ns = now_ns, .decided = Decided::adopted});
+}
+
+void Engine::forget() noexcept {
+  wish_.reset();
+  under_way_.reset();
+  for (const auto& life : lives_) {
+    life->armed = life->in_effect = life->left_alone = false;
+    life->in_place = {};
+    life->ready = {true, true};
+    life->not_before_ns = INT64_MIN;
+    life->failures = 0;
+    life->excused.reset();
+  }
+}
+
+// ---- deciding
+
+time_ns_t Engine::step(time_ns_t now_ns) noexcept {
+  wish_.reset();
+  for (const auto& life : lives_) {
+    if (life->armed) look(*life, now_ns);
+  }
+  for (Life* life : by_rank_) {
+    if (!life->armed) continue;
+    if (const auto act = wanted(*life, now_ns)) consider(*life, *act, now_ns);
+  }
+  time_ns_t next_ns = kForever;
+  for (const auto& life : lives_) {
+    if (life->armed) next_ns = std::min(next_ns, next_look(*life, now_ns));
+  }
+  return next_ns;
+}
+
+void Engine::look(Life& life, time_ns_t now_ns) noexcept {
+  const bool before = life.last.holds;
+  life.last = life.condition->look(now_ns);
+  if (life.last.holds == before) return;
+  life.failures = 0;
+  life.excused.reset();
+  tell(life,
+       {.stamp_ns = now_ns, .decided = life.last.holds ? Decided::condition_true : Decided::condition_false});
+}
+
+/// What the dwell times ask for, whether it may be done or not.
+std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
+  const bool is_due = now_ns >= life.due_ns();
+  if (life.last.holds) {
+    if (is_due && !life.in_effect && !life.left_alone) return Act::do_;
+    return std::nullopt;
+  }
+  if (!is_due) return std::nullopt;
+  life.left_alone = false;
+  if (life.in_effect && !life.rule.undoes) life.in_effect = false;
+  if (life.in_effect) return Act::undo;
+  return std::nullopt;
+}
+
+time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
+  const bool may_want =
+      life.last.holds ? !life.in_effect && !life.left_alone : life.in_effect || life.left_alone;
+  if (!may_want) return life.last.next_ns;
+  if (life.due_ns() > now_ns) return std::min(life.last.next_ns, life.due_ns());
+  return life.not_before_ns > now_ns ? std::min(life.last.next_ns, life.not_before_ns) : life.last.next_ns;
+}
+
+bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
+  if (under_way_ && under_way_->rule == life.index) return false;
+  if (life.in_place[index_of(act)].value_or(false)) {
+    suppress(life, act, Why::already, now_ns);
+    settle(life, act, now_ns);
+    return false;
+  }
+  if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
+    suppress(life, act, Why::outranked, now_ns, other);
+    return false;
+  }
+  if (now_ns < life.not_before_ns) {
+    if (life.failures == 0) suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
+    return false;
+  }
+  if (under_way_ || wish_) {
+    suppress(life, act, Why::in_flight, now_ns, lives_[under_way_ ? under_way_->rule : wish_->rule].get());
+    return false;
+  }
+  if (!life.ready[index_of(act)]) {
+    suppress(life, act, Why::not_ready, now_ns);
+    return false;
+  }
+  wish_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
+  return true;
+}
+
+/// A rule of higher rank that is about one of the same components, and has done or is about to do what it does. One that
+/// cannot leaves the way free: something else than nothing.
+const Engine::Life* Engine::outranking(const Life& life) const noexcept {
+  for (const Life* other : by_rank_) {
+    if (other == &life) return nullptr;
+    if (!other->armed || !life.contends[other->index]) continue;
+    const bool begins = under_way_ && under_way_->rule == other->index && under_way_->act == Act::do_;
+    const bool wishes = wish_ && wish_->rule == other->index && wish_->act == Act::do_;
+    if (other->in_effect || begins || wishes) return other;
+  }
+  return nullptr;
+}
+
+void Engine::begun(time_ns_t now_ns) noexcept {
+  under_way_ = wish_;
+  wish_.reset();
+  if (!under_way_) return;
+  const Act act = under_way_->act;
+  tell(*lives_[under_way_->rule],
+       {.stamp_ns = now_ns, .decided = act == Act::do_ ? Decided::do_ : Decided::undo, .act = act});
+}
+
+void Engine::ended(Ended how, time_ns_t now_ns) noexcept {
+  if (!under_way_) return;
+  Life& life = *lives_[under_way_->rule];
+  const Act act = under_way_->act;
+  under_way_.reset();
+  if (how == Ended::done) {
+    tell(life, {.stamp_ns = now_ns, .decided = Decided::done, .act = act});
+    settle(life, act, now_ns);
+    life.in_place[index_of(act)] = true;
+    life.in_place[index_of(opposite(act))] = false;
+    return;
+  }
+  const bool is_changed = how == Ended::stale || how == Ended::withdrawn;
+  const time_ns_t first_ns = is_changed ? kFirstAfterChange : std::max(life.rule.cooldown_ns, kFirstRetry);
+  const time_ns_t longest_ns = std::max(kLongestRetry, life.rule.cooldown_ns);
+  const time_ns_t wait_ns = first_ns > (longest_ns >> life.failures) ? longest_ns : first_ns << life.failures;
+  life.failures = std::min(life.failures + 1, kMostDoublings);
+  life.excused.reset();
+  life.not_before_ns = later_by(now_ns, wait_ns);
+  tell(life,
+       {.stamp_ns = now_ns, .decided = Decided::failed, .act = act, .why = why_of(how), .wait_ns = wait_ns});
+}
+
+/// An action is in effect, whoever did it.
+void Engine::settle(Life& life, Act act, time_ns_t now_ns) noexcept {
+  life.in_effect = act == Act::do_;
+  life.failures = 0;
+  life.excused.reset();
+  life.not_before_ns = later_by(now_ns, life.rule.cooldown_ns);
+  for (const auto& other : lives_) {
+    if (!life.contends[other->index]) continue;
+    other->in_place = {};
+    if (!life.in_effect || !std::exchange(other->in_effect, false)) continue;
+    suppress(*other, Act::do_, Why::outranked, now_ns, &life);  // what it did is gone
+  }
+}
+
+// ---- telling
+
+void Engine::suppress(Life& life, Act act, Why why, time_ns_t now_ns, const Life* other,
+                      time_ns_t wait_ns) noexcept {
+  const std::pair reason(act, why);
+  if (life.excused == reason) return;
+  life.excused = reason;
+  tell(life, {.stamp_ns = now_ns,
+              .decided = Decided::suppressed,
+              .act = act,
+              .why = why,
+              .other = other != nullptr ? static_cast<std::int32_t>(other->index) : -1,
+              .wait_ns = wait_ns});
+}
+
+void Engine::tell(const Life& life, Decision decision) noexcept {
+  const std::uint64_t told = told_.load(std::memory_order_relaxed);  // relaxed: nobody else writes it
+  if (told - taken_.load(std::memory_order_acquire) >= kRing) {
+    lost_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  decision.rule = static_cast<std::int32_t>(life.index);
+  decision.cause_ns = life.last.since_ns;
+  decision.measured = life.last.measured;
+  ring_[told % kRing] = decision;
+  told_.store(told + 1, std::memory_order_release);
+}
+
+std::optional<Decision> Engine::take() noexcept {
+  const std::uint64_t taken = taken_.load(std::memory_order_relaxed);  // relaxed: nobody else writes it
+  if (taken == told_.load(std::memory_order_acquire)) return std::nullopt;
+  const Decision decision = ring_[taken % kRing];
+  taken_.store(taken + 1, std::memory_order_release);
+  return decision;
+}
+
+RuleStatus Engine::status(std::size_t rule) const noexcept {
+  const Life& life = *lives_[rule];
+  RuleStatus status{.armed = life.armed,
+                    .holds = life.last.holds,
+                    .in_effect = life.in_effect,
+                    .left_alone = life.left_alone,
+                    .since_ns = life.last.since_ns,
+                    .measured = life.last.measured};
+  if (!life.armed) return status;
+  if (life.last.holds && !life.in_effect && !life.left_alone) {
+    status.next = Act::do_;
+    status.next_ns = std::max(life.due_ns(), life.not_before_ns);
+  } else if (!life.last.holds && life.in_effect && life.rule.undoes) {
+    status.next = Act::undo;
+    status.next_ns = std::max(life.due_ns(), life.not_before_ns);
+  } else if (!life.last.holds && !life.in_effect && life.last.next_ns != kForever) {
+    status.next = Act::do_;  // if nothing is told until then
+    status.next_ns = std::max(later_by(life.last.next_ns, life.rule.for_ns), life.not_before_ns);
+  }
+  return status;
+}
+
+const Rule& Engine::rule(std::size_t rule) const { return lives_.at(rule)->rule; }
+
+}  // namespace mauve::rules

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Engine: decides what the rules of an architecture want done, and when.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/rules/condition.hpp"
+#include "mauve_rt/rules/decision.hpp"
+#include "mauve_rt/rules/signal.hpp"
+
+namespace mauve::rules {
+
+/// One rule, without what its transactions are made of.
+struct Rule {
+  std::string name{};
+  When when{};
+  time_ns_t for_ns{0};       // the condition must have held so long before `do`
+  bool undoes{false};        // else it is over when the condition ends
+  time_ns_t undo_for_ns{0};  // and not held so long before `undo`
+  time_ns_t cooldown_ns{0};  // from the end of an action to the next one of the rule
+  std::int64_t priority{0};  // of several that are about the same, the highest decides; then the first
+  std::vector<std::string> about{};  // components that it changes
+};
+
+/// What the engine wants done now.
+struct Wish {
+  std::size_t rule{0};
+  Act act{Act::do_};
+  time_ns_t cause_ns{0};  // since when the condition has been as it is
+  double measured{0.0};
+};
+
+/// How an action that was begun has ended.
+enum class Ended : std::uint8_t { done, refused, stale, withdrawn, timed_out };
+
+/// How one rule fares.
+struct RuleStatus {
+  bool armed{false};
+  bool holds{false};
+  bool in_effect{false};
+  bool left_alone{false};
+  time_ns_t since_ns{0};  // the condition has been as it is
+  double measured{0.0};
+  std::optional<Act> next{};    // what it is going to want if nothing changes
+  time_ns_t next_ns{kForever};  // when
+};
+
+/// The rules of one architecture: no thread in it, no clock, and nothing allocated after it was made.
+///
+/// A rule does (`do`) once its condition has held for `for_ns`, and undoes (`undo`) once it has not held for `undo_for_ns`.
+/// It never fights a person: what it wants and finds already done is not done again, and what somebody changes while it is
+/// in effect stays as it is until the condition ends. One action at a time is under way.
+///
+/// Whoever hosts it calls step() at the instant that the step before returned, and when word() has changed; carries out
+/// wish(), until there is none; and tells what it finds of the architecture. All of that on one thread, the "stepper".
+///
+/// | member       | written by          | read by             | order                                                     |
+/// | ------------ | ------------------- | ------------------- | --------------------------------------------------------- |
+/// | signals_     | who feeds them      | stepper             | their own: signal.hpp                                     |
+/// | word_ (futex)| signals, wake()     | stepper             | release/acquire: who sees it changed sees why             |
+/// | told_, ring_ | stepper             | who takes decisions | release/acquire: a decision is whole before it is counted |
+/// | taken_       | who takes decisions | stepper             | release/acquire: its place may be written again           |
+/// | lost_        | stepper             | anyone              | relaxed: a lone count                                     |
+/// | the rest     | stepper             | stepper             | -                                                         |
+class Engine {
+ public:
+  /// [setup] Throws Error: a rule that cannot be so.
+  explicit Engine(std::vector<Rule> rules);
+  ~Engine();
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  // ---- what it hears
+
+  struct Heard {
+    SignalSpec spec;
+    Signal* signal;
+  };
+  /// One for each condition that listens, in the order of the rules. [non-rt]
+  const std::vector<Heard>& signals() const noexcept { return heard_; }
+  /// Bumped by what is of interest. [rt]
+  const std::atomic<std::uint32_t>& word() const MAUVE_RT { return word_; }
+  /// Lets the stepper look. Any thread. [rt]
+  void wake() MAUVE_RT;
+
+  // ---- the stepper: what it finds of the architecture
+
+  /// Whether all that the rule is about is there and runs: it is armed, or watches no longer. [rt]
+  void set_present(std::size_t rule, bool present, time_ns_t now_ns) MAUVE_RT;
+  /// All rules are present. [rt]
+  void arm(time_ns_t now_ns) MAUVE_RT;
+  /// Whether what the act would do is in effect now. [rt]
+  void set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) MAUVE_RT;
+  /// Whether the act could begin at once; it can until the opposite is said. [rt]
+  void set_ready(std::size_t rule, Act act, bool ready) MAUVE_RT;
+  /// What the rule does is in effect already, by who was there before: it is undone when it is time. [rt]
+  void adopt(std::size_t rule, time_ns_t now_ns) MAUVE_RT;
+  /// The architecture is another one: nothing of before counts. [rt]
+  void forget() MAUVE_RT;
+
+  // ---- the stepper: deciding
+
+  /// Looks at all conditions; the instant at which it has to at the latest. [rt]
+  time_ns_t step(time_ns_t now_ns) MAUVE_RT;
+  /// What to do now, found by the last step. [rt]
+  const std::optional<Wish>& wish() const MAUVE_RT { return wish_; }
+  /// The wish is being carried out: there is no other until it has ended. [rt]
+  void begun(time_ns_t now_ns) MAUVE_RT;
+  /// [rt]
+  void ended(Ended how, time_ns_t now_ns) MAUVE_RT;
+
+  // ---- telling
+
+  /// The next decision that was not taken yet; one thread at a time. [rt]
+  std::optional<Decision> take() MAUVE_RT;
+  /// Decisions that found no room, as nobody took them. [rt]
+  std::uint64_t lost() const MAUVE_RT { return lost_.load(std::memory_order_relaxed); }
+  /// The stepper. [rt]
+  RuleStatus status(std::size_t rule) const MAUVE_RT;
+  std::size_t size() const MAUVE_RT { return lives_.size(); }
+  /// [non-rt]
+  const Rule& rule(std::size_t rule) const;
+
+ private:
+  struct Life;
+  static constexpr std::size_t kRing = 512;
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  void look(Life& life, time_ns_t now_ns) noexcept;
+  std::optional<Act> wanted(Life& life, time_ns_t now_ns) noexcept;
+  time_ns_t next_look(const Life& life, time_ns_t now_ns) const noexcept;
+  bool consider(Life& life, Act act, time_ns_t now_ns) noexcept;
+  const Life* outranking(const Life& life) const noexcept;
+  void settle(Life& life, Act act, time_ns_t now_ns) noexcept;
+  void suppress(Life& life, Act act, Why why, time_ns_t now_ns, const Life* other = nullptr,
+                time_ns_t wait_ns = 0) noexcept;
+  void tell(const Life& life, Decision decision) noexcept;
+
+  std::vector<std::unique_ptr<Signal>> signals_;
+  std::vector<Heard> heard_;
+  std::vector<std::unique_ptr<Life>> lives_;
+  std::vector<Life*> by_rank_;  // the highest first
+  std::optional<Wish> wish_;
+  std::optional<Wish> under_way_;
+  std::array<Decision, kRing> ring_{};
+  alignas(64) std::atomic<std::uint32_t> word_{0};
+  alignas(64) std::atomic<std::uint64_t> told_{0};
+  alignas(64) std::atomic<std::uint64_t> taken_{0};
+  std::atomic<std::uint64_t> lost_{0};
+};
+
+}  // namespace mauve::rules
