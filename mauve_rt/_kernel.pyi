@@ -1,6 +1,6 @@
 """The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import (
     Any,
     ClassVar,
@@ -723,3 +723,189 @@ def allocation_counting() -> str:
     """
 
 def monotonic_ns() -> int: ...
+
+# ---- rules: the engine that the supervisor, virtual time and tools share; instants are the caller's
+
+@final
+class ConditionParameter:
+    """What a condition may be told."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def type(self) -> str:
+        """bool, int, float, str; what a text is (topic, message_type, component, resource, field, executor);
+        or the texts that it can be, as 'wake_up|response'.
+        """
+    @property
+    def unit(self) -> str: ...
+    @property
+    def minimum(self) -> float | None: ...
+    @property
+    def maximum(self) -> float | None: ...
+    @property
+    def initial(self) -> bool | int | float | str | None: ...
+    @property
+    def required(self) -> bool: ...
+
+@final
+class ConditionKind:
+    """A row of the table of conditions."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def summary(self) -> str:
+        """When it holds."""
+    @property
+    def parameters(self) -> list[ConditionParameter]: ...
+
+def condition_kinds() -> list[ConditionKind]:
+    """All conditions that there are."""
+
+@final
+class WhenSpec:
+    """A tree of conditions: `kind` one of the table, or all, any, not, at_least (with `count`)."""
+
+    def __init__(
+        self,
+        kind: str,
+        *,
+        parameters: Mapping[str, bool | int | float | str] = {},
+        parts: Sequence[WhenSpec] = [],
+        count: int = 0,
+        for_ns: int = 0,
+        within_ns: int = 0,
+    ) -> None: ...
+
+@final
+class RuleSpec:
+    """One rule; `about`: the components that it changes, of which only one rule at a time decides."""
+
+    def __init__(
+        self,
+        name: str,
+        when: WhenSpec,
+        *,
+        for_ns: int = 0,
+        undoes: bool = False,
+        undo_for_ns: int = 0,
+        cooldown_ns: int = 0,
+        priority: int = 0,
+        about: Sequence[str] = [],
+    ) -> None: ...
+
+@final
+class SignalSpec:
+    """What one condition hears."""
+
+    @property
+    def kind(self) -> str:
+        """message, write, field, overruns, late, release, state, over_declared, peer, diagnostic or change."""
+    @property
+    def target(self) -> str: ...
+    @property
+    def detail(self) -> str: ...
+
+@final
+class Wish:
+    """What an engine wants done now. act: 'do' or 'undo'; cause_ns: since when the condition is as it is."""
+
+    @property
+    def rule(self) -> int: ...
+    @property
+    def act(self) -> str: ...
+    @property
+    def cause_ns(self) -> int: ...
+    @property
+    def measured(self) -> float: ...
+
+@final
+class RuleDecision:
+    """One decision. decision: as in SupervisorDecision.msg; why: in words, '' where there is no reason."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def rule(self) -> int: ...
+    @property
+    def decision(self) -> str: ...
+    @property
+    def act(self) -> str: ...
+    @property
+    def why(self) -> str: ...
+    @property
+    def other(self) -> int | None:
+        """The rule that outranks it, or whose action is under way."""
+    @property
+    def cause_ns(self) -> int: ...
+    @property
+    def wait_ns(self) -> int: ...
+    @property
+    def measured(self) -> float: ...
+
+@final
+class RuleStatus:
+    """How one rule fares. next: 'do' or 'undo' if nothing changes, and when."""
+
+    @property
+    def armed(self) -> bool: ...
+    @property
+    def holds(self) -> bool: ...
+    @property
+    def in_effect(self) -> bool: ...
+    @property
+    def left_alone(self) -> bool: ...
+    @property
+    def since_ns(self) -> int: ...
+    @property
+    def measured(self) -> float: ...
+    @property
+    def next(self) -> str | None: ...
+    @property
+    def next_ns(self) -> int | None: ...
+
+@final
+class RuleEngine:
+    """Decides what rules want done, and when. All but tell, wake and wait from one thread.
+
+    Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rule or signal that there is not.
+    """
+
+    def __init__(self, rules: Sequence[RuleSpec]) -> None: ...
+    @property
+    def signals(self) -> list[SignalSpec]:
+        """One for each condition that listens; several may hear the same."""
+    def tell(self, signal: int, time_ns: int, value: float = 0.0) -> None:
+        """Something was heard. One thread at a time for each signal."""
+    def arm(self, now_ns: int) -> None:
+        """All rules are present."""
+    def set_present(self, rule: int, present: bool, now_ns: int) -> None:
+        """Whether all that the rule is about is there and runs."""
+    def set_in_place(self, rule: int, act: str, in_place: bool, now_ns: int) -> None:
+        """Whether what the act would do is in effect."""
+    def set_ready(self, rule: int, act: str, ready: bool) -> None:
+        """Whether the act could begin at once."""
+    def adopt(self, rule: int, now_ns: int) -> None:
+        """What the rule does is in effect already: it is undone when it is time."""
+    def forget(self) -> None:
+        """The architecture is another one."""
+    def step(self, now_ns: int) -> int:
+        """Look at all conditions; the instant at which to step again at the latest."""
+    @property
+    def wish(self) -> Wish | None: ...
+    def begun(self, now_ns: int) -> None:
+        """The wish is being carried out."""
+    def ended(self, how: str, now_ns: int) -> None:
+        """How: done, refused, stale, withdrawn or timed_out."""
+    def take(self) -> RuleDecision | None:
+        """The next decision that was not taken yet."""
+    def lost(self) -> int:
+        """Decisions that found no room."""
+    def status(self, rule: int) -> RuleStatus: ...
+    def wake(self) -> None:
+        """Ends a wait."""
+    def word(self) -> int:
+        """Changes with all that is of interest; for wait()."""
+    def wait(self, word: int, until_ns: int) -> bool:
+        """Sleep until the word is another one (True) or until the instant of CLOCK_MONOTONIC (False)."""

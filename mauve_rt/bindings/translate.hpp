@@ -34,6 +34,8 @@ void bind_transaction(py::module_& module);
 /// Registers what parts written in Python see of their shell, and what they declare themselves with.
 void bind_python_shell(py::module_& module);
 void bind_python_fsm(py::module_& module);
+/// Registers the table of conditions and the engine of rules.
+void bind_rules(py::module_& module);
 /// Registers Simulation and its hosts; after Host.
 void bind_simulation(py::module_& module);
 

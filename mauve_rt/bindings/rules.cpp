@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The engine of rules. Parameters that are texts, numbers or truths are Python's own.
+#include "mauve_rt/rules/engine.hpp"
+
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+using Unlocked = py::call_guard<py::gil_scoped_release>;
+
+constexpr auto kSignalNames =
+    std::to_array<std::string_view>({"message", "write", "field", "overruns", "late", "release", "state",
+                                     "over_declared", "peer", "diagnostic", "change"});
+constexpr auto kEndings =
+    std::to_array<std::string_view>({"done", "refused", "stale", "withdrawn", "timed_out"});
+
+std::string_view name_of_act(rules::Act act) { return act == rules::Act::do_ ? "do" : "undo"; }
+
+[[noreturn]] void refuse_name(const char* what, const std::string& expected, const std::string& found) {
+  throw Error(ErrorCode::invalid_argument, what, {.expected = expected, .found = found});
+}
+
+rules::Act act_of(const std::string& name) {
+  if (name != "do" && name != "undo") refuse_name("there is no such act", "do or undo", name);
+  return name == "do" ? rules::Act::do_ : rules::Act::undo;
+}
+
+rules::Ended ended_of(const std::string& name) {
+  const auto* const found = std::find(kEndings.begin(), kEndings.end(), name);
+  if (found == kEndings.end())
+    refuse_name("an action does not end so", "done, refused, stale, withdrawn or timed_out", name);
+  return static_cast<rules::Ended>(found - kEndings.begin());
+}
+
+/// An engine, and who asks it about a rule or signal that there is not is told.
+class PyRuleEngine {
+ public:
+  explicit PyRuleEngine(std::vector<rules::Rule> all) : engine(std::move(all)) {}
+
+  std::size_t rule(std::size_t number) const {
+    if (number >= engine.size()) throw py::index_error("there are " + std::to_string(engine.size()) + " rules");
+    return number;
+  }
+  rules::Signal& signal(std::size_t number) const {
+    const auto& all = engine.signals();
+    if (number >= all.size()) throw py::index_error("there are " + std::to_string(all.size()) + " signals");
+    return *all[number].signal;
+  }
+
+  rules::Engine engine;
+};
+
+void bind_table(py::module_& module) {
+  py::class_<rules::ParameterSpec>(module, "ConditionParameter")
+      .def_readonly("name", &rules::ParameterSpec::name)
+      .def_readonly("type", &rules::ParameterSpec::type)
+      .def_readonly("unit", &rules::ParameterSpec::unit)
+      .def_readonly("minimum", &rules::ParameterSpec::minimum)
+      .def_readonly("maximum", &rules::ParameterSpec::maximum)
+      .def_readonly("initial", &rules::ParameterSpec::initial)
+      .def_readonly("required", &rules::ParameterSpec::required);
+  py::class_<rules::ConditionKind>(module, "ConditionKind")
+      .def_readonly("name", &rules::ConditionKind::name)
+      .def_readonly("summary", &rules::ConditionKind::summary)
+      .def_readonly("parameters", &rules::ConditionKind::parameters);
+  module.def("condition_kinds", [] { return rules::condition_kinds(); });
+}
+
+void bind_rules_of_an_engine(py::module_& module) {
+  py::class_<rules::When>(module, "WhenSpec")
+      .def(py::init([](std::string kind, rules::Parameters parameters, std::vector<rules::When> parts,
+                       std::int64_t count, time_ns_t for_ns, time_ns_t within_ns) {
+             return rules::When{std::move(kind), std::move(parameters), std::move(parts), count, for_ns, within_ns};
+           }),
+           py::arg("kind"), py::kw_only(), py::arg("parameters") = rules::Parameters{},
+           py::arg("parts") = std::vector<rules::When>{}, py::arg("count") = 0, py::arg("for_ns") = 0,
+           py::arg("within_ns") = 0);
+  py::class_<rules::Rule>(module, "RuleSpec")
+      .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes, time_ns_t undo_for_ns,
+                       time_ns_t cooldown_ns, std::int64_t priority, std::vector<std::string> about) {
+             return rules::Rule{std::move(name), std::move(when), for_ns,  undoes,
+                                undo_for_ns,     cooldown_ns,     priority, std::move(about)};
+           }),
+           py::arg("name"), py::arg("when"), py::kw_only(), py::arg("for_ns") = 0, py::arg("undoes") = false,
+           py::arg("undo_for_ns") = 0, py::arg("cooldown_ns") = 0, py::arg("priority") = 0,
+           py::arg("about") = std::vector<std::string>{});
+  py::class_<rules::SignalSpec>(module, "SignalSpec")
+      .def_property_readonly(
+          "kind",
+          [](const rules::SignalSpec& self) { return kSignalNames[static_cast<std::size_t>(self.kind)]; })
+      .def_readonly("target", &rules::SignalSpec::target)
+      .def_readonly("detail", &rules::SignalSpec::detail);
+}
+
+void bind_answers(py::module_& module) {
+  py::class_<rules::Wish>(module, "Wish")
+      .def_readonly("rule", &rules::Wish::rule)
+      .def_property_readonly("act", [](const rules::Wish& self) { return name_of_act(self.act); })
+      .def_readonly("cause_ns", &rules::Wish::cause_ns)
+      .def_readonly("measured", &rules::Wish::measured);
+  py::class_<rules::Decision>(module, "RuleDecision")
+      .def_readonly("stamp_ns", &rules::Decision::stamp_ns)
+      .def_readonly("rule", &rules::Decision::rule)
+      .def_property_readonly("decision", [](const rules::Decision& self) { return rules::name_of(self.decided); })
+      .def_property_readonly("act", [](const rules::Decision& self) { return name_of_act(self.act); })
+      .def_property_readonly("why", [](const rules::Decision& self) { return rules::words_of(self.why); })
+      .def_property_readonly("other",
+                             [](const rules::Decision& self) {
+                               return self.other < 0 ? std::optional<std::int32_t>() : self.other;
+                             })
+      .def_readonly("cause_ns", &rules::Decision::cause_ns)
+      .def_readonly("wait_ns", &rules::Decision::wait_ns)
+      .def_readonly("measured", &rules::Decision::measured);
+  py::class_<rules::RuleStatus>(module, "RuleStatus")
+      .def_readonly("armed", &rules::RuleStatus::armed)
+      .def_readonly("holds", &rules::RuleStatus::holds)
+      .def_readonly("in_effect", &rules::RuleStatus::in_effect)
+      .def_readonly("left_alone", &rules::RuleStatus::left_alone)
+      .def_readonly("since_ns", &rules::RuleStatus::since_ns)
+      .def_readonly("measured", &rules::RuleStatus::measured)
+      .def_property_readonly("next",
+                             [](const rules::RuleStatus& self) {
+                               return self.next ? std::optional(name_of_act(*self.next)) : std::nullopt;
+                             })
+      .def_property_readonly("next_ns", [](const rules::RuleStatus& self) {
+        return self.next ? std::optional(self.next_ns) : std::nullopt;
+      });
+}
+
+void bind_engine(py::module_& module) {
+  py::class_<PyRuleEngine>(module, "RuleEngine")
+      .def(py::init<std::vector<rules::Rule>>(), py::arg("rules"))
+      .def_property_readonly("signals",
+                             [](const PyRuleEngine& self) {
+                               std::vector<rules::SignalSpec> all;
+                               for (const auto& heard : self.engine.signals()) all.push_back(heard.spec);
+                               return all;
+                             })
+      .def(
+          "tell",
+          [](PyRuleEngine& self, std::size_t signal, time_ns_t time_ns, double value) {
+            self.signal(signal).tell(time_ns, value);
+          },
+          py::arg("signal"), py::arg("time_ns"), py::arg("value") = 0.0)
+      .def(
+          "arm", [](PyRuleEngine& self, time_ns_t now_ns) { self.engine.arm(now_ns); }, py::arg("now_ns"))
+      .def(
+          "set_present",
+          [](PyRuleEngine& self, std::size_t rule, bool present, time_ns_t now_ns) {
+            self.engine.set_present(self.rule(rule), present, now_ns);
+          },
+          py::arg("rule"), py::arg("present"), py::arg("now_ns"))
+      .def(
+          "set_in_place",
+          [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool in_place, time_ns_t now_ns) {
+            self.engine.set_in_place(self.rule(rule), act_of(act), in_place, now_ns);
+          },
+          py::arg("rule"), py::arg("act"), py::arg("in_place"), py::arg("now_ns"))
+      .def(
+          "set_ready",
+          [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool ready) {
+            self.engine.set_ready(self.rule(rule), act_of(act), ready);
+          },
+          py::arg("rule"), py::arg("act"), py::arg("ready"))
+      .def(
+          "adopt",
+          [](PyRuleEngine& self, std::size_t rule, time_ns_t now_ns) { self.engine.adopt(self.rule(rule), now_ns); },
+          py::arg("rule"), py::arg("now_ns"))
+      .def("forget", [](PyRuleEngine& self) { self.engine.forget(); })
+      .def(
+          "step", [](PyRuleEngine& self, time_ns_t now_ns) { return self.engine.step(now_ns); }, py::arg("now_ns"))
+      .def_property_readonly("wish", [](const PyRuleEngine& self) { return self.engine.wish(); })
+      .def(
+          "begun", [](PyRuleEngine& self, time_ns_t now_ns) { self.engine.begun(now_ns); }, py::arg("now_ns"))
+      .def(
+          "ended",
+          [](PyRuleEngine& self, const std::string& how, time_ns_t now_ns) {
+            self.engine.ended(ended_of(how), now_ns);
+          },
+          py::arg("how"), py::arg("now_ns"))
+      .def("take", [](PyRuleEngine& self) { return self.engine.take(); })
+      .def("lost", [](const PyRuleEngine& self) { return self.engine.lost(); })
+      .def(
+          "status", [](const PyRuleEngine& self, std::size_t rule) { return self.engine.status(self.rule(rule)); },
+          py::arg("rule"))
+      .def("wake", [](PyRuleEngine& self) { self.engine.wake(); })
+      .def("word", [](const PyRuleEngine& self) { return self.engine.word().load(std::memory_order_acquire); })
+      .def(
+          "wait",
+          [](const PyRuleEngine& self, std::uint32_t word, time_ns_t until_ns) {
+            return futex_wait_until(self.engine.word(), word, until_ns);
+          },
+          py::arg("word"), py::arg("until_ns"), Unlocked());
+}
+
+}  // namespace
+
+void bind_rules(py::module_& module) {
+  bind_table(module);
+  bind_rules_of_an_engine(module);
+  bind_answers(module);
+  bind_engine(module);
+}
+
+}  // namespace mauve::bindings
