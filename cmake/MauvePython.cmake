@@ -38,6 +38,7 @@ function(mauve_install_python_package package)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/${package}/" DESTINATION "${PYTHON_INSTALL_DIR}/${package}"
     FILES_MATCHING
     PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js"
+    PATTERN "*.xml"
     PATTERN "__pycache__" EXCLUDE
     PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE
     PATTERN "maps" EXCLUDE PATTERN "architecture" EXCLUDE PATTERN "launch" EXCLUDE PATTERN "tests" EXCLUDE)

@@ -5,7 +5,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from types import FrameType
 from typing import Any
 
@@ -13,8 +13,9 @@ from rclpy.qos import QoSProfile
 from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 
 from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
+from mauve_rt.cli.transport import accounts_in_the_way, by_fast_dds, by_udp
 from mauve_rt.errors import ParameterError
-from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.discovery import limit_discovery, stays_on_this_machine
 
 DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another machine
 STARTING_S = 3.0  # where there is no executor at all, one may be starting
@@ -63,7 +64,7 @@ class Client:
             for future in futures:
                 if future.done():
                     return future.result()
-        raise NoExecutorError(f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; is its process frozen?")
+        raise NoExecutorError(self._unanswered(service))
 
     def _found(self, service_type: Any, service: str, wait_s: float) -> tuple[Participant, Any]:
         """The first participant of ours that knows the service, and a client of it."""
@@ -87,6 +88,17 @@ class Client:
         if not self._discovery.is_complete() or service in self._discovery.offered():
             return False  # in the second case its endpoints are being matched
         return bool(self.seen_executors()) or waited_s >= STARTING_S
+
+    def _unanswered(self, service: str) -> str:
+        said = f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; "
+        others = " and ".join(accounts_in_the_way(self._discovery.domain)) if by_fast_dds() else ""
+        if not others:
+            return f"{said}is its process frozen?"
+        return (
+            f"{said}is its process frozen, or is it {others}'s, whose shared memory you may not use? "
+            "mauve does without it unless ROS_STATIC_PEERS or a profile of Fast DDS says otherwise "
+            "(docs/several_machines.md)"
+        )
 
     def _missing(self, service: str) -> str:
         from mauve_rt.model.words import did_you_mean  # noqa: PLC0415 - takes its time to load
@@ -155,10 +167,18 @@ def _interrupts_between_spins() -> Iterator[None]:
 
 
 @contextmanager
-def connected() -> Iterator[Client]:
-    """A client on a ROS context of its own; this machine only, unless the environment says otherwise."""
+def connected(*, first: bool = False) -> Iterator[Client]:
+    """A client on a ROS context of its own; this machine only, unless the environment says otherwise.
+
+    With `first` - this process has had no ROS context before - it reaches executors of other accounts, too.
+    """
     limit_discovery()
-    with _interrupts_between_spins(), closing(Discovery()) as discovery:
+    is_local = stays_on_this_machine()
+    with (
+        _interrupts_between_spins(),
+        by_udp() if first else nullcontext(),
+        closing(Discovery(is_local=is_local)) as discovery,
+    ):
         try:
             yield Client(discovery)
         except UnsupportedTypeSupport as error:  # as of a package whose libraries are not found

@@ -15,7 +15,8 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.utilities import get_rmw_implementation_identifier
+
+from mauve_rt.cli.transport import by_fast_dds
 
 ANNOUNCED_S = 3.5  # by then every participant has told of itself, to whomever missed it before
 _SPOKEN_S = 0.2  # after which one more participant speaks: an answer comes within 0.11 s
@@ -37,13 +38,14 @@ class Participant(NamedTuple):
 class Discovery:
     """Our participants, and what they know together. For one thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_local: bool) -> None:
+        """`is_local`: it reaches the participants of this machine, by its ports, and nobody else."""
         self.participants: list[Participant] = []
         self._spoken_s = 0.0
         self._seen: object = None
         self._seen_s = time.monotonic()
         self._speak()
-        self._can_count = _stays_on_this_machine() and _UDP.exists()
+        self._can_count = is_local and by_fast_dds() and _UDP.exists()
 
     @property
     def domain(self) -> int:
@@ -109,13 +111,3 @@ class Discovery:
         ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
         lines = _UDP.read_text("ascii").splitlines()[1:] if self._can_count else []
         return len({port for line in lines if (port := int(line.split()[1].rpartition(":")[2], 16)) in ports})
-
-
-def _stays_on_this_machine() -> bool:
-    """Whether discovery is by the ports of this machine, and by nothing else."""
-    is_local = (
-        os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
-        or os.environ.get("ROS_LOCALHOST_ONLY") == "1"
-    )
-    elsewhere = os.environ.get("ROS_STATIC_PEERS") or os.environ.get("ROS_DISCOVERY_SERVER")
-    return is_local and not elsewhere and get_rmw_implementation_identifier().startswith("rmw_fastrtps")

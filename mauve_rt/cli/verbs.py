@@ -68,7 +68,7 @@ def _list(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import ListComponents  # noqa: PLC0415 - ROS takes its time to load
     from mauve_rt.cli.client import connected  # noqa: PLC0415
 
-    with connected() as client:
+    with connected(first=True) as client:
         reply = client.call(ListComponents, f"{args.executor}/list_components", ListComponents.Request())
     if args.json:
         from mauve_rt.cli.views import print_json  # noqa: PLC0415
@@ -146,7 +146,7 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
         cause=args.cause,
         **fields,
     )
-    with connected() as client:
+    with connected(first=True) as client:
         reply = client.call(service_type, f"{args.executor}/{name}", request)
     if args.json:
         print_json(reply)
@@ -161,7 +161,7 @@ def _nodes(args: argparse.Namespace) -> int:
     from mauve_rt.cli.client import connected  # noqa: PLC0415
     from mauve_rt.cli.views import print_json  # noqa: PLC0415
 
-    with connected() as client:
+    with connected(first=True) as client:
         found = client.find_executors()
     if args.json:
         print_json(found)
@@ -186,7 +186,7 @@ def _events(args: argparse.Namespace) -> int:
         sys.stdout.flush()
 
     try:
-        with connected() as client:
+        with connected(first=True) as client:
             client.listen(ReconfigurationEvent, f"{args.executor}/events", heard)
     except KeyboardInterrupt:
         pass

@@ -24,3 +24,9 @@ def limit_discovery() -> str:
         where = f"{_RANGE}={reach}" + (f", ROS_STATIC_PEERS={peers}" if peers else "")
         return f"discovery beyond this machine ({where}): without DDS Security anyone there can reconfigure"
     return f"discovery on this machine only; {_RANGE} can widen it" if chosen else ""
+
+
+def stays_on_this_machine() -> bool:
+    """Whether the environment keeps discovery to this machine, and to nothing else."""
+    is_local = os.environ.get(_RANGE) == "LOCALHOST" or os.environ.get("ROS_LOCALHOST_ONLY") == "1"
+    return is_local and not (os.environ.get("ROS_STATIC_PEERS") or os.environ.get("ROS_DISCOVERY_SERVER"))
