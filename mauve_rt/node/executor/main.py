@@ -73,8 +73,10 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
     from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
+    from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
 
     node = None
+    addresses = usable_addresses()
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
@@ -90,6 +92,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     for remark in settings.remarks:
         node.get_logger().warning(remark)
     status = FAILED
+    interfaces = NetworkInterfaces(node, node.watch, before=addresses)
     try:
         gc.freeze()  # nor need it be looked at while Python components run and wait for the interpreter
         gc.enable()
@@ -97,6 +100,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         if status == 0:
             status = _spin(node, stop)
     finally:
+        interfaces.close()
         node.close()
         try_shutdown()
     return status

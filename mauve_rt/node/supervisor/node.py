@@ -23,6 +23,7 @@ from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
+from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
 from mauve_rt.node.shared.watch import Watch
@@ -154,6 +155,7 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
         remarks = check_arguments(arguments)
+        addresses = usable_addresses()
         rclpy.init(
             args=list(arguments),
             signal_handler_options=SignalHandlerOptions.NO,
@@ -164,8 +166,10 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         try_shutdown()
         return BAD_INPUT
     executor = SingleThreadedExecutor()
+    interfaces = None
     try:
         supervisor = Supervisor(node, RulesFile(_rules_path(node)))
+        interfaces = NetworkInterfaces(node, supervisor.watch, before=addresses)
         executor.add_node(node)
         for remark in remarks:
             node.get_logger().warning(remark)
@@ -181,6 +185,8 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         complain(f"supervisor: {error}")
         return BAD_INPUT
     finally:
+        if interfaces is not None:
+            interfaces.close()
         executor.shutdown()
         node.destroy_node()
         try_shutdown()
