@@ -15,6 +15,7 @@ from pathlib import Path
 
 import machine
 from command import command_rows
+from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from mission import mission_rows
 from native import BenchmarkError
@@ -68,6 +69,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording-killed": kill_rows,
     "reading": reading_rows,
     "mission": mission_rows,
+    "links": links_rows,
 }
 
 

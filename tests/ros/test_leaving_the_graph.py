@@ -53,7 +53,7 @@ def is_there(graph: Any, name: str) -> bool:
 def ends_whole(
     graph: Any, process: "subprocess.Popen[bytes]", end: str, name: str, *, by_udp: bool = False
 ) -> int:
-    """End a process whose node is seen; returns its exit status. Who speaks UDP alone has no shared memory."""
+    """End a process whose node is seen; returns its exit status. By UDP there is no shared memory."""
     graph.spin_until(lambda: is_there(graph, name), f"node {name}")
     segments = segments_of(process.pid)
     assert bool(segments) != by_udp, "shared memory of DDS to be left over"

@@ -62,10 +62,14 @@ class NetworkInterfaces:
             return
         self._look_anew = look_anew
         self._used = before
-        self._ended, self._end = os.pipe()
-        self._kernel = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
-        self._kernel.bind((0, _LINK | _IPV4_ADDRESS))
+        try:
+            self._kernel = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE)
+            self._kernel.bind((0, _LINK | _IPV4_ADDRESS))
+        except OSError as error:  # a sandbox that has no rtnetlink: then as it was before
+            watch.tell("watching network interfaces", error)
+            return
         self._kernel.setblocking(False)
+        self._ended, self._end = os.pipe()
         self._thread = watch.thread("network interfaces", self._step, ending=self._ending)
         self._thread.start()
 
