@@ -76,8 +76,13 @@ def load_world(map_file: Path, robots: Sequence[str], *, seed: int) -> World:
         raise BadInputError(str(error)) from None
 
 
-def write_setups(world: World, folder: Path, *, seed: int, supervisor: bool) -> list[RobotSetup]:
-    """Write folder/architecture/NAME.yaml and folder/supervisor/NAME.yaml for every robot."""
+def write_setups(
+    world: World, folder: Path, *, seed: int, supervisor: bool, hosts: bool = False
+) -> list[RobotSetup]:
+    """Write folder/architecture/NAME.yaml and folder/supervisor/NAME.yaml for every robot.
+
+    With `hosts` there is no radio: each of two robots hears what the other one sends.
+    """
     cpus = sorted(os.sched_getaffinity(0))
     setups = []
     for index, (name, pose) in enumerate(world.starts.items()):
@@ -86,10 +91,14 @@ def write_setups(world: World, folder: Path, *, seed: int, supervisor: bool) -> 
         changes |= dict(zip(("start_x", "start_y", "start_yaw"), pose, strict=True))
         peers = [peer for peer in world.starts if peer != name]
         cpu = cpus[index % len(cpus)]
-        _write(architecture, ROBOT, _robot(name, peers=peers, cpu=cpu, properties=changes))
+        robot = _robot(name, peers=peers, cpu=cpu, properties=changes)
+        if hosts:
+            robot = _on_a_host(robot, peers[0])
+        _write(architecture, ROBOT, robot)
         rules = folder / "supervisor" / f"{name}.yaml" if supervisor else None
         if rules is not None:
-            _write(rules, SUPERVISOR, _template(SUPERVISOR))
+            given = _template(SUPERVISOR)
+            _write(rules, SUPERVISOR, _hearing(given, peers[0]) if hosts else given)
         setups.append(RobotSetup(name=name, architecture=architecture, rules=rules))
     return setups
 
@@ -103,6 +112,31 @@ def _robot(name: str, *, peers: list[str], cpu: int, properties: Mapping[str, ob
         for key in component.get("properties", {}).keys() & properties.keys():
             component["properties"][key] = properties[key]
     return document
+
+
+def heard_from(peer: str) -> str:
+    """The topic by which a robot on a machine of its own hears a peer."""
+    return f"/{peer}/radio/out"
+
+
+def body_of(robot: str) -> str:
+    """The topic by which such a robot tells the world where its body is."""
+    return f"/{robot}/body"
+
+
+def _on_a_host(document: Any, peer: str) -> Any:
+    """The document with the topics that robots on machines of their own have."""
+    document["resources"]["body"]["topic"]["name"] = "body"
+    return _hearing(document, peer)
+
+
+def _hearing(document: Any, peer: str) -> Any:
+    """The document with what comes by radio coming from the peer, wherever it is named."""
+    if isinstance(document, dict):
+        return {key: _hearing(value, peer) for key, value in document.items()}
+    if isinstance(document, list):
+        return [_hearing(value, peer) for value in document]
+    return heard_from(peer) if document == "radio/in" else document
 
 
 def _template(name: str) -> Any:

@@ -1,7 +1,8 @@
 """The exploration mission from one command: runs it, shows how it goes, tells its story, writes the report.
 
     python -m mauve_examples.mission.demo [--map FILE.yaml] [--robots N] [--duration S] [--link-loss-at S]
-        [--link-back-at S] [--no-supervisor] [--drop-share P] [--seed K] [--simulated-time] [--out DIR]
+        [--link-back-at S] [--no-supervisor] [--drop-share P] [--seed K] [--simulated-time] [--hosts]
+        [--out DIR]
 
 Exit status: 0 success, 1 failure, 2 bad input (one line on stderr, nothing started), 130 interrupted.
 """
@@ -79,17 +80,21 @@ def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
+    from mauve_examples.mission.cable import open_cable  # noqa: PLC0415
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
 
     interrupts.begin()
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        with open_progress() as progress:
-            mission = MissionRun(options, world, progress=progress, interrupted=interrupts.asked)
-            mission.run()
-    finally:
-        try_shutdown()
+    with open_cable(options) as cable:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            with open_progress() as progress:
+                mission = MissionRun(
+                    options, world, progress=progress, interrupted=interrupts.asked, cable=cable
+                )
+                mission.run()
+        finally:
+            try_shutdown()
     return mission
 
 

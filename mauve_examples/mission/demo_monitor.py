@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -40,11 +40,25 @@ class Hooks:
     link: Callable[[bool], None]
 
 
+class Cable(Protocol):
+    """The link between robots on machines of their own."""
+
+    def heard_by(self, robot: str) -> str:
+        """The topic by which a robot hears the other one."""
+
+    def set_link(self, *, up: bool) -> None:
+        """Plug it in, or pull it out."""
+
+
 class MissionMonitor:
     """A node of its own on the default context, which must have been initialised."""
 
-    def __init__(self, robots: Sequence[str], hooks: Hooks) -> None:
-        """Subscribe to everything of every robot, before the robots are there."""
+    def __init__(self, robots: Sequence[str], hooks: Hooks, *, cable: Cable | None = None) -> None:
+        """Subscribe to everything of every robot, before the robots are there.
+
+        `cable` joins robots on machines of their own; without it there is the radio.
+        """
+        self._cable = cable
         self._robots = list(robots)
         self._node = Node("mission_monitor")
         self._executor = SingleThreadedExecutor()
@@ -55,6 +69,7 @@ class MissionMonitor:
             self._watch(robot, hooks)
         self._listen(Bool, "/radio/link", lambda message: hooks.link(message.data), LATCHED)
         self._listen(Bool, "/radio/connected", self._on_connected, LATCHED)
+        self._link = self._node.create_publisher(Bool, "/radio/link", LATCHED) if cable is not None else None
         client = self._node.create_client
         self._set_link = client(SetBool, "/radio/set_link")
         self._list = {robot: client(ListComponents, f"/{robot}/executor/list_components") for robot in robots}
@@ -113,7 +128,7 @@ class MissionMonitor:
                 return f"node {node} is not there"
         if unconfigured:
             return f"/{unconfigured[0]}/executor is not configured"
-        if not self._connected:
+        if not self._connected and self._cable is None:
             return "the radio has not met all of the robots' radio/in and radio/out"
         with_supervisor = {node.split("/")[1] for node in nodes if node.endswith("/supervisor")}
         return next(
@@ -124,10 +139,11 @@ class MissionMonitor:
         for topic in (f"/{robot}/map_updates", f"/{robot}/done"):
             if not self._node.count_publishers(topic):
                 return f"nobody publishes {topic}"
-        heard = self._node.get_subscriptions_info_by_topic(f"/{robot}/radio/in")
+        topic = self._cable.heard_by(robot) if self._cable is not None else f"/{robot}/radio/in"
+        heard = self._node.get_subscriptions_info_by_topic(topic)
         listeners = {info.node_name for info in heard if info.node_namespace == f"/{robot}"}
         absent = {"executor", *(["supervisor"] if with_supervisor else [])} - listeners
-        return f"the {min(absent)} of {robot} does not listen to radio/in" if absent else ""
+        return f"the {min(absent)} of {robot} does not listen to {topic}" if absent else ""
 
     def _configure(self, robot: str) -> bool:
         """Ask for it once its service is there; True when it is done."""
@@ -170,6 +186,10 @@ class MissionMonitor:
 
     def set_link(self, *, up: bool) -> None:
         """Cut or restore the link; /radio/link tells when it is done."""
+        if self._cable is not None and self._link is not None:
+            self._cable.set_link(up=up)
+            self._link.publish(Bool(data=up))
+            return
         self._set_link.call_async(SetBool.Request(data=up))
 
 

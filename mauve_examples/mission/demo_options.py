@@ -33,6 +33,7 @@ class Options:
     drop_share: float
     seed: int
     simulated_time: bool
+    hosts: bool  # each robot on a machine of its own, a real link between them
     out: Path
 
     @property
@@ -55,6 +56,7 @@ def parse_options(arguments: list[str]) -> Options:
         raise BadInputError(f"--drop-share {given.drop_share:g}: expected a share from 0 to 1")
     if not 0 <= given.seed < 2**31:
         raise BadInputError(f"--seed {given.seed}: expected a number from 0 to {2**31 - 1}")
+    _check_hosts(given)
     loss_s, back_s = _link_times(given)
     return Options(
         map_file=map_file(given.map),
@@ -66,6 +68,7 @@ def parse_options(arguments: list[str]) -> Options:
         drop_share=given.drop_share,
         seed=given.seed,
         simulated_time=given.simulated_time,
+        hosts=given.hosts,
         out=_out_folder(given.out),
     )
 
@@ -92,6 +95,11 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="no threads, no ROS graph, no real time: as fast as it goes; equal seeds give equal traces",
     )
+    add(
+        "--hosts",
+        action="store_true",
+        help="each robot on a machine of its own, of Linux namespaces (as root): their link is cut for real",
+    )
     add("--out", metavar="DIR", help="results (default: out/mission_DATE_TIME in the current folder)")
     return parser
 
@@ -101,6 +109,16 @@ def _seconds(text: str) -> float:
     if not math.isfinite(value) or value < 0.0:
         raise argparse.ArgumentTypeError(f"expected seconds, 0 or more, found {text!r}")
     return value
+
+
+def _check_hosts(given: argparse.Namespace) -> None:
+    if not given.hosts:
+        return
+    if given.robots != 2:  # noqa: PLR2004 - who hears one topic hears one peer
+        raise BadInputError(f"--hosts --robots {given.robots}: expected 2, one at each end of the link")
+    for option, is_given in (("simulated-time", given.simulated_time), ("drop-share", given.drop_share)):
+        if is_given:
+            raise BadInputError(f"--hosts: leave out --{option}: the link is a real one")
 
 
 def _link_times(given: argparse.Namespace) -> tuple[float | None, float | None]:

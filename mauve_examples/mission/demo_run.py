@@ -1,10 +1,12 @@
 """One mission from its first process to its last: start, wait until all have met, run the timeline, end."""
 
 import json
+import os
 import time
 from collections.abc import Callable
 
 from mauve_examples.mission.architecture import World, write_setups
+from mauve_examples.mission.cable import RobotCable
 from mauve_examples.mission.demo_errors import MissionError
 from mauve_examples.mission.demo_lock import MissionLock, busy
 from mauve_examples.mission.demo_mission import Mission
@@ -16,6 +18,7 @@ from mauve_examples.mission.progress import Progress
 
 READY_TIMEOUT_S = 60.0  # five processes load; one that ends is noticed at once
 LOOK_AROUND_S = 0.5
+MEETING_S = 3.5  # by then each machine has announced itself to the others once more, whatever was lost before
 STEP_S = 0.05
 LAST_WORDS_S = 0.2
 PATIENCE_S = 10.0
@@ -30,9 +33,17 @@ class MissionRun(Mission):
     """A mission of processes in real time."""
 
     def __init__(
-        self, options: Options, world: World, *, progress: Progress, interrupted: Callable[[], bool]
+        self,
+        options: Options,
+        world: World,
+        *,
+        progress: Progress,
+        interrupted: Callable[[], bool],
+        cable: RobotCable | None = None,
     ) -> None:
+        """`cable`: the robots are on machines of their own; without it a radio is between them."""
         super().__init__(options, world, progress=progress, interrupted=interrupted)
+        self._cable = cable
         self._log = options.out / "log"
         self._processes: Processes | None = None
 
@@ -55,7 +66,7 @@ class MissionRun(Mission):
             link=self.story.on_link,
         )
         lock = MissionLock()
-        monitor = MissionMonitor(self._options.names, hooks)
+        monitor = MissionMonitor(self._options.names, hooks, cable=self._cable)
         try:
             self._refuse_company(monitor)
             self._progress.say(f"Starting {self._in_words()}.")
@@ -63,7 +74,7 @@ class MissionRun(Mission):
             nodes = self._start_processes(self._processes)
             self._wait_until_ready(monitor, self._processes, nodes)
             if not self._interrupted():
-                self._progress.say(f"{LOOK_IN} {' && '.join([*sourcing(), LIST])}")
+                self._progress.say(self._look_in())
                 if not all(robot.realtime_granted for robot in self.story.robots.values()):
                     self._progress.say(NO_REALTIME)
                 self._started_ns = time.monotonic_ns()
@@ -86,17 +97,17 @@ class MissionRun(Mission):
 
     def _start_processes(self, processes: Processes) -> list[str]:
         """Start everything; returns the nodes that will be there."""
-        nodes = ["/radio"]
-        names = ",".join(self._options.names)
-        parameters = {
-            "robots": f"[{names}]",
-            "drop_share": f"{float(self._options.drop_share)!r}",
-            "seed": str(self._options.seed),
-        }
-        processes.start("radio", "mauve_examples.mission.radio", *ros_arguments(parameters))
         options = self._options
-        setups = write_setups(self._world, options.out, seed=options.seed, supervisor=options.supervisor)
+        nodes = [self._start_between(processes)]
+        setups = write_setups(
+            self._world,
+            options.out,
+            seed=options.seed,
+            supervisor=options.supervisor,
+            hosts=self._cable is not None,
+        )
         for setup in setups:
+            wrapper = self._cable.wrapper(setup.name) if self._cable is not None else ()
             bag = self._options.out / "bag" / setup.name
             parameters = {
                 "architecture": str(setup.architecture),
@@ -104,16 +115,28 @@ class MissionRun(Mission):
                 "autostart": "false",
                 "record_topics": json.dumps(RECORDED),
             }
-            processes.start(
-                f"{setup.name}_executor", "mauve_rt.node.executor.main", *ros_arguments(parameters)
-            )
+            arguments = ros_arguments(parameters)
+            executor = "mauve_rt.node.executor.main"
+            processes.start(f"{setup.name}_executor", executor, *arguments, wrapper=wrapper)
             nodes.append(f"/{setup.name}/executor")
             if setup.rules is not None:
                 arguments = ["-r", f"__ns:=/{setup.name}"]
                 arguments = [*ros_arguments({"rules": str(setup.rules)}), *arguments]
-                processes.start(f"{setup.name}_supervisor", "mauve_rt.node.supervisor.main", *arguments)
+                supervisor = "mauve_rt.node.supervisor.main"
+                processes.start(f"{setup.name}_supervisor", supervisor, *arguments, wrapper=wrapper)
                 nodes.append(f"/{setup.name}/supervisor")
         return nodes
+
+    def _start_between(self, processes: Processes) -> str:
+        """Start what is between the robots; returns its node: the radio, or the world that both are in."""
+        options = self._options
+        parameters = {"robots": f"[{','.join(options.names)}]"}
+        if self._cable is not None:
+            processes.start("world", "mauve_examples.mission.world", *ros_arguments(parameters))
+            return "/world"
+        parameters |= {"drop_share": f"{float(options.drop_share)!r}", "seed": str(options.seed)}
+        processes.start("radio", "mauve_examples.mission.radio", *ros_arguments(parameters))
+        return "/radio"
 
     def _wait_until_ready(self, monitor: MissionMonitor, processes: Processes, nodes: list[str]) -> None:
         deadline_s = time.monotonic() + READY_TIMEOUT_S
@@ -126,9 +149,18 @@ class MissionRun(Mission):
                     f"not ready within {READY_TIMEOUT_S:g} s: {missing}; logs are in {self._log}"
                 )
             monitor.spin(STEP_S)
+        if self._cable is not None:
+            monitor.spin(MEETING_S)
         doubled = [node for node, count in monitor.node_counts().items() if node in nodes and count > 1]
         if doubled:
             raise MissionError(str(busy(f"node {doubled[0]} is there twice")))
+
+    def _look_in(self) -> str:
+        if self._cable is None:
+            return f"{LOOK_IN} {' && '.join([*sourcing(), LIST])}"
+        enter = f"sudo nsenter --target {os.getpid()} --net bash"
+        reach = "export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET"
+        return f"{LOOK_IN} {enter}, then {' && '.join([*sourcing(), reach, LIST])}"
 
     # ---- during
 

@@ -122,7 +122,7 @@ class Hosts:
         if ctypes.CDLL(None, use_errno=True).unshare(_NEW_NETWORK):
             raise HostsError(f"no network of its own: {os.strerror(ctypes.get_errno())}")
         _run("ip", "link", "set", "lo", "up")
-        _run("sysctl", "--quiet", "--write", "net.ipv4.ip_forward=0")
+        _forward_nothing()
         for number, machine in enumerate(self._machines.values(), start=1):
             ends = ("type", "veth", "peer", "name", "ground", "netns", str(machine.pid))
             address = GROUND_ADDRESS.format(number)
@@ -145,6 +145,15 @@ class Hosts:
         self._switch.run("ip", "link", "set", port, "master", "switch", "up")
         machine.run("ip", "addr", "add", f"{ADDRESS}{number}/24", "dev", "cable")
         machine.run("ip", "link", "set", "cable", "up")
+
+
+def _forward_nothing() -> None:
+    forward = Path("/proc/sys/net/ipv4/ip_forward")  # of the network of who opens it
+    try:
+        if forward.read_text("ascii").strip() != "0":
+            forward.write_text("0", encoding="ascii")
+    except OSError as error:
+        raise HostsError(f"the machines would reach each other by this one: {error}") from None
 
 
 def _run(*words: str) -> None:

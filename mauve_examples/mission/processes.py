@@ -43,13 +43,16 @@ class Processes:
         self._inherited = tuple(inherited)
         self._children: list[_Child] = []
 
-    def start(self, name: str, module: str, *arguments: str) -> None:
-        """Run `python -m module arguments...` in a session of its own: Ctrl-C reaches only the demo."""
+    def start(self, name: str, module: str, *arguments: str, wrapper: Sequence[str] = ()) -> None:
+        """Run `python -m module arguments...` in a session of its own: Ctrl-C reaches only the demo.
+
+        `wrapper` is a command that becomes the one behind it, such as one that enters another machine.
+        """
         self._log_folder.mkdir(parents=True, exist_ok=True)
         log = self._log_folder / f"{name}.log"
         with log.open("wb") as output:
             popen = subprocess.Popen(
-                [sys.executable, "-m", CHILD_MODULE, str(os.getpid()), module, *arguments],
+                [*wrapper, sys.executable, "-m", CHILD_MODULE, str(os.getpid()), module, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,

@@ -1,0 +1,27 @@
+"""The process of the world that robots on machines of their own share.
+
+    python -m mauve_examples.mission.world --ros-args -p robots:="[robot_1,robot_2]"
+
+Exit status: 0 after SIGINT or SIGTERM.
+"""
+
+import sys
+
+from mauve_rt.node.shared.process import Stop, run_until_signalled
+
+
+def main() -> int:
+    """Run the node until signalled; returns the exit status."""
+    return run_until_signalled(_work)
+
+
+def _work(stop: Stop) -> int:
+    # Imported here: a signal while modules load is handled already, and threads they start block signals too.
+    from mauve_examples.mission.world_node import run_node  # noqa: PLC0415
+
+    stop.begin()
+    return run_node(stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
