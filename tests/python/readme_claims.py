@@ -135,6 +135,15 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "bags are those of the real demo": (
         "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
     ),
+    "says how robots on several hosts are set up": (
+        "ros/links/test_peers.py::test_it_is_enough_that_one_names_the_other",
+        "ros/links/test_links.py::test_who_hears_nothing_acts_once_and_comes_back",
+        "ros/cli/test_other_account.py::test_an_ordinary_user_reaches_an_executor_of_root",
+    ),
+    "runs each robot on a machine of its own, made of Linux namespaces": (
+        "system/test_demo_hosts.py::test_a_real_link_is_cut_for_real",
+        "system/test_demo_hosts.py::test_without_the_right_to_it_one_line_says_so",
+    ),
     # ---- other ways in
     "then `rosdep install --from-paths src -i` and `colcon build`": (
         "doors/test_colcon.py::test_everything_is_where_ros_puts_it",
