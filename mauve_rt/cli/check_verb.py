@@ -92,7 +92,8 @@ def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
     file = RulesFile(path)
     rules = file.rules.rules
     for index in range(len(rules)):
-        heard_type(file, index)
+        for leaf in rules[index].when.leaves():
+            heard_type(file, leaf)
         if model is not None:
             try_rule(file, index, model)
     print(f"{path}: {len(rules)} rules{_tried_on(model)}: no error found")

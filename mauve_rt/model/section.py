@@ -19,8 +19,10 @@ _REQUIRED = object()
 class Setting:
     """What a key may be set to, what it is otherwise, and a hint for who sets it wrongly."""
 
-    def __init__(self, kind: Kind, default: Any, hint: str) -> None:
+    def __init__(self, kind: Kind, default: Any, hint: str, key: str = "") -> None:
         self.kind, self.default, self.hint = kind, default, hint
+        self.key = key  # in a file, where that is no name in Python; empty: as the attribute
+        self.attribute = ""  # set by the section
 
     @property
     def is_required(self) -> bool:
@@ -43,9 +45,9 @@ class Setting:
         return read
 
 
-def setting(kind: Kind, *, default: Any = _REQUIRED, hint: str = "") -> Any:
-    """A setting of a Section."""
-    return Setting(kind, default, hint)
+def setting(kind: Kind, *, default: Any = _REQUIRED, hint: str = "", key: str = "") -> Any:
+    """A setting of a Section; `key` is its key in a file, where that is no name in Python."""
+    return Setting(kind, default, hint, key)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(setting,))
@@ -57,9 +59,10 @@ class Section:
 
     def __init_subclass__(cls) -> None:
         own = {name: each for name, each in vars(cls).items() if isinstance(each, Setting)}
-        cls.settings = {**cls.settings, **own}
-        for name in own:
+        for name, each in own.items():
+            each.attribute = name
             delattr(cls, name)
+        cls.settings = {**cls.settings, **{each.key or name: each for name, each in own.items()}}
 
     def __init__(self, **values: Any) -> None:
         """From values as a file has them, or as the program does.
@@ -89,20 +92,24 @@ class Section:
 
     def changed(self, **values: Any) -> Self:
         """The same, but with these settings."""
-        return type(self)(**{**{key: getattr(self, key) for key in self.given}, **values})
+        return type(self)(**{**{key: self._value(key) for key in self.given}, **values})
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a {type(self).__name__} does not change: {name}")
 
     def __eq__(self, other: object) -> bool:
+        names = [each.attribute for each in self.settings.values()]
         same = type(other) is type(self)
-        return same and all(getattr(self, key) == getattr(other, key) for key in self.settings)
+        return same and all(getattr(self, name) == getattr(other, name) for name in names)
 
     __hash__ = None  # type: ignore[assignment] # there are lists in it
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{key}={getattr(self, key)!r}" for key in self.settings if key in self.given)
+        values = ", ".join(f"{key}={self._value(key)!r}" for key in self.settings if key in self.given)
         return f"{type(self).__name__}({values})"
+
+    def _value(self, key: str) -> Any:
+        return getattr(self, self.settings[key].attribute)
 
     def _take(self, values: Mapping[str, Any], place: Location, faults: Faults) -> None:
         before = len(faults)
@@ -111,11 +118,11 @@ class Section:
         mine["given"] = frozenset(key for key in known if key in values)
         for key, each in known.items():
             if key in values:
-                mine[key] = each.read(values[key], (*place, key), faults)
+                mine[each.attribute] = each.read(values[key], (*place, key), faults)
             elif each.is_required:
                 faults.append(Fault(place, "missing", limit=key))
             else:
-                mine[key] = each.initial()
+                mine[each.attribute] = each.initial()
         for key in values:
             if key not in known:
                 faults.append(Fault((*place, key), "unknown", known=tuple(known)))

@@ -139,8 +139,9 @@ def form_error(file: YamlFile, faults: Faults) -> ArchitectureFileError:
 def _problem(file: YamlFile, fault: Fault) -> Problem:
     location = fault.place
     element = dotted(location)
-    if fault.what == "missing" and fault.limit == "silence":
-        return file.problem(location, f"{element} has no known condition", expected="silence")
+    if fault.what == "condition":
+        remedy = did_you_mean(str(location[-1]), fault.known)
+        return file.key_problem(location, f"{element} is no known condition", remedy=remedy)
     if fault.what == "missing":
         return file.problem(location, f"{dotted((*location, fault.limit))} is missing")
     if fault.what == "unknown":

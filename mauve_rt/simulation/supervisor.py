@@ -12,9 +12,13 @@ from mauve_rt.control.requests import Request
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
 from mauve_rt.simulation.executor import SimulatedExecutor
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
-from mauve_rt.supervision.conditions import SilenceCondition
+from mauve_rt.supervision.condition_tree import TreeCondition
+from mauve_rt.supervision.conditions import TopicCondition, topic_condition
 from mauve_rt.supervision.engine import Decision, RuleEngine
-from mauve_rt.supervision.rules import Rule, RulesFile
+from mauve_rt.supervision.message_fields import field_value
+from mauve_rt.supervision.rule_types import heard_type
+from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.when import When
 
 _DECISIONS_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -35,8 +39,11 @@ class SimulatedSupervisor:
         self._executor = executor
         self.name = resolved("supervisor", executor.namespace)
         self.decisions = f"{self.name}/decisions"
-        listed = RulesFile(rules).rules.rules
-        pairs = [(rule, self._condition(rule)) for rule in listed]
+        file = RulesFile(rules)
+        pairs = [
+            (rule, TreeCondition(rule.when, lambda leaf: self._condition(file, leaf)))
+            for rule in file.rules.rules
+        ]
         ids = (f"{self.name}/{number}" for number in count(1))
         self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look, ids=ids)
         self._ended = False
@@ -57,14 +64,16 @@ class SimulatedSupervisor:
     def _now_s(self) -> float:
         return self._simulation.now_ns() / 1e9
 
-    def _condition(self, rule: Rule) -> SilenceCondition:
-        silence = rule.when.silence
-        topic = resolved(silence.topic, self._executor.namespace)
-        condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
-        self._topics.listen(topic, self._hearer(condition))
+    def _condition(self, file: RulesFile, leaf: When) -> TopicCondition:
+        heard_type(file, leaf)
+        topic = resolved(leaf.parameters["topic"], self._executor.namespace)
+        condition = topic_condition(leaf, topic)
+        self._topics.listen(topic, self._hearer(condition, leaf.parameters.get("field", "")))
         return condition
 
-    def _hearer(self, condition: SilenceCondition) -> Callable[[Sample], None]:
+    def _hearer(self, condition: TopicCondition, path: str) -> Callable[[Sample], None]:
+        if path:
+            return lambda sample: condition.hear(self._now_s(), field_value(sample.message(), path))
         return lambda _sample: condition.hear(self._now_s())
 
     def _look(self) -> None:

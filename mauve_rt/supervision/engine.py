@@ -1,23 +1,29 @@
 """The rule engine of a supervisor, without ROS and with injected time: one action in flight.
 
-The node calls `tick` at 20 Hz or more, `on_state` with every ~/state, `on_outcome` with the reply to a
+The node calls `tick` every CHECK_PERIOD_S, `on_state` with every ~/state, `on_outcome` with the reply to a
 request and `on_inventory` with that of ~/list_components, all from one thread. What the engine wants goes to
 three callables.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.model.step_kinds import PRESENT
 from mauve_rt.supervision.arming import Arming
 from mauve_rt.supervision.conditions import Condition
+from mauve_rt.supervision.effects import disagreement
 from mauve_rt.supervision.inventory import Inventory
 from mauve_rt.supervision.requests import ANSWER_TIMEOUT_S
 from mauve_rt.supervision.rule import ArchitectureView, Kind, RuleLife
 from mauve_rt.supervision.rules import Rule
 
 STATE_TIMEOUT_S = 2.0
+CHECK_PERIOD_S = 0.02  # at most between two ticks
+
+
+Standing = Literal["not armed", "false", "true", "in effect"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,8 @@ class RuleEngine:
 
         `ids` has one for each request, which the executor has never seen.
         """
-        self._lives = [RuleLife(rule, condition) for rule, condition in rules]
+        lives = [RuleLife(rule, condition) for rule, condition in rules]
+        self._lives = sorted(lives, key=lambda life: -life.rule.priority)
         self._act = act
         self._decide = decide
         self._view: ArchitectureView | None = None
@@ -120,6 +127,10 @@ class RuleEngine:
         if self._view is not None and inventory.instance_id == self._view.instance_id:
             self._arming.on_inventory(now_s, inventory)
 
+    def standing(self) -> Mapping[str, Standing]:
+        """How each rule stands, by name."""
+        return {life.rule.name: _standing(life) for life in self._lives}
+
     # ---- arming and following the state
 
     def _follow(self, life: RuleLife, view: ArchitectureView, now_s: float) -> None:
@@ -136,6 +147,8 @@ class RuleEngine:
             self._say(life, "armed", running or "the executor is there")
             self._arming.begin(life, now_s)
         elif life.in_effect and not view.shows(life.rule.do, unknown=True):
+            if self._superior(life, "do", now_s) is not None:
+                return  # its doing: settled with its outcome
             life.in_effect = False
             life.left_alone = True
             present = view.describe(life.rule.do)
@@ -158,6 +171,8 @@ class RuleEngine:
             reason = f"nothing to {kind}: {present} already; {life.last_look.reason}"
             self._say(life, "suppressed", reason)
             life.settle(kind, now_s)
+        elif (superior := self._superior(life, kind, now_s)) is not None:
+            self._excuse(life, kind, _outranked(kind, superior))
         elif now_s < life.not_before_s:
             if life.failures == 0:
                 self._excuse(life, kind, f"{kind} waits {life.not_before_s - now_s:.2f} s: cooldown")
@@ -180,6 +195,31 @@ class RuleEngine:
         self._flight = _Flight(life, kind, request, now_s + ANSWER_TIMEOUT_S)
         self._say(life, kind, cause.removeprefix(f"{life.rule.name}: "))
         self._act(request)
+
+    # ---- priorities
+
+    def _superior(self, life: RuleLife, kind: Kind, now_s: float) -> RuleLife | None:
+        """A rule of higher priority that has done or is to do something else than this one wants.
+
+        One whose action fails does not count: the next one's is better than none.
+        """
+        for other in self._lives:
+            if other.rule.priority <= life.rule.priority:
+                return None
+            flying = self._flight is not None and self._flight.life is other and self._flight.kind == "do"
+            wants = other.armed and other.failures == 0 and other.wants(now_s) == "do"
+            if (other.in_effect or flying or wants) and disagreement(life.steps(kind), other.rule.do):
+                return other
+        return None
+
+    def _supersede(self, flight: _Flight) -> None:
+        """What an action replaced of rules below it is in effect no longer; they may do it again later."""
+        for life in self._lives:
+            lower = life.rule.priority < flight.life.rule.priority
+            if lower and life.in_effect and disagreement(life.rule.do, flight.life.steps(flight.kind)):
+                life.in_effect = False
+                life.excused = "do"
+                self._say(life, "suppressed", _outranked("do", flight.life))
 
     def _excuse(self, life: RuleLife, kind: Kind, reason: str) -> None:
         if life.excused != kind:
@@ -218,6 +258,7 @@ class RuleEngine:
             return
         self._flight = None
         flight.life.settle(flight.kind, now_s)
+        self._supersede(flight)
         self._say(flight.life, "done", f"{flight.kind}: {present}", flight.outcome.message)
         self._follow(flight.life, view, now_s)
 
@@ -233,3 +274,15 @@ class RuleEngine:
     def _say(self, life: RuleLife, decision: str, reason: str, message: str = "") -> None:
         revision = self._view.revision if self._view is not None else 0
         self._decide(Decision(life.rule.name, decision, reason, life.last_look.silence_s, revision, message))
+
+
+def _outranked(kind: Kind, superior: RuleLife) -> str:
+    return f"{kind} waits: outranked by rule {superior.rule.name} (priority {superior.rule.priority})"
+
+
+def _standing(life: RuleLife) -> Standing:
+    if life.in_effect:
+        return "in effect"
+    if not life.armed:
+        return "not armed"
+    return "true" if life.last_look.holds else "false"

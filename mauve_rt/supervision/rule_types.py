@@ -2,22 +2,20 @@
 
 from typing import Any
 
+from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.parts.message_types import message_class
+from mauve_rt.supervision.rule_names import leaf_findings
 from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.when import When
 
 
-def heard_type(file: RulesFile, index: int) -> Any:
-    """The message class that the rule of that index listens to.
+def heard_type(file: RulesFile, leaf: When) -> Any:
+    """The message class of the topic that a condition listens to.
 
     Raises:
-        ArchitectureFileError: it is not installed.
+        ArchitectureFileError: it is not installed, or has no such field that is a number.
     """
-    name = file.rules.rules[index].when.silence.type
-    found = message_class(name)
-    if found is None:
-        raise file.error(
-            ("rules", index, "when", "silence", "type"),
-            f"message type {name} is not installed",
-            remedy="source the workspace that has it, or correct the name",
-        )
-    return found
+    found = list(leaf_findings(file, leaf))
+    if found:
+        raise ArchitectureFileError(file.path, found)
+    return message_class(leaf.parameters["type"])

@@ -5,42 +5,32 @@
     rules:
       - name: link_lost
         when: {silence: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 1.0}}
+        in: supervisor              # who runs it; there is nobody else yet
+        priority: 0                 # of several that hold, the highest decides
         for_s: 0.0                  # the condition must hold so long before `do`
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
         undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
         max_missed: 0               # releases that each component may miss for `do`; in undo: for that
 
-Names of topics and of the executor are resolved against the supervisor's namespace, as ROS 2 does.
+What may stand in `when`: see supervision/when.py. Names of topics and of the executor are resolved
+against the supervisor's namespace, as ROS 2 does.
 """
 
 from pathlib import Path
 from typing import Literal
 
-from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Text
+from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import MISSED, STEPS, Step, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
+from mauve_rt.supervision.when import When, WhenPart
 
 _SECONDS = Real(least=0)
-_MESSAGE_TYPE = Text(r"[a-z]\w*/msg/[A-Z]\w*", "a message type such as std_msgs/msg/Float64")
-
-
-class Silence(Section):
-    """Holds while the last sample on `topic` (before a first one: the arming) is older than a limit."""
-
-    topic: str = setting(ROS_NAME)
-    type: str = setting(_MESSAGE_TYPE)
-    longer_than_s: float = setting(Real(above=0))
-
-
-class When(Section):
-    """What a rule waits for: exactly one kind of condition."""
-
-    silence: Silence = setting(Part(Silence))
+MOST_PRIORITY = 1000
 
 
 class Undo(Section):
@@ -55,7 +45,9 @@ class Rule(Section):
     """One condition and what to do about it. Times in seconds."""
 
     name: str = setting(IDENTIFIER)
-    when: When = setting(Part(When))
+    when: When = setting(WhenPart())
+    where: Literal["supervisor"] = setting(Choice("supervisor"), default="supervisor", key="in")
+    priority: int = setting(Whole(0, MOST_PRIORITY), default=0)
     for_s: float = setting(_SECONDS, default=0.0)
     do: list[Step] = setting(STEPS)
     undo: Undo | None = setting(Part(Undo), default=None)
@@ -101,6 +93,10 @@ class RulesFile:
         """The file."""
         return self._file.path
 
+    def problem(self, location: Location, what: str, **facts: str) -> Problem:
+        """A problem at one element, e.g. ("rules", 0, "when", "silence", "type")."""
+        return self._file.problem(location, what, **facts)
+
     def error(self, location: Location, what: str, *, remedy: str = "") -> ArchitectureFileError:
         """An error about one element, e.g. ("rules", 0, "when", "silence", "type")."""
-        return ArchitectureFileError(self.path, [self._file.problem(location, what, remedy=remedy)])
+        return ArchitectureFileError(self.path, [self.problem(location, what, remedy=remedy)])

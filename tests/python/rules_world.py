@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 from itertools import count
 
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.supervision.conditions import SilenceCondition
+from mauve_rt.supervision.condition_tree import TreeCondition
+from mauve_rt.supervision.conditions import TopicCondition, topic_condition
 from mauve_rt.supervision.engine import Decision, RuleEngine
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
 from mauve_rt.supervision.rule import ArchitectureView, ComponentView
 from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.when import When
 
 TICK_S = 0.05
 LOCAL = "mauve_examples/LocalExploration"
@@ -49,6 +51,8 @@ class World:
     telling: bool = True  # the executor publishes ~/state
     listing: bool = True  # the executor answers ~/list_components
     inactive: bool = False
+    value: float = 0.0  # of every field
+    quiet: set[str] = field(default_factory=set)  # topics on which nobody speaks
     properties: dict[str, str] = field(default_factory=dict)  # of every component
     known: set[str] = field(default_factory=lambda: {LOCAL, USUAL})  # cores it would take
     trials: list[Request] = field(default_factory=list)  # dry runs
@@ -61,8 +65,8 @@ class World:
     components: dict[str, ComponentView] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.conditions = [SilenceCondition("/in", longer_than_s=1.0) for _ in self.rules]
-        pairs = list(zip(self.rules, self.conditions, strict=True))
+        self._heard: list[tuple[str, TopicCondition]] = []  # by topic
+        pairs = [(rule, TreeCondition(rule.when, self._condition)) for rule in self.rules]
         ids = map(str, count(1))
         self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look, ids=ids)
         self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
@@ -82,9 +86,20 @@ class World:
             self.now_s += TICK_S
             if self.talking and self.now_s - self._last_word_s >= 0.2:
                 self._last_word_s = self.now_s
-                for condition in self.conditions:
-                    condition.hear(self.now_s)
+                self.hear()
             self.engine.tick(self.now_s)
+
+    def hear(self) -> None:
+        """A sample on every topic that is not quiet."""
+        for topic, condition in self._heard:
+            if topic not in self.quiet:
+                condition.hear(self.now_s, self.value)
+
+    def _condition(self, leaf: When) -> TopicCondition:
+        topic = leaf.parameters["topic"]
+        condition = topic_condition(leaf, f"/{topic}")
+        self._heard.append((topic, condition))
+        return condition
 
     def _look(self) -> None:
         if not self.listing:

@@ -1,7 +1,8 @@
 """The supervisor node: reconfigures one executor by the rules of a file, and tells every decision.
 
-It listens to the executor's ~/state and to the topics of its rules (raw: nothing is deserialised), checks the
-rules at 50 Hz on the steady clock, asks by ~/reconfigure and publishes ~/decisions. One thread.
+It listens to the executor's ~/state and to the topics of its rules (serialized, but where a field is looked
+at), checks the rules at 50 Hz on the steady clock, asks by ~/reconfigure and publishes ~/decisions. One
+thread.
 """
 
 import threading
@@ -28,13 +29,15 @@ from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.node.supervisor.settings import PARAMETERS, check_arguments
-from mauve_rt.supervision.conditions import Condition, SilenceCondition
-from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.condition_tree import TreeCondition
+from mauve_rt.supervision.conditions import TopicCondition, topic_condition
+from mauve_rt.supervision.engine import CHECK_PERIOD_S, Decision, RuleEngine
+from mauve_rt.supervision.message_fields import field_value
 from mauve_rt.supervision.rule_types import heard_type
-from mauve_rt.supervision.rules import Rule, RulesFile
+from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.when import When
 
 NODE_NAME = "supervisor"
-CHECK_PERIOD_S = 0.02
 _SPIN_S = 0.2  # how long a stop may go unnoticed
 KEPT_DECISIONS = 100
 
@@ -52,7 +55,9 @@ class Supervisor:
         self.watch = watch = Watch(node.get_logger().error)
         self._pending: dict[Any, Any] = {}  # by client (changes, dry runs): the last call
         rules = rules_file.rules
-        conditions = [self._condition(rules_file, index) for index in range(len(rules.rules))]
+        conditions = [
+            TreeCondition(rule.when, lambda leaf: self._condition(rules_file, leaf)) for rule in rules.rules
+        ]
         self._engine = RuleEngine(
             list(zip(rules.rules, conditions, strict=True)),
             act=self._act,
@@ -77,17 +82,14 @@ class Supervisor:
         )
         node.create_timer(CHECK_PERIOD_S, watch.guarded("the rules", self._tick))
 
-    def _condition(self, rules_file: RulesFile, index: int) -> Condition:
-        rule: Rule = rules_file.rules.rules[index]
-        silence = rule.when.silence
-        message = heard_type(rules_file, index)
-        topic = self._node.resolve_topic_name(
-            silence.topic
-        )  # to be told; resolved twice, it might be another
-        condition = SilenceCondition(topic, longer_than_s=silence.longer_than_s)
+    def _condition(self, rules_file: RulesFile, leaf: When) -> TopicCondition:
+        message, said = heard_type(rules_file, leaf), leaf.parameters["topic"]
+        topic = self._node.resolve_topic_name(said)  # to be told; resolved twice, it might be another
+        condition = topic_condition(leaf, topic)
+        path = leaf.parameters.get("field", "")
         # Best effort hears reliable writers too; only that something came counts.
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(message, silence.topic, _hearer(condition), qos, raw=True)
+        self._node.create_subscription(message, said, _hearer(condition, path), qos, raw=not path)
         return condition
 
     def _tick(self) -> None:
@@ -203,5 +205,8 @@ def _rules_path(node: Node) -> str:
     return path
 
 
-def _hearer(condition: SilenceCondition) -> Callable[[bytes], None]:
+def _hearer(condition: TopicCondition, path: str) -> Callable[[Any], None]:
+    """What takes samples, serialized ones where no field is looked at."""
+    if path:
+        return lambda message: condition.hear(time.monotonic(), field_value(message, path))
     return lambda _sample: condition.hear(time.monotonic())

@@ -19,20 +19,23 @@ RULES = """\
 mauve: 1
 rules:
   - name: quiet
-    when: {silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}
+    when: WHEN
     do: [{kind: replace_core, target: metronome, name: mauve_examples/DO}]
     undo: {for_s: 0.5, do: [{kind: replace_core, target: metronome, name: mauve_examples/UNDO}]}
 """
+SILENCE = "{silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}"
+VALUE = "{value: {topic: peer, type: std_msgs/msg/Float64, field: data, above: 1}}"
 
 
 class Stage:
     """The metronome and its supervisor."""
 
-    def __init__(self, folder: Path, *, do: str, undo: str) -> None:
+    def __init__(self, folder: Path, *, do: str, undo: str, when: str = SILENCE) -> None:
         share = share_folder("mauve_examples")
         assert share is not None
         rules = folder / "rules.yaml"
-        rules.write_text(RULES.replace("UNDO", undo).replace("DO", do), encoding="utf-8")
+        text = RULES.replace("UNDO", undo).replace("DO", do).replace("WHEN", when)
+        rules.write_text(text, encoding="utf-8")
         self.time = Simulation()
         self.topics = SimulatedTopics()
         architecture = share / "architecture" / "metronome.yaml"
@@ -45,13 +48,12 @@ class Stage:
         self.executor.activate()
         self.time.every(self.time.now_ns(), 20_000_000, self.supervisor.tick)
 
-    def run(self, seconds: float, *, playing: bool = False) -> None:
+    def run(self, seconds: float, *, playing: bool = False, value: float = 0.0) -> None:
         for _ in range(round(seconds * 10)):
             if playing:
                 now_ns = self.time.now_ns()
-                self.topics.say(
-                    "/peer", "std_msgs/msg/Float64", Float64(), time_ns=now_ns, qos=QoSProfile(depth=1)
-                )
+                message, qos = Float64(data=value), QoSProfile(depth=1)
+                self.topics.say("/peer", "std_msgs/msg/Float64", message, time_ns=now_ns, qos=qos)
             self.time.run_until(self.time.now_ns() + 100_000_000)
 
     def said(self) -> list[str]:
@@ -94,3 +96,14 @@ def test_rules_that_the_executor_takes_are_armed_and_no_more(stage: Stage):
     stage.run(1.0, playing=True)
     assert stage.said() == ["armed"]
     assert stage.core() == "Metronome"
+
+
+@pytest.mark.parametrize("stage", [{"do": "Accelerando", "undo": "Metronome", "when": VALUE}], indirect=True)
+def test_the_value_of_a_field(stage: Stage):
+    stage.run(1.0, playing=True, value=1.0)
+    assert stage.said() == ["armed"]
+    stage.run(1.0, playing=True, value=1.5)
+    assert stage.said()[1:] == ["condition_true", "do", "done"]
+    assert stage.core() == "Accelerando"
+    stage.run(1.0, playing=True, value=1.0)
+    assert stage.said()[4:] == ["condition_false", "undo", "done"]

@@ -95,7 +95,7 @@ def test_a_process_that_slept_is_no_silence():
     world.run(1.0)
     world.now_s += 5.0
     world.engine.tick(world.now_s)  # the timer is served before the samples that wait
-    world.conditions[0].hear(world.now_s)
+    world.hear()
     world.run(2.0)
     assert world.said() == ["armed"]
 

@@ -28,11 +28,28 @@ def test_a_rule_with_its_defaults(tmp_path: Path):
     rules = load(tmp_path, GOOD).rules
     rule = rules.rules[0]
     assert rules.executor == "executor"
-    assert rule.when.silence.longer_than_s == 1.0
+    assert (rule.when.kind, rule.when.parameters["longer_than_s"]) == ("silence", 1.0)
+    assert (rule.where, rule.priority) == ("supervisor", 0)
     assert (rule.for_s, rule.cooldown_s, rule.max_missed) == (0.0, 0.0, 0)
     assert rule.undo is not None
     assert rule.undo.for_s == 3.0
     assert rule.targets() == {"exploration"}
+
+
+def test_a_tree_of_conditions(tmp_path: Path):
+    leaf = GOOD[GOOD.index("{silence") : GOOD.index("    do:")].strip()
+    tree = (
+        f"{{any: [{leaf}, {{not: {leaf}, for_s: 2}}, {{at_least: {{count: 1, of: [{leaf}]}}}}], within_s: 3}}"
+    )
+    where = "in: supervisor\n    priority: 7"
+    rule = load(tmp_path, GOOD.replace(leaf, f"{tree}\n    {where}", 1)).rules.rules[0]
+    assert (rule.where, rule.priority) == ("supervisor", 7)
+    assert (rule.when.kind, rule.when.within_s) == ("any", 3.0)
+    assert [part.kind for part in rule.when.parts] == ["silence", "not", "at_least"]
+    assert (rule.when.parts[1].for_s, rule.when.parts[2].count) == (2.0, 1)
+    assert [leaf.kind for leaf in rule.when.leaves()] == ["silence"] * 3
+    assert rule.changed(priority=8) != rule
+    assert rule.changed() == rule
 
 
 def test_a_scalar_value_becomes_yaml_text(tmp_path: Path):
@@ -47,11 +64,20 @@ def test_a_scalar_value_becomes_yaml_text(tmp_path: Path):
     ("old", "new", "place", "word"),
     [
         ("mauve: 1", "mauve: 2", "1:8", "mauve"),
-        ("longer_than_s: 1", "longer_than_s: 0", "5:88", "greater than 0"),
+        ("longer_than_s: 1", "longer_than_s: 0", "5:88", "longer_than_s"),
         ("longer_than_s: 1", "longer_than_s: .nan", "5:88", "finite"),
         ("longer_than_s: 1", "longer_than_s: fast", "5:88", "'fast'"),
-        ("silence:", "noise:", "5:5", "silence"),
+        ("silence:", "silense:", "5:12", "did you mean silence?"),
         ("type: mauve_msgs/msg/PeerMessage", "type: PeerMessage", "5:45", "type"),
+        ("when: {silence", "when: {for_s: 0, silence", "5:19", "greater than 0"),
+        ("when: {silence", "when: {any: [], silence", "5:5", "exactly one kind of condition"),
+        ("when: {silence", "when: {not: {}} #", "5:12", "exactly one kind of condition"),
+        ("when: {silence", "when: {any: []} #", "5:12", "at least 1 item"),
+        ("when: {silence", "when: {at_least: {count: 1}} #", "5:12", "of is missing"),
+        ("    undo:", "    in: excutor\n    undo:", "7:9", "supervisor"),
+        ("    undo:", "    priority: -1\n    undo:", "7:15", "greater than or equal to 0"),
+        ("silence: {", "value: {field: data, ", "5:12", "below or above, or both"),
+        ("silence: {", "value: {field: a b, below: 1, ", "5:27", "a field such as"),
         ("topic: radio/in", "topic: radio//in", "5:29", "a ROS name"),
         ("do: [{kind: replace_core", "do: [{kind: explode", "6:17", "'explode'"),
         (", name: mauve_examples/LocalExploration", "", "6:10", "needs a name"),

@@ -51,6 +51,7 @@ class StandIn:
         self.requests: list[Any] = []
         self.refuse_with = 0
         self.talking = True
+        self.number = 0
         self.core = USUAL
         self.revision = 0
         self.node = Node("executor", namespace="/robot_1", context=context)
@@ -67,7 +68,7 @@ class StandIn:
 
     def _speak(self) -> None:
         if self.talking:
-            self._voice.publish(PeerMessage(sender="robot_2"))
+            self._voice.publish(PeerMessage(sender="robot_2", sequence=self.number))
 
     def _reconfigure(self, request: Any, response: Any) -> Any:
         self.requests.append(request)
@@ -172,6 +173,29 @@ def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: 
     assert do.silence_s > 0.5
     assert do.revision == 1
     assert do.stamp.sec > 0
+
+
+def test_the_value_of_a_field_and_a_tree(graph: Graph, rules: Path):
+    """The peer's number is out of bounds while the peer is heard."""
+    value = "{value: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, field: sequence, above: 5}}"
+    silence = RULES[RULES.index("{silence") : RULES.index("    do:")].strip()
+    rules.write_text(RULES.replace(silence, f"{{all: [{value}, {{not: {silence}}}]}}"), encoding="utf-8")
+    stand_in, decisions = supervised(graph, rules)
+    graph.spin(1.0)
+    assert said(decisions) == ["armed"]
+    stand_in.number = 6
+    graph.until(lambda: "done" in said(decisions))
+    assert "sequence of /robot_1/radio/in is 6" in stand_in.requests[0].cause
+    stand_in.number = 5
+    graph.until(lambda: said(decisions).count("done") == 2)
+
+
+def test_a_field_that_is_not_there_is_refused_at_the_start(graph: Graph, rules: Path):
+    value = "{value: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, field: sender, above: 5}}"
+    silence = RULES[RULES.index("{silence") : RULES.index("    do:")].strip()
+    rules.write_text(RULES.replace(silence, value), encoding="utf-8")
+    with pytest.raises(ArchitectureFileError, match=r"field 'sender' of .* is no number"):
+        Supervisor(graph.add(Node("supervisor", context=graph.context)), RulesFile(rules))
 
 
 def test_a_refusal_is_told_and_tried_again(graph: Graph, rules: Path):
