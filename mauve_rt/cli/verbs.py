@@ -4,7 +4,7 @@ import argparse
 import sys
 from typing import Any
 
-from mauve_rt.cli import check_verb, report_verb, trace_verb
+from mauve_rt.cli import check_verb, report_verb, rules_verb, trace_verb
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -298,6 +298,7 @@ VERBS = (
     ),
     Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
     Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),
+    Verb("rules", "ask about rules before they matter", rules_verb.add_arguments, rules_verb.main),
     Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

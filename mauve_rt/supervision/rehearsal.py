@@ -10,7 +10,7 @@ from mauve_rt._kernel import Simulation
 from mauve_rt.control import requests
 from mauve_rt.control.control import Control
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
-from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.steps import Change, Step, place_of_step
 from mauve_rt.model.yaml_file import YamlFile
@@ -30,7 +30,12 @@ class Rehearsal:
     """An executor's answers to transactions, by its own checks, before there is an executor."""
 
     def __init__(self, runtime: SimulatedRuntime) -> None:
+        self._runtime = runtime
         self._control = Control(runtime, outside=_NoRos())
+
+    def periods_s(self) -> Mapping[str, float]:
+        """Of every component."""
+        return {each.name: each.period_ns / 1e9 for each in self._runtime.components()}
 
     def carry_out(self, steps: Sequence[Step], *, dry_run: bool = False) -> None:
         """Ask for a transaction.
@@ -99,6 +104,25 @@ def try_rule(file: RulesFile, index: int, model: ArchitectureModel) -> None:
             executor.carry_out(rule.undo.do, dry_run=True)
         except RefusedStepError as error:
             raise file.error(("rules", index, "undo", "do", error.index), str(error)) from None
+
+
+def rehearsal_problems(
+    file: RulesFile, model: ArchitectureModel
+) -> tuple[list[Problem], Mapping[str, float]]:
+    """What the executor of `model` would refuse of every rule, and the periods of its components, s.
+
+    Raises:
+        ArchitectureFileError: the architecture cannot be built or configured.
+    """
+    with rehearsal(model) as executor:
+        periods_s = executor.periods_s()
+    found: list[Problem] = []
+    for index in range(len(file.rules.rules)):
+        try:
+            try_rule(file, index, model)
+        except ArchitectureFileError as error:
+            found += error.problems
+    return found, periods_s
 
 
 class _NoRos:

@@ -261,6 +261,22 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "undoes what a supervisor before it did": (
         "ros/supervisor/test_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
     ),
+    "Conditions are combined by `all`, `any`, `not`, `at_least`, `for_s` and `within_s`": (
+        "python/supervision/test_rule_trees.py::test_what_is_combined",
+        "python/supervision/test_rule_trees.py::test_a_part_that_must_hold_without_a_break",
+        "python/supervision/test_rule_trees.py::test_what_held_a_while_ago",
+    ),
+    "of rules that want different things the one of the highest priority decides": (
+        "python/supervision/test_rule_trees.py::test_of_two_that_hold_the_higher_decides_and_the_lower_says_so_once",
+    ),
+    "`mauve rules check FILE` finds rules that cannot be meant and says how long each may take at most": (
+        "python/cli/test_rules.py::test_a_rule_that_can_never_hold",
+        "python/cli/test_rules.py::test_two_that_want_different_things_at_once",
+        "python/cli/test_rules.py::test_good_rules_and_their_bounds",
+    ),
+    "plays a script to them in virtual time, tells what they decide and draws it": (
+        "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
+    ),
     "A class installed meanwhile is found": (
         "ros/executor/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
     ),

@@ -1,0 +1,114 @@
+"""`mauve rules ...`: what can be asked of rules before they matter. Its sub-verbs: the table at the end."""
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
+from mauve_rt.errors import ArchitectureFileError, Problem
+
+if TYPE_CHECKING:  # loaded by those who use it only
+    from mauve_rt.model import ArchitectureModel
+    from mauve_rt.supervision.rule_bounds import Bound
+    from mauve_rt.supervision.rules import RulesFile
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the sub-verbs."""
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for verb in SUB_VERBS:
+        subparser = verbs.add_parser(verb.name, help=verb.help, description=verb.help)
+        verb.add_arguments(subparser)
+        subparser.set_defaults(rules_verb=verb)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the sub-verb; returns the exit status."""
+    verb: Verb = args.rules_verb
+    try:
+        return verb.main(args)
+    except ArchitectureFileError as error:
+        print("\n".join(error.lines()), file=sys.stderr)
+        return BAD_USAGE
+
+
+def _add_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
+    parser.add_argument(
+        "--architecture", type=Path, metavar="FILE", help="what they are about: its names are known then"
+    )
+
+
+def _check(args: argparse.Namespace) -> int:
+    from mauve_rt.model import load_architecture  # noqa: PLC0415
+    from mauve_rt.supervision.rule_checks import logic_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rule_names import name_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
+
+    file = RulesFile(args.file)
+    model = load_architecture(args.architecture) if args.architecture else None
+    found = [*name_findings(file, model), *logic_findings(file)]
+    periods: Mapping[str, float] = {}
+    if model is not None:
+        from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
+
+        refused, periods = rehearsal_problems(file, model)
+        found += refused
+    _print_bounds(file, periods)
+    for problem in sorted(found, key=lambda each: (each.line, each.column)):
+        _complain(file, problem)
+    counted = f"{len(file.rules.rules)} rules{_held_against(model)}"
+    print(f"{file.path}: {counted}: {f'{len(found)} findings' if found else 'no error found'}")
+    return REFUSED if found else OK
+
+
+def _held_against(model: "ArchitectureModel | None") -> str:
+    return f", held against {model.path}" if model is not None else ""
+
+
+def _complain(file: "RulesFile", problem: Problem) -> None:
+    print(f"{file.path}:{problem.line}:{problem.column}: {problem.text()}", file=sys.stderr)
+
+
+def _print_bounds(file: "RulesFile", periods: Mapping[str, float]) -> None:
+    from mauve_rt.supervision.rule_bounds import bound_of  # noqa: PLC0415
+
+    for rule in file.rules.rules:
+        bound = bound_of(rule, periods)
+        unknown = "" if bound.total_s is not None else " and what is not known"
+        most = f"{bound.known_s * 1e3:.3f} ms{unknown}"
+        print(f"{rule.name} (in the {rule.where}): at most from the cause to the first release: {most}")
+        _print_parts(bound)
+
+
+def _print_parts(bound: "Bound") -> None:
+    for part in bound.parts:
+        seconds = "?" if part.seconds is None else f"{part.seconds * 1e3:.3f}"
+        print(f"  {seconds:>12} ms  {part.what}{' (assumed)' if part.assumed else ''}")
+
+
+def _add_try(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
+    parser.add_argument("script", type=Path, metavar="SCRIPT", help="what happens when: see docs/rules.md")
+
+
+def _try(args: argparse.Namespace) -> int:
+    from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
+    from mauve_rt.supervision.script import load_script  # noqa: PLC0415
+    from mauve_rt.supervision.trial import LEGEND, Trial  # noqa: PLC0415
+
+    rules = RulesFile(args.file).rules.rules
+    trial = Trial(rules, load_script(args.script, rules))
+    for told in trial.story:
+        said = told.decision
+        print(f"{told.at_s:9.3f} s  {said.rule}: {said.decision}: {said.reason}")
+    print("", *trial.timeline(), LEGEND, sep="\n")
+    return OK
+
+
+SUB_VERBS = (
+    Verb("check", "find what is wrong with rules, and how long each may take", _add_file, _check),
+    Verb("try", "play a script to rules in virtual time and tell what they decide", _add_try, _try),
+)

@@ -1,0 +1,87 @@
+"""An executor that takes every transaction at once, for rules that are tried without one. Knows no ROS."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.steps import Step
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.rule import ArchitectureView, ComponentView
+from mauve_rt.supervision.rules import Rule
+
+INSTANCE = "pretended"
+
+
+@dataclass
+class PretendedExecutor:
+    """Its components are those that rules are about; they run as what undoes the rules leaves them."""
+
+    rules: Iterable[Rule]
+
+    def __post_init__(self) -> None:
+        self._components: dict[str, ListedComponent] = {}
+        self._resources: set[str] = set()
+        self._revision = 1
+        for rule in self.rules:
+            for step in rule.do:
+                self._be_there(step)
+            for step in rule.undo.do if rule.undo is not None else []:
+                self._take(step)
+
+    def view(self) -> ArchitectureView:
+        """As ~/state."""
+        shown = {name: ComponentView(each.state, each.core) for name, each in self._components.items()}
+        return ArchitectureView(INSTANCE, self._revision, shown)
+
+    def inventory(self) -> Inventory:
+        """As ~/list_components."""
+        return Inventory(INSTANCE, dict(self._components), frozenset(self._resources))
+
+    def handle(self, request: Request) -> Outcome:
+        """Take it; a dry run changes nothing."""
+        if not request.dry_run:
+            for step in request.steps:
+                self._take(step)
+            self._revision += 1
+        return Outcome(code=Code.OK, message="", revision=self._revision)
+
+    def _be_there(self, step: Step) -> None:
+        """What a step needs before it can be done."""
+        kind = STEP_KINDS[step.kind]
+        if kind.target == "component":
+            self._components.setdefault(step.target, ListedComponent(state="RUNNING", core="its own"))
+        elif kind.target == "resource":
+            self._resources.add(step.target)
+
+    def _take(self, step: Step) -> None:
+        kind = STEP_KINDS[step.kind]
+        if kind.target == "all":
+            return
+        if kind.is_about_resource:
+            (self._resources.discard if kind.removes else self._resources.add)(step.target)
+        elif kind.removes:
+            self._components.pop(step.target, None)
+        elif kind.target == "new component":
+            self._components[step.target] = ListedComponent(state="STOPPED", core="its own")
+        else:
+            self._be_there(step)
+            self._components[step.target] = _after(self._components[step.target], step)
+
+
+def _after(component: ListedComponent, step: Step) -> ListedComponent:
+    kind = STEP_KINDS[step.kind]
+    match kind.name:
+        case "":
+            return replace(component, state=kind.leaves[0])
+        case "property":
+            return replace(component, properties={**component.properties, step.name: step.value})
+        case "port":
+            value = step.value if kind.value else ""
+            return replace(component, connections={**component.connections, step.name: value})
+        case "core":
+            return replace(component, core=step.name)
+        case "fsm":
+            return replace(component, fsm=step.name)
+        case "shell":
+            return replace(component, shell=step.name)

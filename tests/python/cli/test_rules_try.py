@@ -1,0 +1,110 @@
+"""`mauve rules try`: a script played to rules; and what docs/rules.md says of it and of the conditions."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mauve_rt.cli.main import main
+from mauve_rt.supervision.condition_table import ConditionParameter, conditions
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs/rules.md").read_text(encoding="utf-8")
+RULES, SCRIPT = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+(STORY,) = re.findall(r"```\n( .*?)```", PAGE, re.DOTALL)
+
+Try = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def play(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Try:
+    """play(rules, script): status, stdout and stderr, the latter without the folder's name."""
+
+    def run(rules: str = RULES, script: str = SCRIPT) -> tuple[int, str, str]:
+        (tmp_path / "rules").write_text(rules, encoding="utf-8")
+        (tmp_path / "script").write_text(script, encoding="utf-8")
+        status = main(["rules", "try", str(tmp_path / "rules"), str(tmp_path / "script")])
+        said = capsys.readouterr()
+        return status, said.out, said.err.replace(f"{tmp_path}/", "")
+
+    return run
+
+
+def test_the_story_and_the_timeline_of_the_documentation(play: Try) -> None:
+    assert play() == (0, STORY, "")
+
+
+def test_equal_scripts_give_equal_stories(play: Try) -> None:
+    assert play() == play()
+
+
+def test_a_rule_that_lost_is_seen(play: Try) -> None:
+    second = (
+        RULES[RULES.index("  - name") :].replace("link_lost", "alone").replace("priority: 0", "priority: 1")
+    )
+    second = second.replace("LocalExploration", "Hovering")
+    status, out, _ = play(RULES + second, SCRIPT.replace("until_s: 5.0", "until_s: 2.0"))
+    assert status == 0
+    assert "link_lost: suppressed: do waits: outranked by rule alone (priority 1)" in out
+    rows = {line.split()[0]: line for line in out.splitlines() if line.endswith("|")}
+    assert "#" in rows["alone"]
+    assert "?" in rows["link_lost"]
+    assert "#" not in rows["link_lost"]
+
+
+def test_what_is_about_more_than_cores_is_tried_too(play: Try) -> None:
+    do = "do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]"
+    back = "do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]"
+    rules = RULES.replace(do, "do: [{kind: stop, target: camera}, {kind: disconnect, target: a, name: in}]")
+    rules = rules.replace(back, "do: [{kind: start, target: camera}]")
+    _, out, _ = play(rules)
+    assert [line.split(": ")[1] for line in out.splitlines()[:7]] == [
+        "armed",
+        "condition_true",
+        "do",
+        "done",
+        "condition_false",
+        "undo",
+        "done",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "words"),
+    [
+        ("topic: radio/in, every_s: 0.1, until", "topic: radio/out, every_s: 0.1, until", "4:13", "radio/in"),
+        ("lasts_s: 20", "lasts_s: -1", "2:10", "greater than 0"),
+        ("lasts_s: 20", "", "1:1", "lasts_s is missing"),
+        ("every_s: 0.1, until", "every_s: 0, until", "4:32", "greater than or equal to 0.001"),
+        ("heard:", "herd:", "3:1", "did you mean heard?"),
+    ],
+)
+def test_a_bad_script_is_refused_where_it_is_bad(
+    play: Try, old: str, new: str, place: str, words: str
+) -> None:
+    status, out, error = play(script=SCRIPT.replace(old, new, 1))
+    assert (status, out) == (2, "")
+    assert error.startswith(f"script:{place}: ")
+    assert words in error
+
+
+def _row(kind: str, parameter: ConditionParameter) -> str:
+    low, high = parameter.minimum, parameter.maximum
+    if low is not None and high is not None:
+        span = f"{low:g} to {high:g}"
+    else:
+        span = f"{low:g} or more" if low is not None else f"{high:g} or less" if high is not None else ""
+    initial = (
+        "required" if parameter.required else "none" if parameter.initial is None else f"{parameter.initial}"
+    )
+    cells = (kind, parameter.name, parameter.type, parameter.unit, span, initial)
+    return f"| {' | '.join(cells)} |".replace("|  |", "| |").replace("|  |", "| |")
+
+
+def test_the_documentation_lists_every_condition() -> None:
+    lines = [
+        _row(each.name, parameter) for each in conditions().values() for parameter in each.parameters.values()
+    ]
+    table = "| --- | --- | --- | --- | --- | --- |\n" + "\n".join(lines) + "\n\n"
+    assert table in PAGE
