@@ -62,6 +62,8 @@ void Machine::release(time_ns_t actual_ns) noexcept {
   event_settled_ = true;
   statistics_.releases.fetch_add(1, std::memory_order_relaxed);
   statistics_.wakeup.record(actual_ns - clock_ns());
+  released_ns_.store(actual_ns, std::memory_order_relaxed);
+  if (listening_.is_late(actual_ns - clock_ns())) tell_late_wakeup(actual_ns);
   boundary_ns_ = actual_ns;
   trace_at(actual_ns, TraceKind::release, waiting_->trace_id, clock_ns(), actual_ns, grid_place_ns_);
 }
@@ -122,6 +124,7 @@ void Machine::leave_wait() {
 void Machine::enter_wait(const State& state) {
   waiting_ = &state;
   next_ = nullptr;
+  if (listening_.is_late_response(boundary_ns_ - clock_ns())) tell_late_response();
   if (state.event == nullptr) {
     set_clock_ns(later_by(clock_ns(), state.duration_ns));
     if (const time_ns_t period = grid().period_ns; period != 0) {
@@ -173,11 +176,23 @@ void Machine::handle_overrun(const State& state, time_ns_t now_ns) {
     statistics_.skipped.fetch_add(static_cast<std::uint64_t>(skipped), std::memory_order_relaxed);
   }
   trace(TraceKind::overrun, state.trace_id, missed, now_ns, skipped);
+  listening_.tell([&](TaskListener& listener) {
+    listener.on_overrun(now_ns, statistics_.overruns.load(std::memory_order_relaxed));
+  });
   if (settings_.overrun == OverrunPolicy::fault) throw std::runtime_error("overrun, and its policy is fault");
   if (settings_.overrun == OverrunPolicy::catch_up && period != 0 &&
       (now_ns - missed) / period + 1 > settings_.max_backlog) {
     throw std::runtime_error("overrun: more instants are owed than max_backlog allows");
   }
+}
+
+void Machine::tell_late_wakeup(time_ns_t now_ns) noexcept {
+  listening_.tell([&](TaskListener& listener) { listener.on_late_wakeup(now_ns, now_ns - clock_ns()); });
+}
+
+void Machine::tell_late_response() noexcept {
+  listening_.tell(
+      [&](TaskListener& listener) { listener.on_late_response(boundary_ns_, boundary_ns_ - clock_ns()); });
 }
 
 void Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {

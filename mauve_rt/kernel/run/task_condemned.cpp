@@ -30,6 +30,7 @@ bool Task::condemn(std::string what, time_ns_t now_ns) {
 /// FAULTED first, so that whoever has to act can; then the processor for the others; then the outputs.
 void Task::carry_out_sentence() noexcept {
   verdict_.where = machine_.state_name();
+  if (verdict_.bound_ns != 0) tell_over_declared();
   swap_fault(verdict_);  // the fault before this one stays there: a watchdog frees nothing
   publish_state(ComponentState::faulted);
   withdraw_commit();  // it cannot come to the gate any more

@@ -142,12 +142,18 @@ void Task::park_stopped() noexcept {
 
 void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
   if (!machine_.end_execution()) return park_condemned();
+  if (bound_ns != 0) tell_over_declared();
   FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
                  .bound_ns = bound_ns,
                  .where = machine_.state_name(),
                  .when_ns = clock().now_ns()};
   swap_fault(note);
   end_in_fault();
+}
+
+void Task::tell_over_declared() noexcept {
+  machine_.listening().tell(
+      [&](TaskListener& listener) { listener.on_over_declared(machine_.clock().now_ns()); });
 }
 
 void Task::end_in_fault() noexcept {
@@ -186,6 +192,8 @@ void Task::publish_state(ComponentState state) noexcept {
   state_.store(static_cast<std::uint32_t>(state), std::memory_order_release);
   futex_wake_all(state_);
   changes_.bump();
+  machine_.listening().tell(
+      [&](TaskListener& listener) { listener.on_state(machine_.clock().now_ns(), state); });
 }
 
 }  // namespace mauve

@@ -98,6 +98,11 @@ class LatestRegister {
     }
     return sequence == 0 ? DataStatus::none : reader.look(sequence);
   }
+  /// The newest value in place, until the reader lets it go; nullptr: there is none. [rt] wait-free.
+  const T* look(std::uint32_t& held) MAUVE_RT {
+    const Entry& entry = newest(held);
+    return entry.sequence == 0 ? nullptr : &entry.value;
+  }
   /// Gives back what the reader keeps. [rt] wait-free.
   void let_go(std::uint32_t& held) MAUVE_RT {
     if (held == 0) return;

@@ -27,7 +27,7 @@ inline constexpr std::uint32_t kLeftBehind = 2;
 /// |-------------|-----------------------------------------|---------------------------------------------------|
 /// | register_   | readers, each with a ReaderState        | wait-free                                         |
 /// | register_   | the writer; the watchdog for its zeros  | write_mutex_, free but for a writer that hangs    |
-/// | register_   | the serialized face, as one more reader | serial_mutex_                                     |
+/// | register_   | the serialized face, and one number for rules, as one more reader | serial_mutex_           |
 template <Described T>
 class LatestValue final : public NewestResource {
  public:
@@ -50,6 +50,17 @@ class LatestValue final : public NewestResource {
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
+  }
+  std::optional<NumberPlace> find_number(std::string_view path) const override {
+    return mauve::find_number<T>(path);
+  }
+  bool read_number(const NumberPlace& place, double& number) noexcept override {
+    const std::lock_guard lock(serial_mutex_);
+    std::uint32_t held = 0;
+    const T* const newest = register_.look(held);
+    if (newest != nullptr) number = place.of(newest);
+    register_.let_go(held);
+    return newest != nullptr;
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -139,6 +141,12 @@ class Resource : public Configurable {
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
   /// Why write_sample() has just refused this message, in words. [non-rt]
   virtual std::string why_refused(std::span<const std::byte> message) const;
+
+  /// Where the number at a path such as twist.linear.x lies in its newest value; nothing: it has none at a fixed place.
+  /// [non-rt]
+  virtual std::optional<NumberPlace> find_number(std::string_view /*path*/) const { return {}; }
+  /// That number in the newest value; false when there is none yet. [rt]
+  virtual bool read_number(const NumberPlace& /*place*/, double& /*number*/) MAUVE_RT { return false; }
 
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
   virtual ClientBase* client() MAUVE_RT { return nullptr; }

@@ -33,6 +33,15 @@ class SharedData final : public NewestResource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
+  std::optional<NumberPlace> find_number(std::string_view path) const override {
+    return mauve::find_number<T>(path);
+  }
+  bool read_number(const NumberPlace& place, double& number) noexcept override {
+    const std::lock_guard lock(mutex_);
+    if (sequence_ == 0) return false;
+    number = place.of(&value_);
+    return true;
+  }
 
  private:
   class Read final : public ReadService<T> {

@@ -14,6 +14,7 @@
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/run/execution_word.hpp"
+#include "mauve_rt/run/task_listener.hpp"
 #include "mauve_rt/run/task_settings.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
@@ -48,7 +49,8 @@ struct OverBound : std::exception {
 /// | period_ns_              |                                           |            |                                 |
 /// | wait_bound_ns_          | the same                                  | watchdog   | relaxed: a hint when to look    |
 /// | context_, statistics_   | who runs it                               | anyone     | relaxed: lone facts             |
-/// | current_                | who runs it                               | anyone     | relaxed: a lone fact            |
+/// | current_, released_ns_  | who runs it                               | anyone     | relaxed: lone facts             |
+/// | listening_              | ordinary threads                          | who runs it| its own: task_listener.hpp      |
 /// | present_                | who runs it                               | anyone     | its own: present_state.hpp      |
 /// | execution_              | who runs it, who condemns, who removes    | all of them| its own: execution_word.hpp     |
 /// | waiting_ ...            | who runs it                               | who runs it| its own                         |
@@ -152,6 +154,10 @@ class Machine {
   /// The logical clock. [rt]
   time_ns_t clock_ns() const MAUVE_RT { return context_.clock_ns.load(std::memory_order_relaxed); }
   const TaskStatistics& statistics() const MAUVE_RT { return statistics_; }
+  /// When the last release was; 0: there was none. [rt], anyone
+  time_ns_t released_ns() const MAUVE_RT { return released_ns_.load(std::memory_order_relaxed); }
+  /// Who is told of what befalls it. [rt]
+  TaskListening& listening() MAUVE_RT { return listening_; }
   const PresentState& present() const MAUVE_RT { return present_; }
   /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: it wakes
   /// the watchdog itself. [rt]
@@ -165,6 +171,8 @@ class Machine {
   const State* successor(const State& state) const;
   void enter_wait(const State& state);
   void handle_overrun(const State& state, time_ns_t now_ns);
+  void tell_late_wakeup(time_ns_t now_ns) MAUVE_RT;
+  void tell_late_response() MAUVE_RT;
   void set_clock_ns(time_ns_t instant) noexcept {
     context_.clock_ns.store(instant, std::memory_order_relaxed);
   }
@@ -181,7 +189,9 @@ class Machine {
 
   Context context_;
   TaskStatistics statistics_;
+  TaskListening listening_;
   std::atomic<std::uint32_t> current_{0};
+  std::atomic<time_ns_t> released_ns_{0};
   ExecutionWord execution_;
   PresentState present_;
 

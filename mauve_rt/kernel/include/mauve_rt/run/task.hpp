@@ -17,6 +17,7 @@
 #include "mauve_rt/base/threads.hpp"
 #include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/run/commit.hpp"
+#include "mauve_rt/run/lent.hpp"
 #include "mauve_rt/run/machine.hpp"
 #include "mauve_rt/run/queue_place.hpp"
 #include "mauve_rt/run/task_settings.hpp"
@@ -51,10 +52,13 @@ struct FaultNote {
 /// A component not listed yet has nobody to tell.
 struct ChangeSignal {
   std::atomic<std::uint32_t> word{0};
-  std::atomic<ChangeSignal*> listener{nullptr};  // release/acquire: it is there before it is told of anything
+  Lent<ChangeSignal> listener;
 
-  /// Who else is told from now on; nullptr: nobody. [non-rt]
-  void set_listener(ChangeSignal* other) noexcept { listener.store(other, std::memory_order_release); }
+  /// Who else is told from now on; nullptr: nobody, and who was told before is told no more on return. [non-rt]
+  void set_listener(ChangeSignal* other) noexcept {
+    listener.recall(kForever);
+    if (other != nullptr) listener.lend(*other);
+  }
   void bump() MAUVE_RT;  // [rt]
 };
 
@@ -265,6 +269,10 @@ class Task final : public Waiter {
   Fault fault() const;
   const ThreadFacts& facts() const noexcept { return facts_; }
   const TaskStatistics& statistics() const noexcept { return machine_.statistics(); }
+  /// When the last release was; 0: there was none. [rt]
+  time_ns_t released_ns() const MAUVE_RT { return machine_.released_ns(); }
+  /// Who is told of what befalls the component. [rt]
+  TaskListening& listening() MAUVE_RT { return machine_.listening(); }
   /// What the thread allocated, and its page faults, since its last start. [rt]
   const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
@@ -323,6 +331,7 @@ class Task final : public Waiter {
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void publish_state(ComponentState state) MAUVE_RT;
+  void tell_over_declared() MAUVE_RT;
 
   std::string name_;
   std::uint16_t number_;

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// One number within a value, found by its path once and read without looking for it again.
+#pragma once
+
+#include <charconv>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/data/message_shape.hpp"
+
+namespace mauve {
+
+/// Where in a struct the number lies, and as what.
+struct NumberPlace {
+  std::size_t offset{0};
+  double (*convert)(const std::byte* at) noexcept {nullptr};
+
+  /// [rt]
+  double of(const void* value) const MAUVE_RT {
+    return MAUVE_RT_TRUSTED(convert(static_cast<const std::byte*>(value) + offset));  // one of those below
+  }
+};
+
+namespace detail {
+
+/// "x" and "y[2]" of "x.y[2]": the first part of a path, taken off its front.
+inline std::string_view next_part(std::string_view& path) {
+  const std::size_t end = path.find_first_of(".[", 1);
+  const std::string_view part = path.substr(0, end);
+  path.remove_prefix(part.size());
+  if (!path.empty() && path.front() == '.') path.remove_prefix(1);
+  return part;
+}
+
+/// Whether a member is named as the message's field, or so with one word more: cost_m for cost.
+inline bool is_field(std::string_view member, std::string_view field) {
+  return member == field || (member.starts_with(field) && member.find('_', field.size()) == field.size() &&
+                             member.find('_', field.size() + 1) == std::string_view::npos);
+}
+
+template <typename T>
+struct FindNumber {  // texts, and lists whose length changes, have no number at a fixed place
+  static std::optional<NumberPlace> in(const T& /*value*/, std::string_view /*path*/) { return {}; }
+};
+
+template <Primitive T>
+struct FindNumber<T> {
+  static std::optional<NumberPlace> in(const T& /*value*/, std::string_view path) {
+    if (!path.empty()) return {};
+    return NumberPlace{.convert = [](const std::byte* at) noexcept {
+      T number;
+      std::memcpy(&number, at, sizeof(T));
+      return static_cast<double>(number);
+    }};
+  }
+};
+
+template <typename Outer, typename Inner>
+std::optional<NumberPlace> find_inner(const Outer& outer, const Inner& inner, std::string_view path) {
+  std::optional<NumberPlace> found = FindNumber<Inner>::in(inner, path);
+  if (found) {
+    found->offset += static_cast<std::size_t>(reinterpret_cast<const std::byte*>(&inner) -
+                                              reinterpret_cast<const std::byte*>(&outer));
+  }
+  return found;
+}
+
+template <typename T, std::size_t N>
+struct FindNumber<std::array<T, N>> {
+  static std::optional<NumberPlace> in(const std::array<T, N>& value, std::string_view path) {
+    const std::string_view part = next_part(path);
+    if (part.size() < 3 || part.front() != '[' || part.back() != ']') return {};
+    std::size_t index = 0;
+    const auto [end, error] = std::from_chars(part.data() + 1, part.data() + part.size() - 1, index);
+    if (error != std::errc() || end != part.data() + part.size() - 1 || index >= N) return {};
+    return find_inner(value, value[index], path);
+  }
+};
+
+template <Described T>
+struct FindNumber<T> {
+  static std::optional<NumberPlace> in(const T& value, std::string_view path) {
+    const std::string_view part = next_part(path);
+    std::optional<NumberPlace> found;
+    [[maybe_unused]] std::string_view names = TypeTraits<T>::field_names;
+    [[maybe_unused]] const auto look = [&](auto member) {
+      const std::string name = next_name(names);
+      if (!found && is_field(name, part)) found = find_inner(value, value.*member, path);
+    };
+    std::apply([&](auto... member) { (look(member), ...); }, TypeTraits<T>::fields());
+    return found;
+  }
+};
+
+}  // namespace detail
+
+/// The number at a path such as twist.linear.x or ranges[3]; nothing: there is none at a fixed place. [non-rt]
+template <Described T>
+std::optional<NumberPlace> find_number(std::string_view path) {
+  const auto value = std::make_unique<T>();
+  return path.empty() ? std::nullopt : detail::FindNumber<T>::in(*value, path);
+}
+
+}  // namespace mauve

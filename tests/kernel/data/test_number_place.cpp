@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A number of a resource's newest value, by its path.
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+
+struct Inner {
+  double x{};
+  bool on{};
+};
+struct Outer {
+  std::uint8_t first{};
+  Inner inner{};
+  std::array<Inner, 3> list{};
+  float cost_m{};
+  BoundedVector<double, 4> varying{};
+  BoundedString<8> text{};
+};
+struct Large {
+  std::array<double, 512> values{};
+};
+
+}  // namespace mauve::testing
+
+MAUVE_TYPE(mauve::testing::Inner, "test_msgs/msg/Inner", x, on)
+MAUVE_TYPE(mauve::testing::Outer, "test_msgs/msg/Outer", first, inner, list, cost_m, varying, text)
+MAUVE_TYPE(mauve::testing::Large, "test_msgs/msg/Large", values)
+
+namespace mauve::testing {
+namespace {
+
+double read(Resource& resource, const std::string& path) {
+  const std::optional<NumberPlace> place = resource.find_number(path);
+  double number = -1;
+  EXPECT_TRUE(place && resource.read_number(*place, number)) << path;
+  return number;
+}
+
+TEST(NumberPlace, IsFoundByItsPath) {
+  SharedData<Outer> resource;
+  Outer value;
+  value.first = 200;
+  value.inner = {.x = 1.5, .on = true};
+  value.list[2].x = -4;
+  value.cost_m = 0.25F;
+  resource.write.write(value, 1);
+  EXPECT_EQ(200, read(resource, "first"));
+  EXPECT_EQ(1.5, read(resource, "inner.x"));
+  EXPECT_EQ(1, read(resource, "inner.on"));
+  EXPECT_EQ(-4, read(resource, "list[2].x"));
+  EXPECT_EQ(0.25, read(resource, "cost")) << "the message's name of it";
+}
+
+TEST(NumberPlace, IsNoneAtNoFixedPlace) {
+  SharedData<Outer> resource;
+  for (const char* path : {"", ".", "inner", "inner.y", "list", "list[3].x", "list[-1].x", "list[1x].x",
+                           "list[0]", "varying", "varying[0]", "text", "first.x", "inner.x[0]"})
+    EXPECT_FALSE(resource.find_number(path)) << path;
+}
+
+TEST(NumberPlace, IsTheNewest) {
+  LatestValue<Large> resource;
+  const std::optional<NumberPlace> place = resource.find_number("values[511]");
+  ASSERT_TRUE(place);
+  double number = 7;
+  EXPECT_FALSE(resource.read_number(*place, number)) << "nothing was written";
+  EXPECT_EQ(7, number);
+  Large value;
+  for (int i = 0; i < 100; ++i) {  // each read gives back the slot it held
+    value.values[511] = i;
+    ASSERT_TRUE(resource.write.write(value, i + 1));
+    ASSERT_TRUE(resource.read_number(*place, number));
+    EXPECT_EQ(i, number);
+  }
+}
+
+}  // namespace
+}  // namespace mauve::testing
