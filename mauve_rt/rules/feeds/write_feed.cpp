@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "feeds/feeds.hpp"
+
+namespace mauve::rules {
+
+namespace {
+
+/// The writes to a resource, by the clock of who receives them: what a writer says of its time counts for nothing.
+///
+/// | member    | written by       | read by | under                                        |
+/// | --------- | ---------------- | ------- | -------------------------------------------- |
+/// | resource_ | ordinary threads | the same | one thread at a time                        |
+/// | signal_   | writers          | engine   | the resource's listeners' lock: one at once |
+class WriteFeed final : public Feed, private EventListener {
+ public:
+  WriteFeed(std::string resource, Signal& signal, const FeedPlace& place)
+      : architecture_(place.architecture),
+        clock_(place.clock),
+        name_(std::move(resource)),
+        signal_(signal),
+        resource_(architecture_.hold_resource(name_)) {
+    resource_->listen(*this);
+  }
+  ~WriteFeed() override { let_go(); }
+
+  void follow() override {
+    const std::shared_ptr<Resource> present = architecture_.find_resource(name_);
+    if (present == resource_) return;
+    let_go();
+    resource_ = present;
+    if (resource_ != nullptr) resource_->listen(*this);
+  }
+
+ private:
+  void on_event(time_ns_t /*written_ns*/) noexcept override { signal_.tell(clock_.now_ns(), 0); }
+
+  void let_go() noexcept {
+    if (resource_ != nullptr) resource_->unlisten(*this);
+  }
+
+  Architecture& architecture_;
+  const Clock& clock_;
+  const std::string name_;
+  Signal& signal_;
+  std::shared_ptr<Resource> resource_;  // nullptr: it was removed
+};
+
+}  // namespace
+
+std::unique_ptr<Feed> open_write_feed(const std::string& resource, Signal& signal, const FeedPlace& place) {
+  return std::make_unique<WriteFeed>(resource, signal, place);
+}
+
+}  // namespace mauve::rules

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Reflex: rules at work beside the components of one host.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/rules/action.hpp"
+#include "mauve_rt/rules/engine.hpp"
+#include "mauve_rt/rules/feeds.hpp"
+
+namespace mauve::rules {
+
+/// What one rule of the engine does and undoes.
+struct RuleActions {
+  ActionSteps do_steps{};
+  TransactionOptions do_options{};
+  ActionSteps undo_steps{};  // none: it does not undo
+  TransactionOptions undo_options{};
+};
+
+/// One decision, for who tells it.
+struct Told {
+  Decision decision{};
+  ActionReport action{};  // of `done` and `failed`: what came of it
+};
+
+/// How one rule fares.
+struct RuleFacts {
+  std::string name{};
+  RuleStatus status{};
+  bool ready{false};      // what it would do or undo next could begin
+  std::string problem{};  // why that cannot be made ready, or what it hears not be heard; empty: it can
+};
+
+/// Runs an engine beside the components of a host: decides on a real-time thread above the components and below who
+/// conducts their changes, and makes ready, carries out and tells on an ordinary thread of its own. Neither needs
+/// Python, nor anything of another process.
+///
+/// In virtual time there are no threads: whoever simulates calls advance().
+///
+/// "stepper", "tender": the two threads.
+///
+/// | member            | written by | read by        | order                                                            |
+/// | ----------------- | ---------- | -------------- | ---------------------------------------------------------------- |
+/// | engine_           | stepper    | the same       | its decisions: its own                                           |
+/// | feeds_            | tender     | the same       | -                                                                |
+/// | Rule::acts        | both       | both           | their own: action.hpp                                            |
+/// | Rule::found       | tender     | stepper        | release/acquire: what was found lies in it                       |
+/// | Rule::in_effect   | stepper    | tender         | relaxed: work_ is bumped after it                                |
+/// | Rule::status      | stepper    | facts()        | status_mutex_, which the stepper only tries                      |
+/// | ends_             | stepper    | tender         | release/acquire: what was done before lies in the architecture   |
+/// | work_ (futex)     | anyone     | tender         | release/acquire: who sees the bump sees the work                 |
+/// | ending_ (futex)   | stop()     | both           | release/acquire                                                  |
+/// | told_, problems_, woken_ | tender, wake() | anyone | told_mutex_                                                    |
+class Reflex {
+ public:
+  /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
+  /// Throws Error as Feeds::open(); invalid_argument: a kind of step that there is not.
+  Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
+         std::map<std::string, std::string> topics = {});
+  /// As stop().
+  ~Reflex();
+  Reflex(const Reflex&) = delete;
+  Reflex& operator=(const Reflex&) = delete;
+
+  /// Begins to watch; the host is deployed. A rule is armed once its components run. [non-rt] Throws Error (internal).
+  void start();
+  /// Nothing is done any more on return; what is in effect stays so. May be called again. [non-rt]
+  void stop() noexcept;
+
+  /// Decisions not taken yet; waits for one, at most so long, or until wake(). [non-rt]
+  std::vector<Told> wait_told(time_ns_t timeout_ns);
+  /// Ends that wait, now and from now on. [non-rt]
+  void wake();
+  /// [non-rt]
+  std::vector<RuleFacts> facts() const;
+  /// How many decisions nobody took in time. [non-rt]
+  std::uint64_t lost() const MAUVE_RT { return engine_->lost(); }
+
+  /// In virtual time: does all that is to be done now; when it has to be called again at the latest. [non-rt]
+  time_ns_t advance();
+
+ private:
+  struct Rule {
+    explicit Rule(const RuleActions& actions)
+        : acts{Action(actions.do_steps, actions.do_options),
+               Action(actions.undo_steps, actions.undo_options)} {}
+    Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
+
+    std::array<Action, 2> acts;           // by Act
+    std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
+    std::atomic<bool> in_effect{false};
+    RuleStatus status{};
+    std::uint64_t applied{0};  // of found, by the stepper
+    bool was_present{false};   // once, so far as the stepper knows
+  };
+
+  void run_steps() noexcept;
+  void run_tending() noexcept;
+  time_ns_t step() MAUVE_RT;
+  void hear_ends(time_ns_t now_ns) MAUVE_RT;
+  void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
+  void show_status() MAUVE_RT;
+  bool tend();
+  bool look_around();
+  bool make_ready(Rule& rule, std::uint64_t revision);
+  void tell();
+  std::string follow();
+  void end() noexcept;
+
+  Host& host_;
+  std::unique_ptr<Engine> engine_;
+  std::vector<std::unique_ptr<Rule>> rules_;
+  Feeds feeds_;
+  Action* under_way_{nullptr};  // of the stepper
+  std::atomic<std::uint64_t> ends_{0};
+  ChangeSignal work_;
+  std::atomic<std::uint32_t> ending_{0};
+  Thread stepper_;
+  Thread tender_;
+  bool runs_{false};
+  mutable PiMutex status_mutex_;
+  mutable std::mutex told_mutex_;
+  std::condition_variable told_changed_;
+  std::deque<Told> told_;
+  std::vector<std::string> problems_;  // by rule
+  bool woken_{false};
+};
+
+}  // namespace mauve::rules

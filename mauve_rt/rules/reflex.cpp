@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/rules/reflex.hpp"
+
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+
+namespace mauve::rules {
+
+namespace {
+
+constexpr int kPriority = 97;  // above components, below who conducts changes and who watches
+constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
+// A machine or a process that stood still finds its timers due and its messages waiting alike: those come first.
+constexpr time_ns_t kStoodStill = ms_to_ns(50);
+constexpr time_ns_t kCatchUp = ms_to_ns(20);
+
+// What the tender found of a rule.
+constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
+constexpr std::uint64_t kKnown = 2;    // from here on one for each act: whether it is known ...
+constexpr std::uint64_t kInPlace = 8;  // ... that what it asks for is so
+constexpr unsigned kEndsAt = 5;
+
+constexpr std::array kActs{Act::do_, Act::undo};
+constexpr unsigned index_of(Act act) noexcept { return static_cast<unsigned>(act); }
+
+}  // namespace
+
+Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
+               std::map<std::string, std::string> topics)
+    : host_(host),
+      engine_(std::move(engine)),
+      feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
+      problems_(actions.size()) {
+  if (actions.size() != engine_->size())
+    throw Error(ErrorCode::invalid_argument, "every rule of the engine has its actions, and only these");
+  for (const RuleActions& each : actions) {
+    make_transaction(each.do_steps);  // its kinds are checked here
+    make_transaction(each.undo_steps);
+    rules_.push_back(std::make_unique<Rule>(each));
+    rules_.back()->applied = UINT64_MAX;
+  }
+  for (const auto& heard : engine_->signals()) feeds_.open(heard.spec, *heard.signal);
+}
+
+Reflex::~Reflex() { stop(); }
+
+void Reflex::start() {
+  if (runs_ || host_.is_simulated()) return;
+  ending_.store(0, std::memory_order_relaxed);  // the threads' creation publishes it
+  host_.architecture().changes().set_listener(&work_);
+  tend();
+  const auto tending = [](void* self) -> void* {
+    static_cast<Reflex*>(self)->run_tending();
+    return nullptr;
+  };
+  const auto stepping = [](void* self) -> void* {
+    static_cast<Reflex*>(self)->run_steps();
+    return nullptr;
+  };
+  if (tender_.start({.name = "reflex tender"}, tending, this) != 0) {
+    end();
+    throw Error(ErrorCode::internal, "the system refuses the thread that prepares what rules do");
+  }
+  if (stepper_.start({.name = "reflex", .priority = kPriority, .stack_bytes = kStackBytes}, stepping, this) !=
+      0) {
+    end();
+    tender_.join();
+    throw Error(ErrorCode::internal, "the system refuses the thread that rules act on");
+  }
+  stepper_.prefault_stack();
+  runs_ = true;
+}
+
+void Reflex::end() noexcept {
+  ending_.store(1, std::memory_order_release);
+  futex_wake_all(ending_);
+  host_.architecture().changes().set_listener(nullptr);
+  engine_->wake();
+  work_.bump();
+}
+
+void Reflex::stop() noexcept {
+  if (!std::exchange(runs_, false)) return;
+  end();
+  stepper_.join();
+  tender_.join();
+  tell();
+}
+
+time_ns_t Reflex::advance() {
+  for (;;) {
+    tend();
+    const time_ns_t next_ns = step();
+    if (!tend()) {
+      tell();
+      return next_ns;
+    }
+  }
+}
+
+// ---- the stepper
+
+void Reflex::run_steps() noexcept {
+  while (ending_.load(std::memory_order_acquire) == 0) {
+    const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before the look
+    const time_ns_t next_ns = step();
+    if (futex_wait_until(engine_->word(), word, next_ns)) continue;
+    if (host_.clock().now_ns() > later_by(next_ns, kStoodStill))
+      futex_wait_until(ending_, 0, host_.clock().now_ns() + kCatchUp);
+  }
+}
+
+time_ns_t Reflex::step() noexcept {
+  const time_ns_t now_ns = host_.clock().now_ns();
+  hear_ends(now_ns);
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    apply_found(i, now_ns);
+    for (const Act act : kActs) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());
+  }
+  const time_ns_t next_ns = engine_->step(now_ns);
+  if (const std::optional<Wish> wish = engine_->wish()) {
+    Action& action = rules_[wish->rule]->action(wish->act);
+    engine_->begun(now_ns);
+    if (action.begin()) {
+      under_way_ = &action;
+    } else {
+      engine_->ended(Ended::stale, now_ns);  // it was ready a moment ago
+    }
+  }
+  show_status();
+  work_.bump();
+  return next_ns;
+}
+
+void Reflex::hear_ends(time_ns_t now_ns) noexcept {
+  if (under_way_ == nullptr) return;
+  const std::optional<Ended> how = under_way_->ended();
+  if (!how) return;
+  under_way_ = nullptr;
+  engine_->ended(*how, now_ns);
+  ends_.fetch_add(1, std::memory_order_release);
+}
+
+/// What was found before the last action ended, or while one is under way, is of yesterday.
+void Reflex::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
+  Rule& rule = *rules_[index];
+  const std::uint64_t found = rule.found.load(std::memory_order_acquire);
+  const bool is_current = found >> kEndsAt == ends_.load(std::memory_order_relaxed) + 1;  // its own
+  if (under_way_ != nullptr || !is_current || found == rule.applied) return;
+  rule.applied = found;
+  const bool is_present = (found & kPresent) != 0;
+  engine_->set_present(index, is_present, now_ns);
+  if (!is_present) return;
+  const auto in_place = [&](Act act) {
+    const bool is_known = (found & (kKnown << index_of(act))) != 0;
+    const bool is_so = (found & (kInPlace << index_of(act))) != 0;
+    return is_known ? std::optional(is_so) : std::nullopt;
+  };
+  const bool is_first = !std::exchange(rule.was_present, true);
+  if (is_first && engine_->rule(index).undoes && in_place(Act::do_) == true && in_place(Act::undo) == false)
+    engine_->adopt(index, now_ns);
+  for (const Act act : kActs) {
+    if (const std::optional<bool> is_so = in_place(act)) engine_->set_in_place(index, act, *is_so, now_ns);
+  }
+}
+
+void Reflex::show_status() noexcept {
+  const std::unique_lock lock(status_mutex_, std::try_to_lock);
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    const RuleStatus status = engine_->status(i);
+    rules_[i]->in_effect.store(status.in_effect, std::memory_order_relaxed);
+    if (lock) rules_[i]->status = status;
+  }
+}
+
+// ---- the tender
+
+void Reflex::run_tending() noexcept {
+  while (ending_.load(std::memory_order_acquire) == 0) {
+    const std::uint32_t seen = work_.word.load(std::memory_order_acquire);
+    if (tend()) engine_->wake();
+    tell();
+    futex_wait_until(work_.word, seen, kForever);
+  }
+}
+
+/// Whether the stepper has something to look at.
+bool Reflex::tend() {
+  bool changed = false;
+  for (const auto& rule : rules_) {
+    for (Action& action : rule->acts) changed = action.carry_out(host_) || changed;
+  }
+  return changed || look_around();  // what has ended the stepper has to know first
+}
+
+bool Reflex::look_around() {
+  const std::uint64_t ends = ends_.load(std::memory_order_acquire) + 1;  // before the look; 0: never looked
+  const std::uint64_t revision = host_.architecture().revision();
+  const std::string deaf = follow();
+  const ArchitectureDescription description = host_.describe();
+  bool changed = false;
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
+    std::uint64_t found = ends << kEndsAt;
+    if (can_begin(rule.action(Act::do_).steps(), description)) found |= kPresent;
+    for (const Act act : kActs) {
+      const std::optional<bool> is_so = is_in_place(rule.action(act).steps(), description);
+      if (is_so) found |= kKnown << index_of(act);
+      if (is_so == true) found |= kInPlace << index_of(act);
+    }
+    changed = make_ready(rule, revision) || changed;
+    changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
+    std::string problem = !deaf.empty() ? deaf : rule.action(Act::do_).problem();
+    if (problem.empty()) problem = rule.action(Act::undo).problem();
+    const std::lock_guard lock(told_mutex_);
+    if (problems_[i] == problem) continue;
+    problems_[i] = std::move(problem);
+    told_changed_.notify_all();
+  }
+  return changed;
+}
+
+/// What is in effect can be undone, what is not can be done; would it be possible to undo that?
+bool Reflex::make_ready(Rule& rule, std::uint64_t revision) {
+  const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
+  Action& next = rule.action(in_effect ? Act::undo : Act::do_);
+  Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
+  bool changed = other.put_away();
+  if (next.exists()) changed = next.tend(host_, revision) || changed;
+  if (other.exists()) other.try_after(next.steps(), host_, revision);
+  return changed;
+}
+
+/// Why something cannot be heard.
+std::string Reflex::follow() {
+  try {
+    feeds_.follow();
+    return {};
+  } catch (const std::exception& failure) {
+    return failure.what();
+  }
+}
+
+void Reflex::tell() {
+  std::vector<Told> all;
+  while (const std::optional<Decision> decision = engine_->take()) {
+    all.push_back({.decision = *decision});
+    if (decision->decided != Decided::done && decision->decided != Decided::failed) continue;
+    Action& action = rules_[static_cast<std::size_t>(decision->rule)]->action(decision->act);
+    if (auto report = action.complete()) all.back().action = std::move(*report);
+  }
+  if (all.empty()) return;
+  const std::lock_guard lock(told_mutex_);
+  for (Told& each : all) told_.push_back(std::move(each));
+  told_changed_.notify_all();
+}
+
+// ---- anyone
+
+std::vector<Told> Reflex::wait_told(time_ns_t timeout_ns) {
+  std::unique_lock lock(told_mutex_);
+  told_changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
+                         [&] { return woken_ || !told_.empty(); });
+  std::vector<Told> taken(std::make_move_iterator(told_.begin()), std::make_move_iterator(told_.end()));
+  told_.clear();
+  return taken;
+}
+
+void Reflex::wake() {
+  const std::lock_guard lock(told_mutex_);
+  woken_ = true;
+  told_changed_.notify_all();
+}
+
+std::vector<RuleFacts> Reflex::facts() const {
+  std::vector<RuleFacts> all;
+  const std::scoped_lock lock(told_mutex_, status_mutex_);
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
+    all.push_back({.name = engine_->rule(i).name,
+                   .status = rule.status,
+                   .ready = rule.action(rule.status.in_effect ? Act::undo : Act::do_).is_ready(),
+                   .problem = problems_[i]});
+  }
+  return all;
+}
+
+}  // namespace mauve::rules

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Rules at work beside components, on threads and in virtual time.
+#include "mauve_rt/rules/reflex.hpp"
+
+#include "hosts.hpp"
+
+namespace mauve::rules {
+namespace {
+
+using namespace mauve::testing;  // NOLINT(google-build-using-namespace): the kernel's fixtures
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+When leaf(const std::string& kind, Parameters parameters) {
+  return {.kind = kind, .parameters = std::move(parameters)};
+}
+ActionSteps core(const std::string& implementation, const std::string& target = "c") {
+  return {{.kind = "replace_core", .target = target, .name = implementation}};
+}
+
+/// Component "c", whose core a rule replaces; "w", about which it asks; and the resource "beat", which the test writes.
+template <typename Way>
+class ReflexTest : public Hosted<Way> {
+ protected:
+  ReflexTest() : beat(this->architecture.template add_resource<SharedData<Number>>("beat")) {
+    this->add("c");
+    watched = &this->add("w");
+  }
+  ~ReflexTest() override {
+    if (reflex) reflex->stop();
+    this->way.shutdown();
+  }
+
+  void add_rule(When when, ActionSteps undo = core("t/Core"), ActionSteps act = core("t/Counting")) {
+    rules.push_back({.name = "rule" + std::to_string(rules.size()),
+                     .when = std::move(when),
+                     .undoes = !undo.empty(),
+                     .about = {"c"}});
+    actions.push_back({.do_steps = std::move(act), .undo_steps = std::move(undo)});
+  }
+  void make() {
+    reflex =
+        std::make_unique<Reflex>(this->host(), std::make_unique<Engine>(rules), actions, std::move(topics));
+  }
+  void begin() {
+    make();
+    reflex->start();
+    see("armed");
+  }
+  /// Time passes until a decision of this word was told since the last such call.
+  void see(const std::string& word, std::size_t times = 1) {
+    const auto seen = [&] {
+      take();
+      return static_cast<std::size_t>(std::count(words.begin() + from, words.end(), word)) >= times;
+    };
+    this->way.until(seen, word.c_str());
+    from = static_cast<std::ptrdiff_t>(words.size());
+  }
+  void live(time_ns_t duration_ns) {
+    for (const time_ns_t until = this->host().now_ns() + duration_ns; this->host().now_ns() < until;) {
+      this->way.run_for(us_to_ns(100));
+      take();
+    }
+  }
+  void take() {
+    if constexpr (ReflexTest::is_virtual) reflex->advance();
+    for (Told& told : reflex->wait_told(0)) {
+      words.emplace_back(name_of(told.decision.decided));
+      whole.push_back(std::move(told));
+    }
+  }
+  std::string present() { return this->architecture.component("c").shown().core; }
+  Told last(Decided decided) {
+    const auto found = std::find_if(whole.rbegin(), whole.rend(),
+                                    [&](const Told& told) { return told.decision.decided == decided; });
+    EXPECT_NE(whole.rend(), found);
+    return found != whole.rend() ? *found : Told{};
+  }
+
+  SharedData<Number>& beat;
+  Component* watched;
+  std::vector<mauve::rules::Rule> rules;
+  std::vector<RuleActions> actions;
+  std::map<std::string, std::string> topics;
+  std::unique_ptr<Reflex> reflex;
+  std::vector<std::string> words;
+  std::vector<Told> whole;
+  std::ptrdiff_t from{0};
+};
+TYPED_TEST_SUITE(ReflexTest, EveryHost, HostNames);
+
+When silent(double longer_than_s = 0.05) {
+  return leaf("silence", {{"resource", "beat"}, {"longer_than_s", longer_than_s}});
+}
+
+TYPED_TEST(ReflexTest, DoesAndUndoes) {
+  this->add_rule(silent());
+  this->deploy();
+  this->begin();
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  const Told done = this->last(Decided::done);
+  ASSERT_TRUE(done.action.report);
+  EXPECT_EQ("t/Counting", done.action.report->steps.at(0).to_core);
+  EXPECT_GE(done.decision.stamp_ns - done.decision.cause_ns, 0);
+  this->beat.write.write({}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+  EXPECT_THAT(this->words,
+              ElementsAre("armed", "condition_true", "do", "done", "condition_false", "undo", "done"));
+}
+
+TYPED_TEST(ReflexTest, HearsMessagesOfABoundTopic) {
+  this->topics = {{"radio/in", "beat"}};
+  this->add_rule(leaf("silence", {{"topic", "radio/in"}, {"longer_than_s", 0.05}}));
+  this->deploy();
+  this->begin();
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(ReflexTest, TakesWhatIsInEffectAsItsOwn) {
+  this->add_rule(silent());
+  this->deploy();
+  this->begin();
+  this->see("done");
+  this->reflex.reset();
+  this->from = 0;
+  this->words.clear();
+  this->begin();
+  this->live(ms_to_ns(20));
+  EXPECT_THAT(this->words, ElementsAre("armed", "adopted", "condition_true"));
+  this->beat.write.write({}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(ReflexTest, LeavesAloneWhatAnotherHandChanges) {
+  this->add_rule(silent());
+  this->deploy();
+  this->begin();
+  this->see("done");
+  this->host().replace_core("c", "t/Core");
+  this->see("suppressed");
+  EXPECT_EQ(Why::other_hand, this->last(Decided::suppressed).decision.why);
+  this->live(ms_to_ns(120));
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(ReflexTest, SaysAtOnceWhatCannotBeMadeReady) {
+  this->add_rule(silent(1.0), core("t/Core"), core("t/Unready"));
+  this->add_rule(silent(1.0), core("t/Undeclared"));
+  this->deploy();
+  this->begin();
+  this->take();
+  const std::vector<RuleFacts> facts = this->reflex->facts();
+  ASSERT_THAT(facts, SizeIs(2));
+  EXPECT_FALSE(facts[0].ready);
+  EXPECT_THAT(facts[0].problem, HasSubstr("t/Unready"));
+  EXPECT_TRUE(facts[1].ready);
+  EXPECT_THAT(facts[1].problem, HasSubstr("t/Undeclared")) << "it could not be undone";
+}
+
+TYPED_TEST(ReflexTest, SaysSoWhenAnActionCanNoLongerBeMadeReady) {
+  this->add_rule(silent(600), {{.kind = "connect", .target = "c", .name = "input", .value = "gone.read"}},
+                 {{.kind = "connect", .target = "c", .name = "input", .value = "late.read"}});
+  this->architecture.template add_resource<SharedData<Number>>("late");
+  this->architecture.template add_resource<SharedData<Number>>("gone");
+  this->deploy();
+  this->begin();
+  this->way.until(
+      [&] {
+        this->take();
+        return this->reflex->facts()[0].ready;
+      },
+      "the action to be ready");
+  Transaction transaction;
+  transaction.remove_resource("late");
+  this->commit(transaction);
+  this->way.until(
+      [&] {
+        this->take();
+        return !this->reflex->facts()[0].ready;
+      },
+      "the action not to be ready");
+  EXPECT_THAT(this->reflex->facts()[0].problem, HasSubstr("late"));
+}
+
+TYPED_TEST(ReflexTest, IsNotArmedBeforeItsComponentRuns) {
+  this->add_rule(silent());
+  this->deploy();
+  this->host().stop("c", s_to_ns(10));
+  this->make();
+  this->reflex->start();
+  this->live(ms_to_ns(100));
+  EXPECT_THAT(this->words, IsEmpty());
+  this->host().start("c");
+  this->see("done");
+  EXPECT_EQ("armed", this->words.front());
+}
+
+// ---- what it hears
+
+TYPED_TEST(ReflexTest, HearsAValueAndItsComingBack) {
+  this->add_rule(leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", 3.0}}));
+  this->deploy();
+  this->begin();
+  this->beat.write.write({.value = 2.0}, 1);
+  this->live(ms_to_ns(20));
+  EXPECT_THAT(this->words, ElementsAre("armed"));
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  this->beat.write.write({.value = 3.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(ReflexTest, HearsAFault) {
+  this->add_rule(leaf("fault", {{"component", "w"}}));
+  this->deploy();
+  this->begin();
+  this->host().stop("w", s_to_ns(10));
+  this->core(*this->watched).work = [] { throw std::runtime_error("broken"); };
+  this->host().start("w");
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(ReflexTest, HearsOverruns) {
+  const auto many =
+      leaf("overruns", {{"component", "w"}, {"at_least", std::int64_t{3}}, {"within_s", 100.0}});
+  this->add_rule(many, {});
+  this->deploy();
+  this->begin();
+  this->host().stop("w", s_to_ns(10));
+  const Clock& clock = this->host().clock();
+  this->core(*this->watched).work = [&clock] {
+    clock.spend(ms_to_ns(5));  // of virtual time
+    if constexpr (!TestFixture::is_virtual) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
+  this->host().start("w");
+  this->see("done");
+  EXPECT_GE(this->last(Decided::do_).decision.measured, 3.0);
+}
+
+TYPED_TEST(ReflexTest, HearsLateResponses) {
+  const auto slow = leaf("late", {{"component", "w"}, {"what", "response"}, {"longer_than_s", 0.001}});
+  this->add_rule(slow, {});
+  this->deploy();
+  this->host().stop("w", s_to_ns(10));
+  this->begin();
+  const Clock& clock = this->host().clock();
+  this->core(*this->watched).work = [&clock] {
+    clock.spend(us_to_ns(1500));
+    if constexpr (!TestFixture::is_virtual) std::this_thread::sleep_for(std::chrono::microseconds(1500));
+  };
+  this->host().start("w");
+  this->see("done");
+}
+
+TYPED_TEST(ReflexTest, HearsThatReleasesDoNotCome) {
+  this->add_rule(leaf("no_release", {{"component", "w"}, {"periods", 50.0}}));
+  this->deploy();
+  this->begin();
+  this->live(ms_to_ns(30));
+  EXPECT_THAT(this->words, ElementsAre("armed"));
+  this->host().stop("w", s_to_ns(10));
+  this->see("done");
+  const Told acted = this->last(Decided::do_);
+  EXPECT_GE(acted.decision.measured, 0.1) << "50 periods of 2 ms";
+  this->host().start("w");
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(ReflexTest, HearsOfChangesOfTheArchitectureAndOfAComponent) {
+  this->add_rule(leaf("since_change", {{"longer_than_s", 0.1}}), {}, core("t/Counting", "w"));
+  this->add_rule(leaf("since_change", {{"component", "w"}, {"longer_than_s", 0.1}}), {});
+  this->deploy();
+  this->begin();
+  const time_ns_t changed_ns = this->host().now_ns();
+  this->host().set_property("w", "gain", 2.0);
+  this->see("done", 2);
+  EXPECT_GE(this->whole.back().decision.stamp_ns, changed_ns + ms_to_ns(100));
+}
+
+// ---- what is refused
+
+TYPED_TEST(ReflexTest, RefusesWhatAnExecutorCannotHear) {
+  const std::vector<std::pair<When, std::string>> cases{
+      {leaf("peer", {{"executor", "other"}}), "in: supervisor"},
+      {leaf("diagnostic", {{"status", "x"}}), "in: supervisor"},
+      {leaf("silence", {{"topic", "unbound"}, {"longer_than_s", 1.0}}), "topic unbound"},
+      {leaf("silence", {{"resource", "nothing"}, {"longer_than_s", 1.0}}), "nothing"},
+      {leaf("fault", {{"component", "nobody"}}), "nobody"},
+      {leaf("value", {{"resource", "beat"}, {"field", "colour"}, {"above", 1.0}}), "colour"}};
+  this->deploy();
+  for (const auto& [when, word] : cases) {
+    this->rules.clear();
+    this->actions.clear();
+    this->add_rule(when);
+    const Error error = this->refusal([&] { this->make(); });
+    EXPECT_THAT(error.what(), HasSubstr(word));
+  }
+}
+
+TYPED_TEST(ReflexTest, RefusesStepsThatThereAreNot) {
+  this->add_rule(silent(), {}, {{.kind = "explode", .target = "c"}});
+  this->deploy();
+  EXPECT_THAT(this->refusal([&] { this->make(); }).what(), HasSubstr("explode"));
+}
+
+TYPED_TEST(ReflexTest, OnlyOneListensToAComponent) {
+  this->add_rule(leaf("fault", {{"component", "w"}}));
+  this->deploy();
+  this->begin();
+  const std::unique_ptr<Reflex> first = std::move(this->reflex);
+  EXPECT_THAT(this->refusal([&] { this->make(); }).what(), HasSubstr("listen"));
+  first->stop();
+}
+
+}  // namespace
+}  // namespace mauve::rules
