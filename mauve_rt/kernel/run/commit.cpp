@@ -63,6 +63,11 @@ std::int64_t Commit::may_miss(const Participant& place) const noexcept {
   return came_.load(std::memory_order_relaxed) == expected_ ? max_missed_ - place.lost : 0;
 }
 
+time_ns_t Commit::holds_until_ns(const Participant& place) const noexcept {
+  if (place.pending_ns == kForever) return kForever;
+  return place.pending_ns + may_miss(place) * place.task->grid().period_ns;
+}
+
 /// Nothing: it is the last and makes the change.
 std::optional<Commit::Answer> Commit::arrive(Participant& place) noexcept {
   std::uint32_t seen = gate_.load(std::memory_order_acquire);
@@ -102,6 +107,7 @@ Commit::Answer Commit::wait_others(Participant& place) noexcept {
       until = kForever;
     } else if ((seen & kAdopting) != 0) {
       const time_ns_t budget_ends = began_ns_.load(std::memory_order_relaxed) + budget_ns_;
+      place.holds_until_ns = holds_until_ns(place);  // all have been here now
       until = declared_ns_ != 0 ? budget_ends : std::max(budget_ends, place.holds_until_ns);
     } else if (place.task->has_event()) {
       until = 0;

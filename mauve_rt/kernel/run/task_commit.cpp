@@ -82,7 +82,7 @@ void Task::visit(Participant& place) noexcept {
   place.parked_ns = clock().now_ns();
   place.pending_ns = due;
   place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
-  place.holds_until_ns = due == kForever ? kForever : due + commit.may_miss(place) * grid().period_ns;
+  place.holds_until_ns = commit.holds_until_ns(place);
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
   machine_.begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it

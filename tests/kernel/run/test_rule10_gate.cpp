@@ -488,6 +488,18 @@ TEST_F(Rule10Gate, AnAdoptOverItsDeclaredBudgetIsRefused) {
   EXPECT_EQ(0U, c.task().statistics().overruns) << "what adopt took is no overrun";
 }
 
+TEST_F(Rule10Gate, AnAdoptMayLastAsLongAsReleasesMayBeMissedFromTheFirstMeetingOn) {
+  deploy_two();
+  auto fresh = std::make_unique<ToldCore>();
+  fresh->adopting = pause_ms(40);
+  Transaction change = replace("fast", std::move(fresh));
+  change.set_property("slow", "gain", 2.0);
+  TransactionOptions options = kPatient;
+  options.max_missed = 10'000;
+  const auto refused = error_of(std::move(change), options);
+  EXPECT_FALSE(refused) << refused->what();
+}
+
 TEST_F(Rule10Gate, ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent) {
   Component& c = add("c", 20);
   Component& other = add("other", 2);

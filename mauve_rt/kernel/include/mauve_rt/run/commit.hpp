@@ -55,8 +55,8 @@ class Commit;
 /// | came, arrived,    | the component's thread                          | requester            | relaxed: for a message   |
 /// | passed            |                                                 |                      |                          |
 /// | leaves_at_ns      | the component's thread, before it arrives       | who comes last       | relaxed: the gate        |
-/// | parked, pending,  | the component's thread, before it arrives       | who makes the change | the gate                 |
-/// | holds_until_ns    |                                                 |                      |                          |
+/// | parked, pending   | the component's thread, before it arrives       | who makes the change | the gate                 |
+/// | holds_until_ns    | the component's thread                          | the same             | -                        |
 /// | overlong_ns       | who makes the change                            | component's thread   | the gate                 |
 /// | period            | requester, before it is posted                  | requester            | its own                  |
 /// | armed, lost, grid,| the component's thread, before it lets go       | requester, after it  | the task's place         |
@@ -188,6 +188,8 @@ class Commit {
   void note_came(Participant& place) MAUVE_RT;
   /// How many more releases it may be held past, now. [rt]
   std::int64_t may_miss(const Participant& place) const MAUVE_RT;
+  /// The last of the instants that it may miss now, or its pending one. [rt]
+  time_ns_t holds_until_ns(const Participant& place) const MAUVE_RT;
   /// Lets those at the gate look whether they have to go. [rt]
   void poke() MAUVE_RT;
 
