@@ -200,6 +200,7 @@ class StepReport:
     phase_actual_ns: Final[int]  # NOT_MEASURED until the first release after the commit
     remark: Final[str]  # why releases were missed; empty when none was
     shift_ns: Final[int]  # by which a new epoch made its instants later
+    released_ns: Final[int]  # the instant of the release that followed
 
 NOT_MEASURED: Final[int]
 
@@ -734,8 +735,10 @@ class ConditionParameter:
     def name(self) -> str: ...
     @property
     def type(self) -> str:
-        """bool, int, float, str; what a text is (topic, message_type, component, resource, field, executor);
-        or the texts that it can be, as 'wake_up|response'.
+        """bool, int, float or str.
+
+        Of a text what it is (topic, message_type, component, resource, field, executor), or the texts that it
+        can be, as 'wake_up|response'.
         """
     @property
     def unit(self) -> str: ...
@@ -801,7 +804,7 @@ class SignalSpec:
 
     @property
     def kind(self) -> str:
-        """message, write, field, overruns, late, release, state, over_declared, peer, diagnostic or change."""
+        """A kind of SignalKind in rules/signal.hpp: message, write, field, overruns ..."""
     @property
     def target(self) -> str: ...
     @property
@@ -869,7 +872,7 @@ class RuleStatus:
 class RuleEngine:
     """Decides what rules want done, and when. All but tell, wake and wait from one thread.
 
-    Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rule or signal that there is not.
+    Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rule that there is not.
     """
 
     def __init__(self, rules: Sequence[RuleSpec]) -> None: ...
@@ -888,7 +891,7 @@ class RuleEngine:
         """Whether the act could begin at once."""
     def adopt(self, rule: int, now_ns: int) -> None:
         """What the rule does is in effect already: it is undone when it is time."""
-    def forget(self) -> None:
+    def forget(self, rule: int | None = None) -> None:
         """The architecture is another one."""
     def step(self, now_ns: int) -> int:
         """Look at all conditions; the instant at which to step again at the latest."""
@@ -909,3 +912,83 @@ class RuleEngine:
         """Changes with all that is of interest; for wait()."""
     def wait(self, word: int, until_ns: int) -> bool:
         """Sleep until the word is another one (True) or until the instant of CLOCK_MONOTONIC (False)."""
+
+@final
+class ActionStep:
+    """One step of what a rule does: its kind, and the names and the plain value that it takes."""
+
+    def __init__(
+        self, kind: str, target: str = "", name: str = "", value: bool | float | str | None = None
+    ) -> None: ...
+
+@final
+class RuleActions:
+    """What a rule does and undoes; no `undo`: nothing. max_missed: as in Host.commit()."""
+
+    def __init__(
+        self,
+        do: Sequence[ActionStep],
+        *,
+        max_missed: int = 0,
+        undo: Sequence[ActionStep] = [],
+        undo_max_missed: int = 0,
+    ) -> None: ...
+
+@final
+class ToldDecision:
+    """A decision, and of `done` and `failed` what came of the action."""
+
+    @property
+    def decision(self) -> RuleDecision: ...
+    @property
+    def report(self) -> TransactionReport | None: ...
+    @property
+    def failure(self) -> str:
+        """Why it is not in force, in words."""
+
+@final
+class RuleFacts:
+    """How one rule of a Reflex fares."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def status(self) -> RuleStatus: ...
+    @property
+    def ready(self) -> bool:
+        """Whether what it would do or undo next could begin."""
+    @property
+    def problem(self) -> str:
+        """Why that cannot be made ready, or what the rule hears not be heard."""
+    @property
+    def memory_bytes(self) -> int:
+        """What is kept prepared."""
+
+@final
+class Reflex:
+    """Rules at work beside the components of a host, on native threads: they need no Python to act.
+
+    Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.
+    """
+
+    def __init__(
+        self,
+        host: Host,
+        rules: Sequence[RuleSpec],
+        actions: Sequence[RuleActions],
+        topics: Mapping[str, str] = {},
+    ) -> None:
+        """`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it."""
+    def start(self) -> None:
+        """Begin to watch; the host is deployed."""
+    def stop(self) -> None:
+        """Nothing is done any more; what is in effect stays so. May be called again."""
+    def wait_told(self, timeout_ns: int) -> list[ToldDecision]:
+        """Decisions not taken yet; waits for one at most so long, or until wake()."""
+    def wake(self) -> None:
+        """End that wait, now and from now on."""
+    def facts(self) -> list[RuleFacts]: ...
+    def lost(self) -> int:
+        """Decisions that nobody took in time."""
+    def advance(self) -> int:
+        """In virtual time: do all that is due now; when to call again at the latest."""

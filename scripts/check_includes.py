@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Check the dependencies that no other tool sees.
 
-C++ includes point one way: kernel <- rules <- bindings, bridge; in the kernel a storey includes only those below it.
+C++ includes point one way: kernel <- rules <- bindings, bridge; in the kernel a storey includes only those
+below it.
 Examples and benchmarks use what is public only: the headers <mauve_rt/*.hpp>, and of the Python package
 nothing whose name starts with an underscore. import-linter checks the layers inside the Python packages; it
 sees no compiled module.

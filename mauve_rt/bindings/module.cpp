@@ -16,6 +16,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);
+  bind_reflex(module);
   module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;
   module.def("monotonic_ns", &mauve::monotonic_now_ns);

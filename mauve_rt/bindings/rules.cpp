@@ -40,7 +40,8 @@ class PyRuleEngine {
   explicit PyRuleEngine(std::vector<rules::Rule> all) : engine(std::move(all)) {}
 
   std::size_t rule(std::size_t number) const {
-    if (number >= engine.size()) throw py::index_error("there are " + std::to_string(engine.size()) + " rules");
+    if (number >= engine.size())
+      throw py::index_error("there are " + std::to_string(engine.size()) + " rules");
     return number;
   }
   rules::Signal& signal(std::size_t number) const {
@@ -72,15 +73,17 @@ void bind_rules_of_an_engine(py::module_& module) {
   py::class_<rules::When>(module, "WhenSpec")
       .def(py::init([](std::string kind, rules::Parameters parameters, std::vector<rules::When> parts,
                        std::int64_t count, time_ns_t for_ns, time_ns_t within_ns) {
-             return rules::When{std::move(kind), std::move(parameters), std::move(parts), count, for_ns, within_ns};
+             return rules::When{std::move(kind), std::move(parameters), std::move(parts), count, for_ns,
+                                within_ns};
            }),
            py::arg("kind"), py::kw_only(), py::arg("parameters") = rules::Parameters{},
            py::arg("parts") = std::vector<rules::When>{}, py::arg("count") = 0, py::arg("for_ns") = 0,
            py::arg("within_ns") = 0);
   py::class_<rules::Rule>(module, "RuleSpec")
-      .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes, time_ns_t undo_for_ns,
-                       time_ns_t cooldown_ns, std::int64_t priority, std::vector<std::string> about) {
-             return rules::Rule{std::move(name), std::move(when), for_ns,  undoes,
+      .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes,
+                       time_ns_t undo_for_ns, time_ns_t cooldown_ns, std::int64_t priority,
+                       std::vector<std::string> about) {
+             return rules::Rule{std::move(name), std::move(when), for_ns,   undoes,
                                 undo_for_ns,     cooldown_ns,     priority, std::move(about)};
            }),
            py::arg("name"), py::arg("when"), py::kw_only(), py::arg("for_ns") = 0, py::arg("undoes") = false,
@@ -103,7 +106,8 @@ void bind_answers(py::module_& module) {
   py::class_<rules::Decision>(module, "RuleDecision")
       .def_readonly("stamp_ns", &rules::Decision::stamp_ns)
       .def_readonly("rule", &rules::Decision::rule)
-      .def_property_readonly("decision", [](const rules::Decision& self) { return rules::name_of(self.decided); })
+      .def_property_readonly("decision",
+                             [](const rules::Decision& self) { return rules::name_of(self.decided); })
       .def_property_readonly("act", [](const rules::Decision& self) { return name_of_act(self.act); })
       .def_property_readonly("why", [](const rules::Decision& self) { return rules::words_of(self.why); })
       .def_property_readonly("other",
@@ -166,11 +170,23 @@ void bind_engine(py::module_& module) {
           py::arg("rule"), py::arg("act"), py::arg("ready"))
       .def(
           "adopt",
-          [](PyRuleEngine& self, std::size_t rule, time_ns_t now_ns) { self.engine.adopt(self.rule(rule), now_ns); },
+          [](PyRuleEngine& self, std::size_t rule, time_ns_t now_ns) {
+            self.engine.adopt(self.rule(rule), now_ns);
+          },
           py::arg("rule"), py::arg("now_ns"))
-      .def("forget", [](PyRuleEngine& self) { self.engine.forget(); })
       .def(
-          "step", [](PyRuleEngine& self, time_ns_t now_ns) { return self.engine.step(now_ns); }, py::arg("now_ns"))
+          "forget",
+          [](PyRuleEngine& self, std::optional<std::size_t> rule) {
+            if (rule) {
+              self.engine.forget(self.rule(*rule));
+            } else {
+              self.engine.forget();
+            }
+          },
+          py::arg("rule") = py::none())
+      .def(
+          "step", [](PyRuleEngine& self, time_ns_t now_ns) { return self.engine.step(now_ns); },
+          py::arg("now_ns"))
       .def_property_readonly("wish", [](const PyRuleEngine& self) { return self.engine.wish(); })
       .def(
           "begun", [](PyRuleEngine& self, time_ns_t now_ns) { self.engine.begun(now_ns); }, py::arg("now_ns"))
@@ -183,10 +199,12 @@ void bind_engine(py::module_& module) {
       .def("take", [](PyRuleEngine& self) { return self.engine.take(); })
       .def("lost", [](const PyRuleEngine& self) { return self.engine.lost(); })
       .def(
-          "status", [](const PyRuleEngine& self, std::size_t rule) { return self.engine.status(self.rule(rule)); },
+          "status",
+          [](const PyRuleEngine& self, std::size_t rule) { return self.engine.status(self.rule(rule)); },
           py::arg("rule"))
       .def("wake", [](PyRuleEngine& self) { self.engine.wake(); })
-      .def("word", [](const PyRuleEngine& self) { return self.engine.word().load(std::memory_order_acquire); })
+      .def("word",
+           [](const PyRuleEngine& self) { return self.engine.word().load(std::memory_order_acquire); })
       .def(
           "wait",
           [](const PyRuleEngine& self, std::uint32_t word, time_ns_t until_ns) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/rules/action.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
@@ -20,6 +21,37 @@ Ended how_ended(ErrorCode code) noexcept {
   }
 }
 
+Ended how_ended(PreparedOutcome outcome) noexcept {
+  switch (outcome) {
+    case PreparedOutcome::committed:
+      return Ended::done;
+    case PreparedOutcome::stale:
+      return Ended::stale;
+    case PreparedOutcome::timed_out:
+      return Ended::timed_out;
+    case PreparedOutcome::withdrawn:
+      return Ended::withdrawn;
+    case PreparedOutcome::refused:
+      break;
+  }
+  return Ended::refused;
+}
+
+bool can_be_prepared(const ActionSteps& steps) {
+  return std::none_of(steps.begin(), steps.end(), [](const ActionStep& step) {
+    return step.kind == "configure" || step.kind == "resynchronise";
+  });
+}
+
+/// Their transaction, prepared; nullptr: they cannot be, and were tried. Throws Error: they would be refused.
+std::unique_ptr<PreparedTransaction> try_steps(const ActionSteps& steps, TransactionOptions options,
+                                               Host& host) {
+  if (can_be_prepared(steps)) return host.prepare(make_transaction(steps), options);
+  options.dry_run = true;
+  host.make(make_transaction(steps), options);
+  return nullptr;
+}
+
 }  // namespace
 
 Transaction make_transaction(const ActionSteps& steps) {
@@ -29,50 +61,81 @@ Transaction make_transaction(const ActionSteps& steps) {
   return transaction;
 }
 
+Action::Action(ActionSteps steps, const TransactionOptions& options)
+    : steps_(std::move(steps)), options_(options), is_preparable_(can_be_prepared(steps_)) {}
+
 // ---- the tender
 
-bool Action::try_steps(const ActionSteps& steps, Host& host) {
-  problem_.clear();
-  try {
-    TransactionOptions options = options_;
-    options.dry_run = true;
-    host.make(make_transaction(steps), options);
-    return true;
-  } catch (const std::exception& failure) {
-    problem_ = failure.what();
-    return false;
-  }
+bool Action::is_wanting(std::uint64_t revision) const {
+  const Stage stage = stage_.load(std::memory_order_acquire);
+  if (stage == Stage::ready && is_preparable_) return !prepared_->is_current();
+  return (stage == Stage::idle || stage == Stage::ready) && tried_at_ != revision;
 }
 
 bool Action::tend(Host& host, std::uint64_t revision) {
-  if (tried_at_ == revision) return false;
-  Stage stage = stage_.load(std::memory_order_acquire);
-  if (stage == Stage::begun || stage == Stage::over) return false;
+  if (!is_wanting(revision)) return false;
+  const bool was_ready = put_away();
+  if (stage_.load(std::memory_order_acquire) != Stage::idle) return false;  // it has just begun
   tried_at_ = revision;
-  if (try_steps(steps_, host)) {
-    // acq_rel: a stepper that took it meanwhile has it
-    return stage_.compare_exchange_strong(stage = Stage::idle, Stage::ready, std::memory_order_acq_rel);
+  try {
+    problem_.clear();
+    prepared_ = try_steps(steps_, options_, host);
+    stage_.store(Stage::ready, std::memory_order_release);
+    return true;
+  } catch (const std::exception& failure) {
+    problem_ = failure.what();
+    return was_ready;
   }
-  return stage_.compare_exchange_strong(stage = Stage::ready, Stage::idle, std::memory_order_acq_rel);
 }
 
 void Action::try_after(const ActionSteps& before, Host& host, std::uint64_t revision) {
   if (std::exchange(tried_after_at_, revision) == revision) return;
   ActionSteps both = before;
   both.insert(both.end(), steps_.begin(), steps_.end());
-  try_steps(both, host);
+  try {
+    problem_.clear();
+    try_steps(both, options_, host);
+  } catch (const std::exception& failure) {
+    problem_ = failure.what();
+  }
 }
 
 bool Action::put_away() {
   Stage ready = Stage::ready;
+  // acq_rel: one that the stepper has taken meanwhile is its
+  if (!stage_.compare_exchange_strong(ready, Stage::idle, std::memory_order_acq_rel)) return false;
+  prepared_.reset();
   tried_at_ = 0;
-  return stage_.compare_exchange_strong(ready, Stage::idle, std::memory_order_acq_rel);
+  return true;
 }
 
-bool Action::carry_out(Host& host) {
-  if (stage_.load(std::memory_order_acquire) != Stage::begun) return false;
-  report_.emplace();
+bool Action::settle(Host& host) {
+  const Stage stage = stage_.load(std::memory_order_acquire);
+  if (stage == Stage::begun && !is_preparable_) {
+    carry_out(host);
+    return true;
+  }
+  if (stage == Stage::heard) complete();
+  return false;
+}
+
+void Action::complete() {
+  if (prepared_ != nullptr) {
+    report_.emplace();
+    try {
+      report_->report = prepared_->complete();
+    } catch (const std::exception& failure) {
+      report_->failure = failure.what();
+    }
+    prepared_.reset();
+  }
   tried_at_ = 0;
+  stage_.store(Stage::idle, std::memory_order_release);
+}
+
+void Action::carry_out(Host& host) {
+  report_.emplace();
+  how_ = Ended::refused;
   try {
     committed_ = host.make(make_transaction(steps_), options_);
     how_ = Ended::done;
@@ -80,16 +143,14 @@ bool Action::carry_out(Host& host) {
     how_ = how_ended(failure.code());
     report_->failure = failure.what();
   } catch (const std::exception& failure) {
-    how_ = Ended::refused;
     report_->failure = failure.what();
   }
   stage_.store(Stage::over, std::memory_order_release);
-  return true;
 }
 
-std::optional<ActionReport> Action::complete() {
-  if (!report_) return std::nullopt;
-  if (committed_ != nullptr) report_->report = committed_->report(options_.timeouts.phase_ns);
+std::optional<ActionReport> Action::report() {
+  if (stage_.load(std::memory_order_acquire) == Stage::heard) complete();  // it ended since it was tended
+  if (report_ && committed_ != nullptr) report_->report = committed_->report(options_.timeouts.phase_ns);
   committed_.reset();
   return std::exchange(report_, std::nullopt);
 }
@@ -98,13 +159,17 @@ std::optional<ActionReport> Action::complete() {
 
 bool Action::begin() noexcept {
   Stage ready = Stage::ready;
-  return stage_.compare_exchange_strong(ready, Stage::begun, std::memory_order_acq_rel);
+  if (!stage_.compare_exchange_strong(ready, Stage::begun, std::memory_order_acq_rel)) return false;
+  if (!is_preparable_) return true;
+  how_ = how_ended(prepared_->commit(options_.timeouts.commit_ns));
+  stage_.store(Stage::over, std::memory_order_release);
+  return true;
 }
 
 std::optional<Ended> Action::ended() noexcept {
   if (stage_.load(std::memory_order_acquire) != Stage::over) return std::nullopt;
   const Ended how = how_;
-  stage_.store(Stage::idle, std::memory_order_release);
+  stage_.store(Stage::heard, std::memory_order_release);
   return how;
 }
 

@@ -19,6 +19,12 @@ constexpr auto kWhy = std::to_array<std::string_view>(
 }  // namespace
 
 std::string_view name_of(Decided decided) noexcept { return kDecided[static_cast<std::size_t>(decided)]; }
+std::int64_t trace_code(const Decision& decision) noexcept {
+  // The acts of the last three have codes of their own.
+  constexpr auto kFirst = std::to_array<std::int64_t>({0, 1, 2, 3, 4, 5, 6, 7, 9, 11});
+  const bool has_act = decision.decided >= Decided::done;
+  return kFirst[static_cast<std::size_t>(decision.decided)] + (has_act && decision.act == Act::undo ? 1 : 0);
+}
 std::string_view words_of(Why why) noexcept { return kWhy[static_cast<std::size_t>(why)]; }
 
 }  // namespace mauve::rules

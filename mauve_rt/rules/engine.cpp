@@ -12,6 +12,7 @@ namespace mauve::rules {
 namespace {
 
 constexpr time_ns_t kFirstRetry = ms_to_ns(500);
+constexpr time_ns_t kMakingReady = ms_to_ns(100);  // what takes no longer to be made ready is no news
 constexpr time_ns_t kLongestRetry = s_to_ns(30);
 constexpr time_ns_t kFirstAfterChange =
     ms_to_ns(10);  // somebody else changed the architecture: look again soon
@@ -52,6 +53,7 @@ struct Engine::Life {
   time_ns_t not_before_ns{INT64_MIN};
   int failures{0};
   std::optional<std::pair<Act, Why>> excused{};  // the last reason given, so that it is given once
+  std::optional<time_ns_t> unready_since_ns{};   // what it wants is not ready
 
   /// When the condition will have been as it is for long enough.
   time_ns_t due_ns() const noexcept {
@@ -73,7 +75,7 @@ Engine::Engine(std::vector<Rule> rules) {
     } catch (const Error& failure) {
       ErrorDetail detail = failure.detail();
       detail.component = "rule " + rule.name;
-      throw Error(failure.code(), failure.what(), detail);
+      throw Error(failure.code(), failure.statement(), detail);
     }
     life->rule = std::move(rule);
     lives_.push_back(std::move(life));
@@ -143,16 +145,20 @@ void Engine::adopt(std::size_t rule, time_ns_t now_ns) noexcept {
 }
 
 void Engine::forget() noexcept {
-  wish_.reset();
-  under_way_.reset();
-  for (const auto& life : lives_) {
-    life->armed = life->in_effect = life->left_alone = false;
-    life->in_place = {};
-    life->ready = {true, true};
-    life->not_before_ns = INT64_MIN;
-    life->failures = 0;
-    life->excused.reset();
-  }
+  for (const auto& life : lives_) forget(life->index);
+}
+
+void Engine::forget(std::size_t rule) noexcept {
+  if (wish_ && wish_->rule == rule) wish_.reset();
+  if (under_way_ && under_way_->rule == rule) under_way_.reset();
+  Life& life = *lives_[rule];
+  life.armed = life.in_effect = life.left_alone = false;
+  life.in_place = {};
+  life.ready = {true, true};
+  life.not_before_ns = INT64_MIN;
+  life.failures = 0;
+  life.excused.reset();
+  life.unready_since_ns.reset();
 }
 
 // ---- deciding
@@ -179,6 +185,7 @@ void Engine::look(Life& life, time_ns_t now_ns) noexcept {
   if (life.last.holds == before) return;
   life.failures = 0;
   life.excused.reset();
+  life.unready_since_ns.reset();
   tell(life,
        {.stamp_ns = now_ns, .decided = life.last.holds ? Decided::condition_true : Decided::condition_false});
 }
@@ -202,10 +209,13 @@ time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
       life.last.holds ? !life.in_effect && !life.left_alone : life.in_effect || life.left_alone;
   if (!may_want) return life.last.next_ns;
   if (life.due_ns() > now_ns) return std::min(life.last.next_ns, life.due_ns());
+  if (life.unready_since_ns && !life.excused)
+    return std::min(life.last.next_ns, later_by(*life.unready_since_ns, kMakingReady));
   return life.not_before_ns > now_ns ? std::min(life.last.next_ns, life.not_before_ns) : life.last.next_ns;
 }
 
 bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
+  if (life.ready[index_of(act)]) life.unready_since_ns.reset();
   if (under_way_ && under_way_->rule == life.index) return false;
   if (life.in_place[index_of(act)].value_or(false)) {
     suppress(life, act, Why::already, now_ns);
@@ -225,7 +235,8 @@ bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
     return false;
   }
   if (!life.ready[index_of(act)]) {
-    suppress(life, act, Why::not_ready, now_ns);
+    if (!life.unready_since_ns) life.unready_since_ns = now_ns;
+    if (now_ns >= later_by(*life.unready_since_ns, kMakingReady)) suppress(life, act, Why::not_ready, now_ns);
     return false;
   }
   wish_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};

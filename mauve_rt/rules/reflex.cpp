@@ -7,6 +7,7 @@
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/trace.hpp"
 
 namespace mauve::rules {
 
@@ -34,7 +35,8 @@ Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<Rul
     : host_(host),
       engine_(std::move(engine)),
       feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
-      problems_(actions.size()) {
+      kept_(actions.size()),
+      trace_number_(host.architecture().trace_number("(rules)")) {
   if (actions.size() != engine_->size())
     throw Error(ErrorCode::invalid_argument, "every rule of the engine has its actions, and only these");
   for (const RuleActions& each : actions) {
@@ -42,6 +44,7 @@ Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<Rul
     make_transaction(each.undo_steps);
     rules_.push_back(std::make_unique<Rule>(each));
     rules_.back()->applied = UINT64_MAX;
+    rules_.back()->name = TraceNames::intern(engine_->rule(rules_.size() - 1).name);
   }
   for (const auto& heard : engine_->signals()) feeds_.open(heard.spec, *heard.signal);
 }
@@ -125,11 +128,13 @@ time_ns_t Reflex::step() noexcept {
   if (const std::optional<Wish> wish = engine_->wish()) {
     Action& action = rules_[wish->rule]->action(wish->act);
     engine_->begun(now_ns);
-    if (action.begin()) {
+    if (MAUVE_RT_TRUSTED(action.begin())) {  // as far as the components' own adopt and take are
       under_way_ = &action;
+      hear_ends(host_.clock().now_ns());
     } else {
       engine_->ended(Ended::stale, now_ns);  // it was ready a moment ago
     }
+    if (under_way_ == nullptr) engine_->wake();  // what to do next is looked at anew
   }
   show_status();
   work_.bump();
@@ -190,22 +195,23 @@ void Reflex::run_tending() noexcept {
 
 /// Whether the stepper has something to look at.
 bool Reflex::tend() {
+  // Before all: what has ended by now is completed below, and then found in force.
+  const std::uint64_t ends = ends_.load(std::memory_order_acquire);
   bool changed = false;
   for (const auto& rule : rules_) {
-    for (Action& action : rule->acts) changed = action.carry_out(host_) || changed;
+    for (Action& action : rule->acts) changed = action.settle(host_) || changed;
   }
-  return changed || look_around();  // what has ended the stepper has to know first
+  return changed || look_around(ends);  // what was carried out the stepper has to know first
 }
 
-bool Reflex::look_around() {
-  const std::uint64_t ends = ends_.load(std::memory_order_acquire) + 1;  // before the look; 0: never looked
+bool Reflex::look_around(std::uint64_t ends) {
   const std::uint64_t revision = host_.architecture().revision();
   const std::string deaf = follow();
   const ArchitectureDescription description = host_.describe();
   bool changed = false;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
-    std::uint64_t found = ends << kEndsAt;
+    std::uint64_t found = (ends + 1) << kEndsAt;  // 0: never looked
     if (can_begin(rule.action(Act::do_).steps(), description)) found |= kPresent;
     for (const Act act : kActs) {
       const std::optional<bool> is_so = is_in_place(rule.action(act).steps(), description);
@@ -214,14 +220,22 @@ bool Reflex::look_around() {
     }
     changed = make_ready(rule, revision) || changed;
     changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
-    std::string problem = !deaf.empty() ? deaf : rule.action(Act::do_).problem();
-    if (problem.empty()) problem = rule.action(Act::undo).problem();
-    const std::lock_guard lock(told_mutex_);
-    if (problems_[i] == problem) continue;
-    problems_[i] = std::move(problem);
-    told_changed_.notify_all();
+    keep(i, rule, deaf);
   }
   return changed;
+}
+
+/// For facts().
+void Reflex::keep(std::size_t index, const Rule& rule, const std::string& deaf) {
+  Kept kept{.problem = deaf};
+  for (const Action& action : rule.acts) {
+    if (kept.problem.empty()) kept.problem = action.problem();
+    kept.memory_bytes += action.memory_bytes();
+  }
+  const std::lock_guard lock(told_mutex_);
+  if (kept_[index] == kept) return;
+  kept_[index] = std::move(kept);
+  told_changed_.notify_all();
 }
 
 /// What is in effect can be undone, what is not can be done; would it be possible to undo that?
@@ -249,9 +263,17 @@ void Reflex::tell() {
   std::vector<Told> all;
   while (const std::optional<Decision> decision = engine_->take()) {
     all.push_back({.decision = *decision});
+    Rule& rule = *rules_[static_cast<std::size_t>(decision->rule)];
+    host_.architecture().record({.sequence = 0,
+                                 .time_ns = decision->stamp_ns,
+                                 .a = trace_code(*decision),
+                                 .b = decision->cause_ns,
+                                 .c = static_cast<std::int64_t>(decision->why),
+                                 .name = rule.name,
+                                 .kind = static_cast<std::uint16_t>(TraceKind::decision),
+                                 .component = trace_number_});
     if (decision->decided != Decided::done && decision->decided != Decided::failed) continue;
-    Action& action = rules_[static_cast<std::size_t>(decision->rule)]->action(decision->act);
-    if (auto report = action.complete()) all.back().action = std::move(*report);
+    if (auto report = rule.action(decision->act).report()) all.back().action = std::move(*report);
   }
   if (all.empty()) return;
   const std::lock_guard lock(told_mutex_);
@@ -284,7 +306,8 @@ std::vector<RuleFacts> Reflex::facts() const {
     all.push_back({.name = engine_->rule(i).name,
                    .status = rule.status,
                    .ready = rule.action(rule.status.in_effect ? Act::undo : Act::do_).is_ready(),
-                   .problem = problems_[i]});
+                   .problem = kept_[i].problem,
+                   .memory_bytes = kept_[i].memory_bytes});
   }
   return all;
 }

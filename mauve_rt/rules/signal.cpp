@@ -6,10 +6,9 @@ namespace mauve::rules {
 void Signal::tell(time_ns_t time_ns, double value) noexcept {
   const std::uint64_t count = count_.load(std::memory_order_relaxed) + 1;  // relaxed: nobody else writes it
   Place& place = places_[count & 1U];
-  std::atomic_thread_fence(
-      std::memory_order_release);  // the count before this one is out before its place is
-  place.time_ns.store(time_ns, std::memory_order_relaxed);
-  place.value.store(value, std::memory_order_relaxed);
+  // release: who sees these sees the count before this one, too
+  place.time_ns.store(time_ns, std::memory_order_release);
+  place.value.store(value, std::memory_order_release);
   count_.store(count, std::memory_order_seq_cst);
   const double low = low_.load(std::memory_order_seq_cst);
   const double high = high_.load(std::memory_order_seq_cst);
@@ -24,10 +23,9 @@ Signal::Last Signal::last() const noexcept {
     const std::uint64_t count = count_.load(std::memory_order_seq_cst);
     if (count == 0) return {};
     const Place& place = places_[count & 1U];
-    const Last found{.time_ns = place.time_ns.load(std::memory_order_relaxed),
-                     .value = place.value.load(std::memory_order_relaxed),
+    const Last found{.time_ns = place.time_ns.load(std::memory_order_acquire),
+                     .value = place.value.load(std::memory_order_acquire),
                      .count = count};
-    std::atomic_thread_fence(std::memory_order_acquire);
     if (count_.load(std::memory_order_relaxed) == count) return found;
   }
 }

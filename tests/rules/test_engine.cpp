@@ -402,10 +402,20 @@ TEST(Rules, WhatIsNotReadyIsNotWishedAndSaysSo) {
   Tried tried({rule("r", silence(1.0))});
   tried.engine.set_ready(0, Act::do_, false);
   tried.run_to(ms(2000));
-  EXPECT_EQ("1000 r suppressed it is not prepared", tried.words.back());
+  EXPECT_EQ("1100 r suppressed it is not prepared", tried.words.back());
   tried.engine.set_ready(0, Act::do_, true);
   tried.run_to(ms(2001));
   EXPECT_TRUE(tried.engine.status(0).in_effect);
+}
+
+TEST(Rules, WhatIsMadeReadySoonIsNoNews) {
+  Tried tried({rule("r", silence(1.0))});
+  tried.engine.set_ready(0, Act::do_, false);
+  tried.run_to(ms(1050));
+  tried.engine.set_ready(0, Act::do_, true);
+  tried.run_to(ms(1051));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  for (const std::string& word : tried.words) EXPECT_EQ(std::string::npos, word.find("suppressed")) << word;
 }
 
 TEST(Rules, WhatIsAbsentIsNotWatched) {
@@ -418,6 +428,21 @@ TEST(Rules, WhatIsAbsentIsNotWatched) {
   EXPECT_FALSE(tried.holds()) << "what was before does not count";
   tried.run_to(ms(6001));
   EXPECT_TRUE(tried.holds());
+}
+
+TEST(Rules, OneThatSomebodyElseRunsIsForgottenAndTheOthersGoOn) {
+  Tried tried({rule("left", silence(1.0)), rule("kept", silence(1.0))});
+  tried.run_to(ms(1500));
+  ASSERT_TRUE(tried.engine.status(0).in_effect);
+  tried.engine.forget(0);
+  EXPECT_FALSE(tried.engine.status(0).armed);
+  EXPECT_FALSE(tried.engine.status(0).in_effect);
+  EXPECT_TRUE(tried.engine.status(1).armed);
+  tried.engine.set_present(0, true, tried.now_ns);
+  tried.run_to(ms(2000));
+  EXPECT_FALSE(tried.engine.status(0).in_effect) << "nothing of before counts";
+  tried.run_to(ms(2600));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
 }
 
 TEST(Rules, StatusSaysWhatComesNextAndWhen) {

@@ -20,13 +20,40 @@ ActionSteps core(const std::string& implementation, const std::string& target = 
   return {{.kind = "replace_core", .target = target, .name = implementation}};
 }
 
+/// Counts what is done with cores of its kind.
+struct CountedCore : TestCore {
+  CountedCore() { made.fetch_add(1); }
+  bool configure_hook() override {
+    configuring.fetch_add(1);
+    while (closed.load()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return TestCore::configure_hook();
+  }
+  bool adopt(const CoreBase& /*old*/) override {
+    made_at_adopt.store(made.load());
+    adopted.fetch_add(1);
+    return true;
+  }
+  static void reset() {
+    for (std::atomic<int>* count : {&made, &made_at_adopt, &configuring, &adopted}) count->store(0);
+    closed.store(false);
+  }
+
+  static inline std::atomic<int> made{0};
+  static inline std::atomic<int> made_at_adopt{0};
+  static inline std::atomic<int> configuring{0};
+  static inline std::atomic<int> adopted{0};
+  static inline std::atomic<bool> closed{false};  // none is configured until it is open
+};
 /// Component "c", whose core a rule replaces; "w", about which it asks; and the resource "beat", which the test writes.
 template <typename Way>
 class ReflexTest : public Hosted<Way> {
  protected:
   ReflexTest() : beat(this->architecture.template add_resource<SharedData<Number>>("beat")) {
-    this->add("c");
-    watched = &this->add("w");
+    CountedCore::reset();
+    this->registry.template core<CountedCore>("t/Counted", "t/Shell");
+    for (const char* name : {"c", "w"})
+      this->add(name).allow({"t/Counting", "t/Counted", "t/Refusing", "t/Throwing", "t/Unready"}, true);
+    watched = &this->architecture.component("w");
   }
   ~ReflexTest() override {
     if (reflex) reflex->stop();
@@ -56,6 +83,10 @@ class ReflexTest : public Hosted<Way> {
       return static_cast<std::size_t>(std::count(words.begin() + from, words.end(), word)) >= times;
     };
     this->way.until(seen, word.c_str());
+    if (this->HasFatalFailure()) {
+      for (const RuleFacts& facts : reflex->facts())
+        ADD_FAILURE() << facts.name << (facts.ready ? " is ready " : " is not ready ") << facts.problem;
+    }
     from = static_cast<std::ptrdiff_t>(words.size());
   }
   void live(time_ns_t duration_ns) {
@@ -70,6 +101,13 @@ class ReflexTest : public Hosted<Way> {
       words.emplace_back(name_of(told.decision.decided));
       whole.push_back(std::move(told));
     }
+  }
+  void await_ready(std::size_t rule = 0) {
+    const auto is_ready = [&] {
+      take();
+      return reflex->facts()[rule].ready;
+    };
+    this->way.until(is_ready, "the action to be ready");
   }
   std::string present() { return this->architecture.component("c").shown().core; }
   Told last(Decided decided) {
@@ -110,6 +148,66 @@ TYPED_TEST(ReflexTest, DoesAndUndoes) {
   EXPECT_EQ("t/Core", this->present());
   EXPECT_THAT(this->words,
               ElementsAre("armed", "condition_true", "do", "done", "condition_false", "undo", "done"));
+}
+
+When too_high() { return leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", 3.0}}); }
+
+TYPED_TEST(ReflexTest, PreparesNothingWhenItIsTime) {
+  this->add_rule(too_high(), core("t/Core"), core("t/Counted"));
+  this->deploy();
+  this->begin();
+  this->await_ready();
+  EXPECT_GT(this->reflex->facts()[0].memory_bytes, 0U);
+  const int made = CountedCore::made.load();
+  EXPECT_GT(made, 0);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Counted", this->present());
+  EXPECT_EQ(made, CountedCore::made_at_adopt.load()) << "the core was there before";
+}
+
+TYPED_TEST(ReflexTest, ActsWhileNothingCanBePrepared) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(too_high(), core("t/Core"), core("t/Counted"));
+  this->add_rule(silent(3600.0), {}, core("t/Counted", "w"));
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  this->await_ready(1);
+  CountedCore::closed.store(true);
+  const int configuring = CountedCore::configuring.load();
+  std::thread changing([this] { this->host().set_property("w", "gain", 2.0); });  // what is prepared is stale
+  this->way.until([&] { return CountedCore::configuring.load() > configuring; }, "the preparation");
+  changing.join();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->way.until([] { return CountedCore::adopted.load() > 0; }, "the commit");
+  CountedCore::closed.store(false);
+  this->see("done");
+  EXPECT_EQ("t/Counted", this->present());
+}
+
+TYPED_TEST(ReflexTest, WritesEveryDecisionIntoTheTrace) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->begin();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  this->beat.write.write({.value = 3.0}, 1);
+  this->see("done");
+  const std::vector<std::string> names = this->architecture.trace_components();
+  std::vector<std::int64_t> codes;
+  std::vector<std::uint64_t> sequences;
+  for (const TraceRecord& record : this->host().drain_trace().records) {
+    if (record.kind != static_cast<std::uint16_t>(TraceKind::decision)) continue;
+    EXPECT_EQ("(rules)", names.at(record.component));
+    EXPECT_EQ("rule0", TraceNames::word(record.name));
+    EXPECT_EQ(this->whole.at(codes.size()).decision.stamp_ns, record.time_ns);
+    EXPECT_EQ(this->whole.at(codes.size()).decision.cause_ns, record.b);
+    codes.push_back(record.a);
+    sequences.push_back(record.sequence);
+  }
+  EXPECT_THAT(codes, ElementsAre(0, 3, 5, 7, 4, 6, 8)) << "as TraceRecord.msg counts";
+  EXPECT_THAT(sequences, ElementsAre(0, 1, 2, 3, 4, 5, 6));
 }
 
 TYPED_TEST(ReflexTest, HearsMessagesOfABoundTopic) {
@@ -170,12 +268,7 @@ TYPED_TEST(ReflexTest, SaysSoWhenAnActionCanNoLongerBeMadeReady) {
   this->architecture.template add_resource<SharedData<Number>>("gone");
   this->deploy();
   this->begin();
-  this->way.until(
-      [&] {
-        this->take();
-        return this->reflex->facts()[0].ready;
-      },
-      "the action to be ready");
+  this->await_ready();
   Transaction transaction;
   transaction.remove_resource("late");
   this->commit(transaction);

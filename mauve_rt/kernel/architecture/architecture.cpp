@@ -106,6 +106,14 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
   return make_one(std::move(transaction), timeouts)->report(timeouts.phase_ns).steps.front();
 }
 
+void Architecture::settle_prepared() noexcept {
+  for (PreparedChange* prepared : prepared_) prepared->settle();
+}
+
+void Architecture::drop_stale_prepared() noexcept {
+  for (PreparedChange* prepared : prepared_) prepared->drop_if_stale();
+}
+
 Runner* Architecture::host() const {
   const std::lock_guard lock(host_mutex_);
   return host_;
@@ -177,11 +185,15 @@ void Architecture::connect(const std::string& component, const std::string& port
 void Architecture::publish(const std::string& name) {
   const std::lock_guard change(change_lock_);
   prepare_outward(resource(name), TopicBinding::publish);
+  const std::lock_guard gate(commit_gate_.mutex);
+  commit_gate_.restructured();
 }
 
 void Architecture::subscribe(const std::string& name) {
   const std::lock_guard change(change_lock_);
   resource(name).bind_input();
+  const std::lock_guard gate(commit_gate_.mutex);
+  commit_gate_.restructured();
 }
 
 void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {

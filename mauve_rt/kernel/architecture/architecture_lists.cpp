@@ -37,15 +37,26 @@ void append(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::sh
 
 std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) {
   const std::lock_guard lock(list_mutex_);
+  const auto member = std::make_shared<Member>(name, give_number(name));
+  return {member, &member->component};
+}
+
+std::uint16_t Architecture::give_number(const std::string& name) {
   if (names_.size() == kMostNumbers) {
     throw Error(ErrorCode::out_of_range, "the trace has no number left for another component",
                 {.component = name,
                  .expected = "at most " + std::to_string(kMostNumbers) + " components, removed ones included",
                  .remedy = "start the executor anew"});
   }
-  const auto member = std::make_shared<Member>(name, static_cast<std::uint16_t>(names_.size()));
   names_.push_back(name);
-  return {member, &member->component};
+  return static_cast<std::uint16_t>(names_.size() - 1);
+}
+
+std::uint16_t Architecture::trace_number(const std::string& name) {
+  const auto change = change_lock_.join();  // one that fails gives numbers back
+  const std::lock_guard lock(list_mutex_);
+  const auto found = std::find(names_.begin(), names_.end(), name);
+  return found == names_.end() ? give_number(name) : static_cast<std::uint16_t>(found - names_.begin());
 }
 
 std::size_t Architecture::numbers() const {
@@ -129,9 +140,20 @@ void Architecture::retire_trace(Task& task) {
   ring->drain(records);
   if (finals_.size() <= task.number()) finals_.resize(task.number() + std::size_t{1});
   finals_[task.number()] = {.written = ring->offered(), .dropped = ring->dropped()};
+  keep_records(records);
+}
+
+void Architecture::keep_records(const std::vector<TraceRecord>& records) {
   retired_.insert(retired_.end(), records.begin(), records.end());
   for (; retired_.size() > kMostRetiredRecords; retired_.pop_front())
     ++finals_[retired_.front().component].dropped;
+}
+
+void Architecture::record(TraceRecord record) {
+  const std::lock_guard lock(trace_mutex_);
+  if (finals_.size() <= record.component) finals_.resize(record.component + std::size_t{1});
+  record.sequence = finals_[record.component].written++;
+  keep_records({record});
 }
 
 TraceDrain Architecture::drain_trace() {

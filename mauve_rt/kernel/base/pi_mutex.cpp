@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <ctime>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
@@ -81,6 +82,28 @@ bool PiMutex::lock_contended() noexcept {
 bool PiMutex::try_lock() noexcept {
   if (MAUVE_RT_TRUSTED(pthread_mutex_trylock(&mutex_)) != 0) return false;
   note_holder();
+  return true;
+}
+
+bool PiMutex::try_lock_until(time_ns_t until_ns) noexcept {
+  if (try_lock()) return true;
+  if (until_ns == kForever) {
+    const bool is_others = lock_contended();
+    if (is_others) note_holder();
+    return is_others;
+  }
+#if !defined(__SANITIZE_THREAD__)  // it does not know the timed lock of the monotonic clock
+  constexpr time_ns_t kSecond = 1'000'000'000;
+  const timespec until{.tv_sec = until_ns / kSecond, .tv_nsec = until_ns % kSecond};
+  const int result = MAUVE_RT_TRUSTED(pthread_mutex_clocklock(&mutex_, CLOCK_MONOTONIC, &until));
+  if (result == 0) note_holder();
+  if (result != EINVAL) return result == 0;  // else the system has no timed lock with inheritance
+#endif
+  constexpr timespec kBetweenTries{.tv_sec = 0, .tv_nsec = 50'000};
+  while (!try_lock()) {
+    if (monotonic_now_ns() >= until_ns) return false;
+    MAUVE_RT_TRUSTED(clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenTries, nullptr));
+  }
   return true;
 }
 

@@ -57,11 +57,38 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
   return found != by_name_.end() ? found->second : nullptr;
 }
 
+void Draft::claim(const std::shared_ptr<Component>& component) {
+  claimed_.reserve(claimed_.size() + 1);
+  const std::lock_guard gate(architecture_.commit_gate().mutex);
+  if (component->change_mark().is_unsettled()) {
+    throw Error(ErrorCode::wrong_revision, "a prepared change of the component came meanwhile",
+                {.component = component->name(), .remedy = "look at it again, then decide again"});
+  }
+  component->change_mark().claim();
+  claimed_.push_back(component);
+}
+
+void Draft::release(bool changed) noexcept {
+  if (claimed_.empty()) return;
+  const std::lock_guard gate(architecture_.commit_gate().mutex);
+  for (const auto& component : claimed_) component->change_mark().release(changed);
+  claimed_.clear();
+}
+
+bool Draft::is_structural() const noexcept {
+  if (!removed_components_.empty() || !resources_.empty() || !removed_resources_.empty()) return true;
+  return std::any_of(components_.begin(), components_.end(), [](const DraftComponent& component) {
+    return component.is_added || component.shell_step != 0 || component.fsm_step != 0 ||
+           component.wires != component.wires_before;
+  });
+}
+
 DraftComponent& Draft::touch(const std::string& name) {
   DraftComponent* component = find(name);
   if (component == nullptr) {
     auto found = is_removed(name) ? nullptr : architecture_.find_component(name);
     if (found == nullptr) throw_no_component(name, component_names());
+    claim(found);
     components_.push_back(present(std::move(found)));
     component = &components_.back();
     component->first_step = step_;
@@ -155,7 +182,9 @@ std::vector<std::string> Draft::ports_of(const Resource& resource) const {
   };
   for (const DraftComponent& component : components_) look(component);
   for (const auto& component : architecture_.components()) {
-    if (!by_name_.contains(component->name()) && !is_removed(component->name())) look(present(component));
+    if (by_name_.contains(component->name()) || is_removed(component->name())) continue;
+    const std::lock_guard gate(architecture_.commit_gate().mutex);  // it is not claimed
+    look(present(component));
   }
   return ports;
 }

@@ -23,6 +23,9 @@ struct Wire {
   int step{0};
 };
 
+/// Same resources, same services.
+inline bool operator==(const Wire& a, const Wire& b) noexcept { return a.service == b.service; }
+
 struct DraftProperty {
   PropertyValue value;  // as PropertyBase::checked returned it
   int step{0};
@@ -86,6 +89,9 @@ struct DraftResource {
 class Draft {
  public:
   Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {}
+  ~Draft() { release(false); }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
 
   Architecture& architecture() const noexcept { return architecture_; }
   bool is_deployed() const noexcept { return deployed_; }
@@ -94,6 +100,12 @@ class Draft {
   /// The step being entered.
   void begin(int step) noexcept { step_ = step; }
   int step() const noexcept { return step_; }
+
+  /// Every component that was there before and is touched is claimed until then: no prepared commit changes it.
+  void release(bool changed) noexcept;
+  const std::vector<std::shared_ptr<Component>>& claimed() const noexcept { return claimed_; }
+  /// Whether it adds or removes something, wires a port, or replaces a shell or an fsm.
+  bool is_structural() const noexcept;
 
   /// Marks it as touched by this step. Throws Error: unknown_component.
   DraftComponent& touch(const std::string& name);
@@ -130,6 +142,7 @@ class Draft {
   std::vector<std::shared_ptr<Resource>>& removed_resources() noexcept { return removed_resources_; }
 
  private:
+  void claim(const std::shared_ptr<Component>& component);
   bool is_removed(const std::string& component) const noexcept;
   std::shared_ptr<Resource> find_resource(const std::string& name) const;
   std::vector<std::string> component_names() const;
@@ -145,6 +158,7 @@ class Draft {
   bool deployed_;
   int step_{0};
   int resynchronise_step_{0};
+  std::vector<std::shared_ptr<Component>> claimed_;
   std::list<DraftComponent> components_;
   std::map<std::string, DraftComponent*> by_name_;  // of components_
   std::list<DraftComponent> removed_components_;    // those that were there before

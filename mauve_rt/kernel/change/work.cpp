@@ -24,8 +24,7 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
       is_simulated_(host != nullptr && host->is_simulated()),
       options_(options) {}
 
-void TransactionCommit::Work::make(Transaction transaction) {
-  const time_ns_t began = monotonic_now_ns();
+void TransactionCommit::Work::begin(Transaction transaction) {
   constexpr std::int64_t kMostMissed = 1'000'000;
   if (options_.max_missed < 0 || options_.max_missed > kMostMissed) {
     throw Error(ErrorCode::out_of_range, "so many releases cannot be allowed to be missed",
@@ -42,8 +41,18 @@ void TransactionCommit::Work::make(Transaction transaction) {
                  .found = std::to_string(revision),
                  .remedy = "look at it again, then decide again"});
   }
+  {
+    const std::lock_guard gate(architecture_.commit_gate().mutex);
+    structure_ = architecture_.commit_gate().structure();
+  }
+  architecture_.settle_prepared();  // all that had been committed by then
   architecture_.reap();
   numbers_before_ = architecture_.numbers();
+}
+
+void TransactionCommit::Work::make(Transaction transaction) {
+  const time_ns_t began = monotonic_now_ns();
+  begin(std::move(transaction));
   try {
     draft_steps();
     prepare();
@@ -56,11 +65,92 @@ void TransactionCommit::Work::make(Transaction transaction) {
     discard();
     throw;
   }
+  finish();
+}
+
+void TransactionCommit::Work::finish() {
   tell_epoch();
   publish();
+  architecture_.drop_stale_prepared();  // they refer to what goes now
   settle_with_host();
   retire();
+  draft_->release(true);
   keep_for_report();
+}
+
+/// What would be done before the commit cannot wait for it.
+void TransactionCommit::Work::require_preparable() const {
+  const auto refuse = [this](int step, const char* what) {
+    throw Error(ErrorCode::invalid_argument, what,
+                {.expected = "steps that do nothing before the commit",
+                 .remedy = "make this step in a transaction of its own",
+                 .step = step,
+                 .step_name = text_of(step)});
+  };
+  if (draft_->resynchronise_step() != 0)
+    refuse(draft_->resynchronise_step(), "a new epoch cannot be prepared");
+  for (const DraftComponent& component : draft_->components()) {
+    if (component.configure_step != 0) refuse(component.configure_step, "to configure cannot be prepared");
+  }
+}
+
+TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transaction transaction) {
+  const time_ns_t began = monotonic_now_ns();
+  if (options_.dry_run || !deployed_) {
+    throw Error(ErrorCode::not_configured, "a transaction is prepared for an architecture that is deployed",
+                {.remedy = "deploy it first; for a dry run ask for a commit"});
+  }
+  begin(std::move(transaction));
+  Basis basis;
+  try {
+    draft_steps();
+    require_preparable();
+    prepare();
+    in_reach_ = architecture_.resources();
+    gather();
+    conductor_ = host_->conductor();
+    require_host_open();
+    prepared_commit_.emplace(*commit_);
+    numbers_after_ = architecture_.numbers();
+    basis.is_structural = draft_->is_structural();
+    basis.structure = structure_;
+    for (const auto& component : draft_->claimed())
+      basis.touched.push_back({.component = component, .count = 0, .state = {}});
+    const auto found = [&](std::list<DraftComponent>& components) {
+      for (const DraftComponent& component : components) {
+        for (Basis::Touched& touched : basis.touched) {
+          if (touched.component == component.component) touched.state = component.state;
+        }
+      }
+    };
+    found(draft_->components());
+    found(draft_->removed_components());
+    draft_->release(false);
+    for (Basis::Touched& touched : basis.touched) touched.count = touched.component->change_mark().count();
+  } catch (...) {
+    discard();
+    throw;
+  }
+  prepare_ns_ = monotonic_now_ns() - began;
+  return basis;
+}
+
+PreparedCommit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
+  if (changes_.empty()) return PreparedCommit::Outcome::made;  // there is nobody to commit with
+  const PreparedCommit::Outcome outcome = prepared_commit_->carry_out(until_ns, conductor_.get());
+  committed_ = outcome == PreparedCommit::Outcome::made;
+  const bool is_changed = outcome == PreparedCommit::Outcome::refused && commit_->refused_by() == &guard_;
+  return is_changed ? PreparedCommit::Outcome::changed : outcome;
+}
+
+void TransactionCommit::Work::settle_committed() { finish(); }
+
+void TransactionCommit::Work::throw_not_made() {
+  commit_or_throw([this] {
+    prepared_commit_->rethrow_refusal();
+    return false;
+  });
+  throw Error(ErrorCode::internal, "a prepared change was made, and is said not to be");
 }
 
 /// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
@@ -134,10 +224,31 @@ void TransactionCommit::Work::gather() {
 }
 
 void TransactionCommit::Work::carry_out_commit() {
-  if (changes_.empty()) return;
+  CommitGate& gate = architecture_.commit_gate();
+  const std::lock_guard passing(gate.mutex);
+  require_same_structure();
+  if (!changes_.empty()) {
+    commit_->set_yields();
+    commit_or_throw([this] {
+      const auto conductor = deployed_ ? host_->conductor() : nullptr;
+      return carry_out(*commit_, options_.timeouts.commit_ns, conductor.get());
+    });
+  }
+  if (draft_->is_structural()) gate.restructured();
+}
+
+/// A prepared commit that came while this change was being prepared; of what it touches it is kept off otherwise.
+void TransactionCommit::Work::require_same_structure() const {
+  if (!draft_->is_structural() || architecture_.commit_gate().structure() == structure_) return;
+  throw Error(ErrorCode::wrong_revision,
+              "a prepared change of what there is, or of its wiring, came meanwhile; nothing was changed",
+              {.remedy = "look at the architecture again, then decide again"});
+}
+
+template <typename CarryOut>
+void TransactionCommit::Work::commit_or_throw(CarryOut&& carry_out) {
   try {
-    const auto conductor = deployed_ ? host_->conductor() : nullptr;
-    if (carry_out(*commit_, options_.timeouts.commit_ns, conductor.get())) {
+    if (carry_out()) {
       committed_ = true;
       return;
     }
@@ -281,6 +392,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     step.missed_releases = found->second.missed_releases;
     step.phase_nominal_ns = found->second.phase_nominal_ns;
     step.phase_actual_ns = found->second.phase_actual_ns;
+    step.released_ns = found->second.released_ns;
     step.remark = found->second.remark;
     step.shift_ns = places_.at(step.component)->shift_ns;
     report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);

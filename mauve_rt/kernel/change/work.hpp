@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "mauve_rt/change/transaction_commit.hpp"
@@ -21,6 +22,32 @@ class TransactionCommit::Work {
   void make(Transaction transaction);
   TransactionReport report(time_ns_t phase_timeout_ns);
 
+  // ---- the same as make() in parts, for a prepared transaction
+
+  /// What it was prepared against; read without the work itself, which may be gone.
+  struct Basis {
+    struct Touched {
+      std::shared_ptr<Component> component;
+      std::uint32_t count;
+      ComponentState state;
+    };
+    std::vector<Touched> touched{};
+    bool is_structural{false};
+    std::uint32_t structure{0};
+  };
+  /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
+  Basis prepare_for_later(Transaction transaction);
+  /// The gate of commits held, the basis checked. [rt] as far as the actions are.
+  PreparedCommit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
+  /// Who conducted commits when it was prepared; nullptr in virtual time. [non-rt]
+  const std::shared_ptr<Conductor>& conductor() const noexcept { return conductor_; }
+  /// What follows the commit. [non-rt], the change lock held.
+  void settle_committed();
+  /// Throws why it was not made. [non-rt]
+  [[noreturn]] void throw_not_made();
+  /// [non-rt], the change lock held.
+  void discard() noexcept;
+
  private:
   /// A component that takes part in the commit.
   struct Change {
@@ -30,7 +57,9 @@ class TransactionCommit::Work {
   };
 
   // draft
+  void begin(Transaction transaction);
   void draft_steps();
+  void require_preparable() const;
   // prepare
   void prepare();
   void prepare_epoch();
@@ -48,6 +77,10 @@ class TransactionCommit::Work {
   // commit
   void gather();
   void carry_out_commit();
+  void require_same_structure() const;
+  template <typename CarryOut>
+  void commit_or_throw(CarryOut&& carry_out);
+  void finish();
   void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
   // after it
@@ -58,7 +91,6 @@ class TransactionCommit::Work {
   void keep_for_report();
   static void renew_fallback(Change& change);
   void leave_behind();
-  void discard() noexcept;
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 
   template <typename Part>
@@ -77,6 +109,10 @@ class TransactionCommit::Work {
   TransactionOptions options_;
   Transaction transaction_;
   std::size_t numbers_before_{0};
+  std::size_t numbers_after_{0};
+  std::uint32_t structure_{0};                       // as it was when this began to look
+  std::shared_ptr<Conductor> conductor_{};           // of a prepared one
+  std::vector<std::shared_ptr<Resource>> in_reach_;  // of a prepared one: outlive what refers to them
   std::unique_ptr<Draft> draft_;
 
   std::vector<StepReport> reports_;  // by step
@@ -98,6 +134,7 @@ class TransactionCommit::Work {
   NewEpoch* new_epoch_{nullptr};                     // among the actions, when the transaction resynchronises
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
+  std::optional<PreparedCommit> prepared_commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};
 };

@@ -61,6 +61,7 @@ void Deployer::prepare_process() {
 
 void Deployer::deploy() {
   const std::lock_guard change(architecture().change_lock());
+  architecture().settle_prepared();
   const std::lock_guard life(life_mutex_);
   require_deployable();
   prepare_process();

@@ -57,6 +57,12 @@ std::unique_ptr<TransactionCommit> Host::make(Transaction transaction, const Tra
   return architecture_.make(std::move(transaction), options);
 }
 
+std::unique_ptr<PreparedTransaction> Host::prepare(Transaction transaction,
+                                                   const TransactionOptions& options) {
+  require_own();
+  return std::make_unique<PreparedTransaction>(architecture_, *this, std::move(transaction), options);
+}
+
 TransactionReport Host::commit(Transaction transaction, const TransactionOptions& options) {
   return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
 }

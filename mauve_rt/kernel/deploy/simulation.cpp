@@ -174,6 +174,7 @@ void SimulatedHost::deploy() {
 
 void SimulatedHost::begin(time_ns_t epoch_ns) {
   const auto change = architecture().change_lock().join();
+  architecture().settle_prepared();
   for (const auto& component : architecture().components()) attach(component->task());
   start_all(epoch_ns);
   set_deployed(true);

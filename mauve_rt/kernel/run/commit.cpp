@@ -146,11 +146,7 @@ Commit::Answer Commit::make_change() noexcept {
   borrow_priority();
   const Clock& clock =
       participants_.empty() ? MonotonicClock::instance() : participants_.front().task->clock();
-  if (!adopt_all(clock)) {
-    // refused_by_ tells
-  } else if (!begin_taking()) {
-    refused_by_ = most_over_budget();
-  } else {
+  if (adopt_all(clock) && begin_taking()) {
     for (Participant& place : participants_) {
       if (place.in_flight && place.replaces_parts) place.task->write_outputs(true);
     }
@@ -186,19 +182,21 @@ bool Commit::adopt_all(const Clock& clock) noexcept {
     const time_ns_t declared = action->declared_ns();
     const bool is_late = declared != 0 && action->adopt_ns > declared;
     if (agreed && !is_late && !is_off) continue;
-    refused_by_ = agreed && !is_late ? most_over_budget() : action;
+    refused_by_ = agreed && !is_late ? nullptr : action;  // called off: the actions may be gone by now
     adopt_was_late_ = agreed && is_late;
     return false;
   }
   return true;
 }
 
-/// Of those that have adopted: the one that a commit called off for its time is put down to.
-const CommitAction* Commit::most_over_budget() const noexcept {
-  return *std::max_element(actions_.begin(), actions_.end(),
-                           [](const CommitAction* a, const CommitAction* b) {
-                             return a->adopt_ns - a->budget_ns() < b->adopt_ns - b->budget_ns();
-                           });
+const CommitAction* Commit::put_down() noexcept {
+  if (began_ns_.load(std::memory_order_relaxed) == 0 || actions_.empty()) return nullptr;
+  const CommitAction* slowest =
+      *std::max_element(actions_.begin(), actions_.end(), [](const CommitAction* a, const CommitAction* b) {
+        return a->adopt_ns - a->budget_ns() < b->adopt_ns - b->budget_ns();
+      });
+  if (slowest->task == nullptr) return nullptr;
+  return refused_by_ = slowest;
 }
 
 /// Decides against all who would call it off.

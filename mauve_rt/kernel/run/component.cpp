@@ -32,9 +32,38 @@ void Component::set_architecture(Architecture* architecture) noexcept {
   task_.changes().set_listener(architecture != nullptr ? &architecture->changes() : nullptr);
 }
 
-std::unique_lock<ChangeLock> Component::join_change() const {
-  Architecture* architecture = architecture_.load(std::memory_order_acquire);
-  return architecture != nullptr ? architecture->change_lock().join() : std::unique_lock<ChangeLock>();
+class Component::JoinedChange {
+ public:
+  JoinedChange(Architecture* architecture, ChangeMark& mark) {
+    if (architecture == nullptr) return;
+    lock_ = architecture->change_lock().join();
+    if (!lock_.owns_lock()) return;  // a part of a change, which has claimed what it touches
+    std::unique_lock gate(architecture->commit_gate().mutex, std::defer_lock);
+    do {
+      if (gate.owns_lock()) gate.unlock();
+      architecture->settle_prepared();
+      gate.lock();
+    } while (mark.is_unsettled());
+    mark.claim();
+    gate_ = &architecture->commit_gate();
+    mark_ = &mark;
+  }
+  ~JoinedChange() {
+    if (mark_ == nullptr) return;
+    const std::lock_guard gate(gate_->mutex);
+    mark_->release(true);
+  }
+  JoinedChange(const JoinedChange&) = delete;
+  JoinedChange& operator=(const JoinedChange&) = delete;
+
+ private:
+  std::unique_lock<ChangeLock> lock_;
+  CommitGate* gate_{nullptr};
+  ChangeMark* mark_{nullptr};
+};
+
+Component::JoinedChange Component::join_change() {
+  return {architecture_.load(std::memory_order_acquire), change_mark_};
 }
 
 Architecture& Component::require_listed() const {
@@ -253,8 +282,10 @@ StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   const bool released = place.task->wait_release(place, later_by(monotonic_now_ns(), phase_timeout_ns));
   const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;
   report.phase_nominal_ns = place.grid.phase_error(nominal_ns - place.grid_place_ns);
-  if (released)
+  if (released) {
     report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
+    report.released_ns = place.release_actual_ns;
+  }
   report.missed_releases = place.lost + missed_releases(place, nominal_ns - place.shift_ns);
   if (report.missed_releases != 0) report.remark = why_missed(place);
   return report;

@@ -89,11 +89,22 @@ void Conductor::run() noexcept {
   }
 }
 
+void Conductor::press() noexcept {
+  pressing_.fetch_add(1, std::memory_order_seq_cst);
+  under_way_.use([this](Commit& commit) { give_way(commit); });
+}
+
+void Conductor::give_way(Commit& commit) noexcept {
+  if (commit.yields() && pressing_.load(std::memory_order_seq_cst) != 0)
+    commit.call_off(Commit::Off::preempted);
+}
+
 void Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
   commit_ = &commit;
   timeout_ns_ = timeout_ns;
   finished_.store(0, std::memory_order_relaxed);  // relaxed: the order publishes it
   under_way_.lend(commit);
+  give_way(commit);
   order_.store(kConduct, std::memory_order_release);
   futex_wake_all(order_);
   while (finished_.load(std::memory_order_acquire) == 0) futex_wait_until(finished_, 0, kForever);
@@ -102,6 +113,7 @@ void Conductor::conduct(Commit& commit, time_ns_t timeout_ns) noexcept {
 
 void Conductor::make_alone(Commit& commit) noexcept {
   under_way_.lend(commit);
+  give_way(commit);
   commit.make_alone();
   under_way_.recall(kForever);
 }
@@ -214,11 +226,12 @@ void throw_if_off(Commit& commit, time_ns_t timeout_ns) {
     case Commit::Off::shut_down:
       throw Error(ErrorCode::wrong_revision, "the architecture is being shut down; nothing was changed",
                   {.remedy = "deploy it again first"});
+    case Commit::Off::preempted:
+      throw Error(ErrorCode::wrong_revision, "a prepared change came before this one; nothing was changed",
+                  {.remedy = "look at the architecture again, then decide again"});
     case Commit::Off::timed_out:
     case Commit::Off::overran:
-      // A look at the states, which is no component's, was merely the last thing done before it was called off.
-      if (commit.refused_by() != nullptr && commit.refused_by()->task != nullptr)
-        throw_late_adopt(*commit.refused_by());
+      if (const CommitAction* slowest = commit.put_down()) throw_late_adopt(*slowest);
       throw_timeout(commit, timeout_ns);
     case Commit::Off::not_yet:
       if (commit.adopt_was_late()) throw_late_adopt(*commit.refused_by());
@@ -236,23 +249,10 @@ std::uint32_t call_parked(Commit& commit) {
   return 0;
 }
 
-}  // namespace
-
-bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
-  // Whoever commands two tasks takes them in the order of their numbers, so that no two wait for each other.
-  commit.order_participants();
-  std::vector<Task*> tasks;
-  for (const Participant& place : commit.participants()) tasks.push_back(place.task);
-  std::sort(tasks.begin(), tasks.end(),
-            [](const Task* a, const Task* b) { return a->number() < b->number(); });
-  std::vector<std::unique_lock<std::mutex>> locks;
-  locks.reserve(tasks.size());
-  for (Task* task : tasks) locks.emplace_back(task->command_mutex());
-
-  const Claims claims(commit);
+/// All that is done with the tasks' commands held. Runs no code of others but the actions'.
+void make_or_refuse(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) noexcept {
   std::uint32_t running = 0;
   for (Participant& place : commit.participants()) {
-    if (place.afterwards != Afterwards::stop && !place.repairs) check_state(*place.task);
     place.in_flight = !place.left_behind && !place.task->is_parked();
     if (place.in_flight && !place.task->is_simulated()) ++running;
   }
@@ -272,13 +272,103 @@ bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
   } else {
     commit.call_off(Commit::Off::shut_down);  // a task left behind by a host that is no more
   }
-  if (commit.is_abandoned()) give_up(commit);
+  if (commit.is_abandoned()) return;
   for (Participant& place : commit.participants()) {
     if (!place.in_flight || place.task->is_simulated()) place.task->finish_parked(place, commit.committed());
   }
+}
+
+std::vector<Task*> tasks_of(Commit& commit) {
+  std::vector<Task*> tasks;
+  for (const Participant& place : commit.participants()) tasks.push_back(place.task);
+  std::sort(tasks.begin(), tasks.end(),
+            [](const Task* a, const Task* b) { return a->number() < b->number(); });
+  return tasks;
+}
+
+}  // namespace
+
+bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor) {
+  // Whoever commands two tasks takes them in the order of their numbers, so that no two wait for each other.
+  commit.order_participants();
+  const std::vector<Task*> tasks = tasks_of(commit);
+  std::vector<std::unique_lock<PiMutex>> locks;
+  locks.reserve(tasks.size());
+  for (Task* task : tasks) locks.emplace_back(task->command_mutex());
+
+  const Claims claims(commit);
+  for (const Participant& place : commit.participants()) {
+    if (place.afterwards != Afterwards::stop && !place.repairs) check_state(*place.task);
+  }
+  make_or_refuse(commit, timeout_ns, conductor);
+  if (commit.is_abandoned()) give_up(commit);
   throw_if_off(commit, timeout_ns);
   if (commit.refusal()) std::rethrow_exception(commit.refusal());
   return commit.committed();
+}
+
+PreparedCommit::PreparedCommit(Commit& commit) : commit_(commit), tasks_(tasks_of(commit)) {
+  commit.order_participants();  // reserves what ordering them again needs
+}
+
+bool PreparedCommit::lock(time_ns_t until_ns) noexcept {
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    if (tasks_[i]->command_mutex().try_lock_until(until_ns)) continue;
+    while (i-- > 0) tasks_[i]->command_mutex().unlock();
+    return false;
+  }
+  return true;
+}
+
+void PreparedCommit::unlock() noexcept {
+  for (Task* task : tasks_) task->command_mutex().unlock();
+}
+
+PreparedCommit::Outcome PreparedCommit::carry_out(time_ns_t until_ns, Conductor* conductor) noexcept {
+  if (!lock(until_ns)) return Outcome::timed_out;
+  const bool is_as_it_was =
+      std::all_of(commit_.participants().begin(), commit_.participants().end(), [](const Participant& place) {
+        const ComponentState state = place.task->state();
+        if (place.afterwards == Afterwards::stop || place.repairs) return true;
+        return state != ComponentState::stopping && state != ComponentState::faulted;
+      });
+  if (is_as_it_was) {
+    const Claims claims(commit_);
+    timeout_ns_ = std::max<time_ns_t>(0, until_ns - monotonic_now_ns());
+    make_or_refuse(commit_, timeout_ns_, conductor);
+    if (commit_.is_abandoned()) {
+      try {
+        give_up(commit_);
+      } catch (...) {
+        given_up_ = std::current_exception();
+      }
+    }
+  }
+  unlock();
+  has_begun_ = is_as_it_was;
+  if (!is_as_it_was) return Outcome::changed;
+  if (commit_.committed()) return Outcome::made;
+  if (commit_.is_abandoned()) return Outcome::refused;
+  switch (commit_.off()) {
+    case Commit::Off::not_yet:
+      return Outcome::refused;
+    case Commit::Off::timed_out:
+    case Commit::Off::overran:
+      return Outcome::timed_out;
+    default:
+      return Outcome::off;
+  }
+}
+
+void PreparedCommit::rethrow_refusal() const {
+  if (given_up_) std::rethrow_exception(given_up_);
+  if (!has_begun_) {
+    throw Error(ErrorCode::timeout,
+                "a start of one of its components, or the end of its thread, lasted; nothing was changed",
+                {.remedy = "try again, or allow a longer commit timeout"});
+  }
+  throw_if_off(commit_, timeout_ns_);
+  if (commit_.refusal()) std::rethrow_exception(commit_.refusal());
 }
 
 }  // namespace mauve

@@ -159,7 +159,7 @@ void Task::end_simulation() noexcept {
 }
 
 bool Task::end_thread(time_ns_t until_ns) noexcept {
-  std::unique_lock lock(command_mutex_, std::defer_lock);
+  std::unique_lock<PiMutex> lock(command_mutex_, std::defer_lock);
   // Tried again and again: ThreadSanitizer does not know the timed lock of the monotonic clock.
   while (!lock.try_lock()) {
     if (monotonic_now_ns() >= until_ns) return false;

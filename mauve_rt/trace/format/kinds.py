@@ -9,6 +9,7 @@ So a reader names kinds that are newer than itself; `Kind` has those that it kno
 
 import re
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from mauve_rt.trace.format.records import Kind
@@ -18,6 +19,8 @@ _KIND = re.compile(
     r"^uint16 (?P<name>[A-Z][A-Z0-9_]*)=(?P<number>\d+)[ \t]*(?:#(?P<fields>.*))?$", re.MULTILINE
 )
 _FIELD = re.compile(r"\b(name|a|b|c): (\w+)")
+_VALUES = re.compile(r"\b(a|b|c): \w+ \((?=\d+ )([^)]*)\)")
+_VALUE = re.compile(r"(\d+) ([^,]+)")
 _IN_BRACKETS = re.compile(r"\([^)]*\)")
 
 
@@ -28,6 +31,9 @@ class RecordKind(NamedTuple):
     """In small letters, e.g. release."""
     fields: Mapping[str, str]
     """What those of `name`, `a`, `b`, `c` mean that it uses, e.g. {"name": "wait", "a": "nominal_ns"}."""
+
+    words: Mapping[str, Mapping[int, str]] = MappingProxyType({})
+    """Of those whose values are listed, e.g. {"a": {1: "adopt", 2: "take"}}."""
 
     @property
     def figures(self) -> dict[str, str]:
@@ -44,9 +50,19 @@ def kinds_told(definition: str) -> dict[int, RecordKind]:
         return kinds_known()
     return {
         int(told["number"]): RecordKind(
-            told["name"].lower(), dict(_FIELD.findall(_IN_BRACKETS.sub("", told["fields"] or "")))
+            told["name"].lower(),
+            dict(_FIELD.findall(_IN_BRACKETS.sub("", told["fields"] or ""))),
+            _words_told(told["fields"] or ""),
         )
         for told in _KIND.finditer(definition)
+    }
+
+
+def _words_told(fields: str) -> dict[str, dict[int, str]]:
+    """Return of each field whose values are listed in brackets behind it what they mean."""
+    return {
+        field: {int(number): word.strip() for number, word in _VALUE.findall(values)}
+        for field, values in _VALUES.findall(fields)
     }
 
 

@@ -26,6 +26,7 @@ class Kind(IntEnum):
     CONTENDED = 14
     RECONFIGURATION = 15
     MARK = 16
+    DECISION = 17
 
 
 class ReconfigurationPhase(IntEnum):

@@ -431,14 +431,15 @@ TEST_F(Rule10Gate, AStoppedComponentWhoseAdoptDoesNotEndCanBeRemoved) {
   deploy();
   deployer.stop("c", s_to_ns(50));
   auto fresh = std::make_unique<ToldCore>();
-  fresh->adopting = [this] { latch.wait(); };
+  const auto shared = std::make_shared<Latch>();  // the thread that is left behind may outlive this test
+  fresh->adopting = [shared] { shared->wait(); };
   ASSERT_TRUE(error_of(replace("c", std::move(fresh)), {.timeouts = {.commit_ns = ms_to_ns(200)}}));
   Transaction removal;
   removal.remove_component("c");
   const auto refused = error_of(std::move(removal), kPatient);
   EXPECT_FALSE(refused) << refused->what();
   EXPECT_EQ(nullptr, architecture.find_component("c"));
-  latch.open();
+  shared->open();
 }
 
 TEST_F(Rule10Gate, ATakeThatDoesNotEndGivesUpAllTheStoppedOnesOfItsChange) {

@@ -4,7 +4,6 @@ import threading
 
 import pytest
 
-
 from mauve_rt._kernel import MauveError, RuleEngine, RuleSpec, WhenSpec, condition_kinds, monotonic_ns
 
 MS = 1_000_000

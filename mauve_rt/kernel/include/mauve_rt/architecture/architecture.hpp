@@ -11,10 +11,12 @@
 #include <vector>
 
 #include "mauve_rt/architecture/description.hpp"
+#include "mauve_rt/architecture/prepared_change.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/run/change_lock.hpp"
+#include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {
@@ -51,8 +53,9 @@ struct ListChange {
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
 /// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
+/// | prepared_                       | who prepares          | changes | change_lock_                   |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
-/// | retired_, finals_               | who removes, drains   | same    | trace_mutex_                   |
+/// | retired_, finals_               | who removes, drains, records | same | trace_mutex_             |
 /// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
 class Architecture final : public Configurable {
  public:
@@ -159,6 +162,11 @@ class Architecture final : public Configurable {
   std::vector<std::string> trace_components() const;
   /// Empties every ring, and what removed components left. [non-rt]
   TraceDrain drain_trace();
+  /// The number under which somebody who is no component writes records; the same for the same name, which is no
+  /// component's: `(rules)`. [non-rt] Throws Error (out_of_range) when all numbers are used up.
+  std::uint16_t trace_number(const std::string& name);
+  /// Writes a record there; its sequence is the next one of its component. [non-rt]
+  void record(TraceRecord record);
 
   /// The next sample of the published resources not handed out yet; false when there is none. [non-rt], one
   /// thread.
@@ -173,6 +181,8 @@ class Architecture final : public Configurable {
 
   /// Under it all changes are made. [non-rt]
   ChangeLock& change_lock() noexcept { return change_lock_; }
+  /// Commits pass it one at a time; taken after the change lock. [rt]
+  CommitGate& commit_gate() MAUVE_RT { return commit_gate_; }
   /// Who runs it; nullptr: nobody. [non-rt]
   Runner* host() const;
   /// [non-rt], the change lock held. Throws Error (already_running) when it has a host.
@@ -181,6 +191,15 @@ class Architecture final : public Configurable {
   void release_host(const Runner& host) noexcept;
 
   // ---- for transactions
+
+  /// Completes what prepared transactions have committed. [non-rt], the change lock held; not from inside of a change that
+  /// has begun to look at components.
+  void settle_prepared() noexcept;
+  /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
+  void drop_stale_prepared() noexcept;
+  /// [non-rt], the change lock held.
+  void enlist(PreparedChange& prepared) { prepared_.push_back(&prepared); }
+  void delist(const PreparedChange& prepared) noexcept { std::erase(prepared_, &prepared); }
 
   /// A component with a number of its own, not listed yet: its changes are nobody's business. [non-rt]
   /// Throws Error (out_of_range) when all numbers are used up.
@@ -201,12 +220,17 @@ class Architecture final : public Configurable {
   void retire_trace(Task& task);
 
  private:
+  /// A number that the trace knows the name by. list_mutex_ held. Throws Error (out_of_range): all are used up.
+  std::uint16_t give_number(const std::string& name);
+  /// Keeps records until the next drain; of too many the oldest are lost. trace_mutex_ held.
+  void keep_records(const std::vector<TraceRecord>& records);
+
   struct Leaving {
     std::shared_ptr<Component> component;
     bool was_listed;
     std::vector<std::shared_ptr<Resource>> uses;
   };
-  struct Final {  // of a removed component
+  struct Final {  // of a removed component, or of who is none
     std::uint64_t written{0};
     std::uint64_t dropped{0};
   };
@@ -218,6 +242,8 @@ class Architecture final : public Configurable {
 
   PluginRegistry* registry_;
   ChangeLock change_lock_;
+  CommitGate commit_gate_;
+  std::vector<PreparedChange*> prepared_;
   mutable std::mutex host_mutex_;
   Runner* host_{nullptr};
   ChangeSignal changes_;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -18,6 +19,7 @@ class Task;
 /// | member    | written by           | read by | under                                                  |
 /// | --------- | -------------------- | ------- | ------------------------------------------------------ |
 /// | deployed_ | deploy(), shutdown() | anyone  | seq_cst: a commit that shutdown() does not see, sees it |
+/// | deployments_ | deploy()          | anyone  | as deployed_                                           |
 /// | in_use_   | changes              | the end | -                                                      |
 class Runner {
  public:
@@ -26,7 +28,11 @@ class Runner {
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
-  bool is_deployed() const noexcept { return deployed_.load(std::memory_order_seq_cst); }
+  /// How often it was deployed. [rt]
+  std::uint32_t deployments() const MAUVE_RT { return deployments_.load(std::memory_order_seq_cst); }
+  /// [rt]
+  bool is_deployed() const MAUVE_RT { return deployed_.load(std::memory_order_seq_cst); }
+  /// [non-rt]
   virtual const Clock& clock() const noexcept = 0;
   /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
   virtual bool is_simulated() const noexcept = 0;
@@ -42,12 +48,16 @@ class Runner {
 
  protected:
   /// From here on nobody starts anything, and no change of a running architecture is made.
-  void set_deployed(bool deployed) noexcept { deployed_.store(deployed, std::memory_order_seq_cst); }
+  void set_deployed(bool deployed) noexcept {
+    if (deployed) deployments_.fetch_add(1, std::memory_order_seq_cst);
+    deployed_.store(deployed, std::memory_order_seq_cst);
+  }
   /// Waits for a change that uses the runner; after shutdown(), at its end. [non-rt]
   void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
 
  private:
   std::atomic<bool> deployed_{false};
+  std::atomic<std::uint32_t> deployments_{0};
   std::mutex in_use_;
 };
 

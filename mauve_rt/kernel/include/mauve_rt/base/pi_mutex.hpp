@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace mauve {
 
@@ -33,6 +34,8 @@ class PiMutex {
   void lock() MAUVE_RT;
   /// Locks if free. [rt]
   bool try_lock() MAUVE_RT;
+  /// Locks, or gives up at the instant; whether it has. Not of one that the caller holds: false. [rt]
+  bool try_lock_until(time_ns_t until_ns) MAUVE_RT;
   /// Unlocks. [rt]
   void unlock() MAUVE_RT;
 

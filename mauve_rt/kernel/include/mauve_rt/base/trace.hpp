@@ -31,6 +31,7 @@ enum class TraceKind : std::uint16_t {
   contended = 14,
   reconfiguration = 15,
   mark = 16,
+  decision = 17,
 };
 
 /// One record; in memory as mauve_msgs/msg/TraceRecord is on the wire.

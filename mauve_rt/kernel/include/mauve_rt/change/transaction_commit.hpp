@@ -28,6 +28,7 @@ class TransactionCommit {
   TransactionReport report(time_ns_t phase_timeout_ns);
 
  private:
+  friend class PreparedTransaction;
   class Work;
   std::unique_ptr<Work> work_;
 };

@@ -10,6 +10,7 @@
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/realtime.hpp"
+#include "mauve_rt/change/prepared_transaction.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 namespace mauve {
@@ -41,6 +42,10 @@ class Host : public Runner {
   TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
   /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
   std::unique_ptr<TransactionCommit> make(Transaction transaction, const TransactionOptions& options = {});
+  /// All of it but the commit, for a real-time thread to make; waits for a change under way. [non-rt] Throws as commit();
+  /// Error (not_configured) unless it is deployed, and (invalid_argument) for steps that configure or resynchronise.
+  std::unique_ptr<PreparedTransaction> prepare(Transaction transaction,
+                                               const TransactionOptions& options = {});
   /// Replaces a core by a registered implementation that the component declares as its alternative. [non-rt]
   StepReport replace_core(const std::string& component, const std::string& core,
                           const CommitTimeouts& timeouts = {});

@@ -168,8 +168,16 @@ class Commit {
   const std::exception_ptr& refusal() const noexcept { return refusal_; }
   /// The action whose adopt refused, or nullptr. [non-rt], after it ended.
   const CommitAction* refused_by() const noexcept { return refused_by_; }
+  /// Puts one that was called off for its time down to the action that was most over its budget, and returns that;
+  /// nullptr: no adopt of a component was begun. [non-rt], after it ended: no abandoned maker may do it.
+  const CommitAction* put_down() noexcept;
   /// Whether that was for the time its adopt took. [non-rt], after it ended.
   bool adopt_was_late() const noexcept { return adopt_was_late_; }
+
+  /// It gives way to a prepared commit. [setup]
+  void set_yields() noexcept { yields_ = true; }
+  /// [rt]
+  bool yields() const MAUVE_RT { return yields_; }
 
   // ---- for those who come to the gate
 
@@ -195,7 +203,7 @@ class Commit {
 
   // ---- for who conducts it, and who wants it not to happen
 
-  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, overran, shut_down };
+  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, overran, shut_down, preempted };
   /// Calls it off, without waiting for anybody: withdrawn by a task that is stopped or faulted, e.g. False when the
   /// change was made already, or is being taken this moment. [rt]
   bool call_off(Off why, const Task* task = nullptr) MAUVE_RT;
@@ -231,7 +239,6 @@ class Commit {
   Answer wait_others(Participant& place) noexcept;
   Answer make_change() noexcept;
   bool adopt_all(const Clock& clock) noexcept;
-  const CommitAction* most_over_budget() const noexcept;
   bool begin_taking() noexcept;
   void take_all(const Clock& clock) noexcept;
   void borrow_priority() noexcept;
@@ -247,6 +254,7 @@ class Commit {
   std::uint32_t expected_{0};
   int own_priority_{0};  // of who makes the change, while it works at another's; 0: it does not
   bool committed_{false};
+  bool yields_{false};
   bool adopt_was_late_{false};
   std::exception_ptr refusal_{};
   const CommitAction* refused_by_{nullptr};
@@ -274,6 +282,7 @@ void conduct(Commit& commit, time_ns_t timeout_ns) MAUVE_RT;
 /// | order_ (futex)  | requester  | the thread | release/acquire: hands over commit_   |
 /// | finished_(futex)| the thread | requester  | release/acquire: the commit's end     |
 /// | under_way_      | requester  | anyone     | its own: lent.hpp                     |
+/// | pressing_       | who presses| requester  | seq_cst with under_way_: one of them sees the other |
 class Conductor {
  public:
   /// [setup] Without the right to SCHED_FIFO it is an ordinary thread.
@@ -282,11 +291,14 @@ class Conductor {
   Conductor(const Conductor&) = delete;
   Conductor& operator=(const Conductor&) = delete;
 
-  /// conduct() on the thread; one caller at a time. [non-rt]
-  void conduct(Commit& commit, time_ns_t timeout_ns) noexcept;
+  /// conduct() on the thread; one caller at a time. [rt]
+  void conduct(Commit& commit, time_ns_t timeout_ns) MAUVE_RT;
   /// Makes a commit whose tasks are all parked on the calling thread, where withdraw() finds it; one caller at a time.
-  /// [non-rt]
+  /// [rt] as far as the actions are.
   void make_alone(Commit& commit) noexcept;
+  /// Calls off the commit under way, where that gives way, and each such that comes before relax(). [rt]
+  void press() MAUVE_RT;
+  void relax() MAUVE_RT { pressing_.fetch_sub(1, std::memory_order_seq_cst); }
   /// Calls off the commit under way, if there is one, and does not wait for its end; any thread. [rt]
   void withdraw() MAUVE_RT;
 
@@ -295,11 +307,13 @@ class Conductor {
 
   static void* entry(void* self) noexcept;
   void run() noexcept;
+  void give_way(Commit& commit) MAUVE_RT;
 
   Thread thread_;
   Commit* commit_{nullptr};
   time_ns_t timeout_ns_{0};
   Lent<Commit> under_way_;
+  std::atomic<std::uint32_t> pressing_{0};
   std::atomic<std::uint32_t> order_{kNone};
   std::atomic<std::uint32_t> finished_{0};
 };
@@ -311,5 +325,28 @@ class Conductor {
 /// its actions must then outlive that component's thread). Rethrows what adopt threw; returns whether every adopt agreed.
 /// Unless it returns true nothing was changed.
 bool carry_out(Commit& commit, time_ns_t timeout_ns, Conductor* conductor);
+
+/// The same in two: the real-time part, and what it answers.
+class PreparedCommit {
+ public:
+  enum class Outcome : std::uint8_t { made, refused, off, timed_out, changed };
+
+  /// Of a commit whose participants are filled in. [non-rt]
+  explicit PreparedCommit(Commit& commit);
+  /// [rt] as far as the actions are: it allocates only where it gives up a component (Commit::is_abandoned).
+  Outcome carry_out(time_ns_t until_ns, Conductor* conductor) noexcept;
+  /// Why it was not made: throws what mauve::carry_out() throws; returns where an adopt disagreed. [non-rt], after it.
+  void rethrow_refusal() const;
+
+ private:
+  bool lock(time_ns_t until_ns) noexcept;
+  void unlock() noexcept;
+
+  Commit& commit_;
+  std::vector<Task*> tasks_;  // by number: whoever commands two takes them in this order
+  time_ns_t timeout_ns_{0};
+  bool has_begun_{false};  // the tasks' commands were held
+  std::exception_ptr given_up_{};
+};
 
 }  // namespace mauve

@@ -11,6 +11,7 @@
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/run/change_lock.hpp"
+#include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -29,8 +30,9 @@ struct StepReport {
   std::int64_t missed_releases{0};
   time_ns_t phase_nominal_ns{0};
   time_ns_t phase_actual_ns{kNotMeasured};
-  std::string remark{};   // why releases were missed; empty when none was
-  time_ns_t shift_ns{0};  // by which a new epoch made its instants later
+  std::string remark{};                 // why releases were missed; empty when none was
+  time_ns_t shift_ns{0};                // by which a new epoch made its instants later
+  time_ns_t released_ns{kNotMeasured};  // the instant of the release that followed
 };
 
 struct CommitTimeouts {
@@ -149,6 +151,7 @@ struct ShownParts {
 /// | member           | written by                                | read by             | under            |
 /// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
 /// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
+/// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
 /// | the rest         | [setup]                                   | anyone              | -                |
@@ -176,8 +179,11 @@ class Component final : public Configurable {
   Shell& shell() noexcept { return *parts_.shell; }
   CoreBase& core() noexcept { return *parts_.core; }
   const FsmBase& fsm() const noexcept { return *parts_.fsm; }
-  Task& task() noexcept { return task_; }
-  const Task& task() const noexcept { return task_; }
+  /// What changes it has been through. [rt]
+  ChangeMark& change_mark() MAUVE_RT { return change_mark_; }
+  /// [rt]
+  Task& task() MAUVE_RT { return task_; }
+  const Task& task() const MAUVE_RT { return task_; }
   /// The shell as the type it has. Throws std::bad_cast.
   template <typename ShellType>
   ShellType& shell_as() {
@@ -275,7 +281,9 @@ class Component final : public Configurable {
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
-  std::unique_lock<ChangeLock> join_change() const;
+  /// Its change lock held, and the component claimed, as far as they were not yet.
+  class JoinedChange;
+  JoinedChange join_change();
   Architecture& require_listed() const;
   void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
@@ -290,6 +298,7 @@ class Component final : public Configurable {
   std::string name_;
   std::atomic<Architecture*> architecture_{nullptr};
   Task task_;
+  ChangeMark change_mark_;
   Parts parts_;
   FsmFactory make_fsm_;
   CoreBinding binding_;

@@ -93,7 +93,7 @@ struct ChangeSignal {
 /// | deferrals_ ...         | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
-/// | command_mutex_         | ordinary threads: start, commits      | -            | -                                  |
+/// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task final : public Waiter {
  public:
@@ -196,7 +196,7 @@ class Task final : public Waiter {
   /// After this the machine does not refer to the participant any more. [non-rt]
   void forget_release(Participant& place) noexcept;
   ChangeSignal& changes() noexcept { return changes_; }
-  std::mutex& command_mutex() noexcept { return command_mutex_; }
+  PiMutex& command_mutex() noexcept { return command_mutex_; }
   [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
                                         const std::string& remedy) const;
 
@@ -345,7 +345,7 @@ class Task final : public Waiter {
   Shell* shell_{nullptr};
   CoreBinding* core_{nullptr};
 
-  std::mutex command_mutex_;
+  PiMutex command_mutex_;
   PiMutex order_mutex_;
   Thread thread_;
   pthread_barrier_t* barrier_{nullptr};

@@ -11,6 +11,7 @@
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/value.hpp"
+#include "mauve_rt/change/prepared_transaction.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/rules/engine.hpp"
 
@@ -38,57 +39,66 @@ struct ActionReport {
   std::string failure{};                      // of one that is not: why, in words
 };
 
-/// One transaction of a rule, made anew for each time that it is carried out.
+/// One transaction of a rule, prepared anew for each time that it is carried out.
 ///
-/// "tender": the ordinary thread that makes ready; "stepper": the one that decides.
+/// "tender": the ordinary thread that prepares; "stepper": the one that decides, and commits what is prepared. Steps that
+/// cannot be prepared (configure, resynchronise) are tried beforehand, and carried out by the tender.
 ///
-/// | member       | written by                                       | read by | order                                         |
-/// | ------------ | ------------------------------------------------ | ------- | --------------------------------------------- |
-/// | stage_       | tender: idle <-> ready, begun -> over; stepper: ready -> begun, over -> idle | both | acq_rel: whose turn it is, and hands over how_ |
-/// | how_         | who ends it                                      | stepper | by stage_                                     |
-/// | the rest     | tender                                           | tender  | -                                             |
+/// | member    | written by                                                               | read by | order     |
+/// | --------- | ------------------------------------------------------------------------ | ------- | --------- |
+/// | stage_    | tender: idle <-> ready, begun -> over, heard -> idle; stepper: the others | both   | acq_rel: whose turn it is, and hands over prepared_ and how_ |
+/// | prepared_ | tender; the stepper commits it from ready on                             | both    | by stage_ |
+/// | how_      | who carries it out                                                       | stepper | by stage_ |
+/// | the rest  | tender                                                                   | tender  | -         |
 class Action {
  public:
   /// No steps: the rule has no such action. [setup]
-  explicit Action(ActionSteps steps = {}, const TransactionOptions& options = {})
-      : steps_(std::move(steps)), options_(options) {}
+  explicit Action(ActionSteps steps = {}, const TransactionOptions& options = {});
   Action(const Action&) = delete;
   Action& operator=(const Action&) = delete;
 
-  bool exists() const noexcept { return !steps_.empty(); }
+  /// [rt]
+  bool exists() const MAUVE_RT { return !steps_.empty(); }
+  /// [non-rt]
   const ActionSteps& steps() const noexcept { return steps_; }
 
   // ---- the tender
 
-  /// Makes it ready, where it is not or was at another revision; whether that changed anything. [non-rt]
+  /// Prepares it, where it is not prepared, or was before something changed; whether that changed anything. [non-rt]
   bool tend(Host& host, std::uint64_t revision);
-  /// Finds out whether it could be made ready once `before` is done. [non-rt]
+  /// Finds out whether it could be prepared once `before` is done, where that was done at another revision. [non-rt]
   void try_after(const ActionSteps& before, Host& host, std::uint64_t revision);
   /// It is not to be wished now; whether it was ready. [non-rt]
   bool put_away();
-  /// Carries it out if it was begun; whether it was. [non-rt]
-  bool carry_out(Host& host);
-  /// What came of it, once; waits for the releases that follow. [non-rt]
-  std::optional<ActionReport> complete();
-  /// Why it could not be made ready; empty: it could be, or that was not tried. [non-rt]
+  /// Completes what was committed; carries out what was begun and cannot be prepared: whether it did that. [non-rt]
+  bool settle(Host& host);
+  /// What came of it, once; completes what was committed, and waits for the releases that follow. [non-rt]
+  std::optional<ActionReport> report();
+  /// Why it could not be prepared; empty: it could be, or that was not tried. [non-rt]
   const std::string& problem() const noexcept { return problem_; }
+  /// What is kept prepared. [non-rt]
+  std::size_t memory_bytes() const noexcept { return prepared_ != nullptr ? prepared_->memory_bytes() : 0; }
 
   // ---- the stepper
 
   /// Whether it could begin. [rt]
   bool is_ready() const MAUVE_RT { return stage_.load(std::memory_order_acquire) == Stage::ready; }
-  /// Lets it be carried out; false: it was not ready any more. [rt]
-  bool begin() MAUVE_RT;
+  /// Commits it, or lets the tender carry it out; false: it was not ready any more. [rt] as far as adopt and take are.
+  bool begin() noexcept;
   /// How it has ended, once. [rt]
   std::optional<Ended> ended() MAUVE_RT;
 
  private:
-  enum class Stage : std::uint8_t { idle, ready, begun, over };
+  enum class Stage : std::uint8_t { idle, ready, begun, over, heard };
 
-  bool try_steps(const ActionSteps& steps, Host& host);
+  bool is_wanting(std::uint64_t revision) const;
+  void complete();
+  void carry_out(Host& host);
 
   const ActionSteps steps_;
   const TransactionOptions options_;
+  const bool is_preparable_;
+  std::unique_ptr<PreparedTransaction> prepared_;
   std::unique_ptr<TransactionCommit> committed_;
   std::optional<ActionReport> report_;
   std::string problem_;

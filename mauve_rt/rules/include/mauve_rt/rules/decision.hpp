@@ -54,6 +54,8 @@ struct Decision {
 
 /// Their names, as in SupervisorDecision.msg. [rt]
 std::string_view name_of(Decided decided) MAUVE_RT;
+/// What a trace record of the kind `decision` calls it, with the act: `a` in TraceRecord.msg. [rt]
+std::int64_t trace_code(const Decision& decision) MAUVE_RT;
 /// In words, for people. [rt]
 std::string_view words_of(Why why) MAUVE_RT;
 

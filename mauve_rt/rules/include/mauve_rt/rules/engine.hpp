@@ -105,6 +105,8 @@ class Engine {
   void adopt(std::size_t rule, time_ns_t now_ns) MAUVE_RT;
   /// The architecture is another one: nothing of before counts. [rt]
   void forget() MAUVE_RT;
+  /// The same of one rule, that somebody else is to run: it watches no longer. [rt]
+  void forget(std::size_t rule) MAUVE_RT;
 
   // ---- the stepper: deciding
 

@@ -39,13 +39,14 @@ struct Told {
 struct RuleFacts {
   std::string name{};
   RuleStatus status{};
-  bool ready{false};      // what it would do or undo next could begin
-  std::string problem{};  // why that cannot be made ready, or what it hears not be heard; empty: it can
+  bool ready{false};            // what it would do or undo next could begin
+  std::string problem{};        // why that cannot be prepared, or what it hears not be heard; empty: it can
+  std::size_t memory_bytes{0};  // of what is kept prepared
 };
 
-/// Runs an engine beside the components of a host: decides on a real-time thread above the components and below who
-/// conducts their changes, and makes ready, carries out and tells on an ordinary thread of its own. Neither needs
-/// Python, nor anything of another process.
+/// Runs an engine beside the components of a host: decides and commits on a real-time thread above the components and
+/// below who conducts their changes; prepares, completes and tells on an ordinary thread of its own. Neither needs
+/// Python, but for parts that are written in it, nor anything of another process.
 ///
 /// In virtual time there are no threads: whoever simulates calls advance().
 ///
@@ -62,7 +63,7 @@ struct RuleFacts {
 /// | ends_             | stepper    | tender         | release/acquire: what was done before lies in the architecture   |
 /// | work_ (futex)     | anyone     | tender         | release/acquire: who sees the bump sees the work                 |
 /// | ending_ (futex)   | stop()     | both           | release/acquire                                                  |
-/// | told_, problems_, woken_ | tender, wake() | anyone | told_mutex_                                                    |
+/// | told_, kept_, woken_ | tender, wake() | anyone | told_mutex_                                                    |
 class Reflex {
  public:
   /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
@@ -85,7 +86,7 @@ class Reflex {
   void wake();
   /// [non-rt]
   std::vector<RuleFacts> facts() const;
-  /// How many decisions nobody took in time. [non-rt]
+  /// How many decisions nobody took in time. [rt]
   std::uint64_t lost() const MAUVE_RT { return engine_->lost(); }
 
   /// In virtual time: does all that is to be done now; when it has to be called again at the latest. [non-rt]
@@ -99,6 +100,7 @@ class Reflex {
     Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
 
     std::array<Action, 2> acts;           // by Act
+    std::uint32_t name{0};                // in the trace
     std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
     std::atomic<bool> in_effect{false};
     RuleStatus status{};
@@ -113,8 +115,9 @@ class Reflex {
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
   void show_status() MAUVE_RT;
   bool tend();
-  bool look_around();
+  bool look_around(std::uint64_t ends);
   bool make_ready(Rule& rule, std::uint64_t revision);
+  void keep(std::size_t index, const Rule& rule, const std::string& deaf);
   void tell();
   std::string follow();
   void end() noexcept;
@@ -134,8 +137,14 @@ class Reflex {
   mutable std::mutex told_mutex_;
   std::condition_variable told_changed_;
   std::deque<Told> told_;
-  std::vector<std::string> problems_;  // by rule
+  struct Kept {
+    std::string problem{};
+    std::size_t memory_bytes{0};
+    bool operator==(const Kept&) const = default;
+  };
+  std::vector<Kept> kept_;  // by rule
   bool woken_{false};
+  std::uint16_t trace_number_;
 };
 
 }  // namespace mauve::rules

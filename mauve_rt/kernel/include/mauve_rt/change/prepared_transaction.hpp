@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// PreparedTransaction: a transaction of which only the commit is left, for a real-time thread to make.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "mauve_rt/architecture/prepared_change.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/change/transaction.hpp"
+
+namespace mauve {
+
+class Architecture;
+class Runner;
+
+enum class PreparedOutcome : std::uint8_t {
+  committed,  // it is in force
+  stale,      // what it was prepared against has changed, or it was committed already
+  refused,    // by the adopt of a new core
+  timed_out,  // its components were not together in their waits in time, or what commit() waits for lasted
+  withdrawn,  // a component was stopped or faulted meanwhile, or the host was shut down
+};
+/// [rt]
+const char* to_string(PreparedOutcome outcome) MAUVE_RT;
+
+/// One transaction on a deployed architecture, drafted, built, configured and prefaulted; made by Host::prepare(). The host
+/// and the architecture outlive it. Unless commit() answers `committed` nothing was changed.
+///
+/// It is stale once another change of a component that it touches was committed, or once one of these was started, stopped
+/// or faulted; where it adds, removes, wires, or replaces a shell or an fsm, once any change did that; and once the host was
+/// shut down. While an ordinary change of a component that it touches is under way, from its draft to its end, it is stale as
+/// well: what hooks read then is not to be exchanged beneath them. It is current again when that one was refused.
+///
+/// commit() waits for nobody's preparation. It waits, until its time-out, for no more than: an ordinary commit under way,
+/// which it calls off, to leave its gate (an adopt or take that has begun ends first); another prepared commit; a start()
+/// of a component that it touches, or the end of such a one's thread; its own components to come to their waits. Beyond the
+/// time-out it waits for its own adopt and take, where these run on a component's thread no longer than Commit::kPatience,
+/// and for the threads of components that it starts to take up the start. It allocates only where it gives up a component
+/// whose adopt or take does not end.
+///
+/// After the commit, lists, described wiring and properties are those of before until complete(), or until the next change of the
+/// architecture, which completes it first; until then a component with a new shell or fsm has no fallback, and one that was
+/// added is not stopped by a shutdown.
+class PreparedTransaction final : private PreparedChange {
+ public:
+  /// By Host::prepare(). [non-rt] Throws as Architecture::make().
+  PreparedTransaction(Architecture& architecture, Runner& host, Transaction transaction,
+                      const TransactionOptions& options);
+  /// Completes what was committed, lets go of what was not; waits for a change under way. [non-rt]
+  ~PreparedTransaction() override;
+  PreparedTransaction(const PreparedTransaction&) = delete;
+  PreparedTransaction& operator=(const PreparedTransaction&) = delete;
+
+  /// Whether nothing that it was prepared against has changed. [rt]
+  bool is_current() const MAUVE_RT;
+  /// Makes the change, once, whatever it answers; the second call answers stale. [rt] as far as adopt and take are.
+  PreparedOutcome commit(time_ns_t timeout_ns) noexcept;
+  /// Publishes and retires what was committed, unless the next change did; returns its report, or throws Error in words
+  /// where commit() did not answer `committed`. Waits for a change under way. After commit(); may be called again. [non-rt]
+  TransactionReport complete();
+  /// What the calling thread allocated for it and still holds, as far as the allocator's figures tell. [non-rt]
+  std::size_t memory_bytes() const noexcept;
+
+ private:
+  class State;
+
+  void settle() noexcept override;
+  void drop_if_stale() noexcept override;
+  void note_failure() noexcept;
+  void let_go() noexcept;
+
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace mauve
