@@ -16,6 +16,14 @@ from mauve_rt.trace.reading.trace import Trace
 
 COMPONENT = "metronome"
 ARCHITECTURE = ROOT / "mauve_examples" / "architecture" / "metronome.yaml"
+_RULES = f"""\
+mauve: 1
+rules:
+  - name: quiet
+    in: supervisor
+    when: {{silence: {{topic: beat, type: std_msgs/msg/Float64, longer_than_s: 60.0}}}}
+    do: [{{kind: replace_core, target: {COMPONENT}, name: mauve_examples/Accelerando}}]
+"""
 
 
 class BusyExecutor:
@@ -65,6 +73,19 @@ class BusyExecutor:
     def stop(self) -> None:
         """Stop the component; executor and load go on."""
         self._executor.stop(self._client, COMPONENT)
+
+    def lose_supervisor(self) -> None:
+        """Start a supervisor of the executor, and kill it once it watches.
+
+        Raises:
+            BenchmarkError: it does not come to that.
+        """
+        rules = self._processes.folder / "rules.yaml"
+        rules.write_text(_RULES, encoding="utf-8")
+        words = ("-r", f"__ns:={self._executor.namespace}", "-p", f"rules:={rules}")
+        self._processes.spawn("supervisor", "-m", "mauve_rt.node.supervisor.main", "--ros-args", *words)
+        self._processes.await_output("supervisor", "armed")
+        self._processes.kill("supervisor")
 
     def finish(self) -> Trace:
         """End both processes and read the bag.

@@ -30,6 +30,7 @@ from reconfiguration import (
 )
 from recording import recording_rows
 from recording_killed import kill_rows
+from reflex import reflex_rows
 from rows import Row, markdown, not_available
 from scale import idle_rows, scale_rows, simulation_rows
 from service_calls import service_rows, service_stop_rows
@@ -51,6 +52,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "prefault": prefault_rows,
     "transaction": transaction_rows,
     "refused": refused_rows,
+    "reflex": reflex_rows,
     "shared-data": shared_data_rows,
     "latest-value": latest_value_rows,
     "activation": activation_rows,

@@ -14,6 +14,7 @@ class Settings:
     stops: int
     busy_stops: int
     deployments: int
+    reactions: int
     restarts: int
     inversions: int
     scale_s: float
@@ -36,6 +37,7 @@ QUICK = Settings(
     stops=30,
     busy_stops=10,
     deployments=8,
+    reactions=100,
     restarts=100,
     inversions=2,
     scale_s=0.3,
@@ -55,6 +57,7 @@ FULL = Settings(
     stops=100,
     busy_stops=40,
     deployments=30,
+    reactions=500,
     restarts=50,
     inversions=10,
     scale_s=1.0,

@@ -101,6 +101,31 @@ class Witness {
   RealtimeThread thread_;
 };
 
+/// How much of an interval stalls take, none of which overlap.
+inline mauve::time_ns_t stalled_ns(const std::vector<Stall>& stalls, mauve::time_ns_t from_ns,
+                                   mauve::time_ns_t until_ns) {
+  mauve::time_ns_t sum = 0;
+  for (const Stall& stall : stalls) {
+    sum +=
+        std::max<mauve::time_ns_t>(0, std::min(stall.end_ns, until_ns) - std::max(stall.begin_ns, from_ns));
+  }
+  return sum;
+}
+
+/// Stalls of several CPUs as intervals that do not overlap.
+inline std::vector<Stall> merged(std::vector<Stall> stalls) {
+  std::sort(stalls.begin(), stalls.end(),
+            [](const Stall& one, const Stall& other) { return one.begin_ns < other.begin_ns; });
+  std::vector<Stall> apart;
+  for (const Stall& stall : stalls) {
+    if (!apart.empty() && stall.begin_ns <= apart.back().end_ns)
+      apart.back().end_ns = std::max(apart.back().end_ns, stall.end_ns);
+    else
+      apart.push_back(stall);
+  }
+  return apart;
+}
+
 /// Releases that are missing between consecutive nominal instants. The machine's are as many as it stood still for where
 /// that was more than 500 us, in one piece or, as hosts do, in several.
 struct Missed {
@@ -119,13 +144,9 @@ inline Missed count_missed(mauve::time_ns_t before_ns, mauve::time_ns_t after_ns
                            const std::vector<Stall>& stalls) {
   const std::int64_t count = (after_ns - before_ns) / period_ns - 1;
   if (count <= 0) return {};
-  mauve::time_ns_t stalled_ns = 0;
-  for (const Stall& stall : stalls) {
-    stalled_ns +=
-        std::max<mauve::time_ns_t>(0, std::min(stall.end_ns, after_ns) - std::max(stall.begin_ns, before_ns));
-  }
-  if (stalled_ns <= mauve::us_to_ns(500)) return {.ours = count};
-  const std::int64_t machines = std::min(count, stalled_ns / period_ns + 1);
+  const mauve::time_ns_t stood_still_ns = stalled_ns(stalls, before_ns, after_ns);
+  if (stood_still_ns <= mauve::us_to_ns(500)) return {.ours = count};
+  const std::int64_t machines = std::min(count, stood_still_ns / period_ns + 1);
   return {.ours = count - machines, .machines = machines};
 }
 inline Missed count_missed(const std::vector<mauve::time_ns_t>& nominal_ns, mauve::time_ns_t period_ns,
