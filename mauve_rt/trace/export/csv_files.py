@@ -24,6 +24,7 @@ _FRAMES: dict[str, Callable[[Trace], pd.DataFrame]] = {
     "services": frames.services,
     "contention": frames.contention,
     "marks": frames.marks,
+    "decisions": frames.decisions,
     "records": frames.records,
 }
 _ROWS_AT_ONCE = 100_000

@@ -3,7 +3,8 @@
 Every executor is a process, every component a track of it: states and services are slices, releases the
 time from the nominal to the actual instant, overruns, faults, stops and marks instants with their figures.
 Each reconfiguration is a slice from parked to armed, and a flow from the request to it to the next release.
-A track `requests` has who asked for what; a counter below each component its wake-up latency.
+A track `requests` has who asked for what, a track `rules` what the executor's rules decided; a counter below
+each component its wake-up latency.
 
 Timestamps are the records' own, ns of CLOCK_MONOTONIC, which the file declares to be the trace's clock and
 relates to CLOCK_REALTIME by the pairs that the bag has.
@@ -27,6 +28,7 @@ from mauve_rt.trace.export.packets import (
 from mauve_rt.trace.export.swaps import RequestSlice, find_requests, find_swaps, number_flows
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.architecture import ComponentInfo
+from mauve_rt.trace.reading.decisions import explained_decisions
 from mauve_rt.trace.reading.trace import Trace, merge_traces
 
 _SNAPSHOT_EVERY_NS = 1_000_000_000
@@ -71,6 +73,7 @@ def _write_executor(
     flow = number_flows(every, flow)
     for request in requests:
         _write_request(file, process, request)
+    _write_decisions(file, process, trace)
     about = {one.name: _description(one) for one in trace.architecture}
     for rank, (component, own) in enumerate(swaps.items(), start=1):
         described = {"description": about[component]} if component in about else {}
@@ -103,6 +106,20 @@ def _write_request(file: PacketFile, process: int, request: RequestSlice) -> Non
     flows = [swap.flow for swap in request.swaps]
     track.begin(request.begin_ns, str(said.request), "request", figures, flows=flows)
     track.end(request.end_ns)
+
+
+def _write_decisions(file: PacketFile, process: int, trace: Trace) -> None:
+    """Write an instant of each decision of the rules; no track when there is none."""
+    found = explained_decisions(trace)
+    if not found:
+        return
+    track = Track(file, file.add_track("rules", parent=process))
+    for one in found:
+        said = one.traced
+        figures: dict[str, Figure] = {"rule": said.rule, "decision": said.decision, "reason": one.reason}
+        figures |= {"why": said.why} if said.why else {}
+        figures["since_cause_ns"] = said.time_ns - said.cause_ns
+        track.instant(said.time_ns, f"{said.rule}: {said.decision}", "decision", figures)
 
 
 def _write_clocks(file: PacketFile, traces: Mapping[str, Trace]) -> None:

@@ -55,6 +55,19 @@ class BagFile(NamedTuple):
     """Why not all; empty when it could."""
 
 
+class TracedDecision(NamedTuple):
+    """What a rule of the executor decided. Times in ns of CLOCK_MONOTONIC."""
+
+    time_ns: int
+    rule: str
+    decision: str
+    """In the words of TraceRecord.msg, e.g. `condition true`, `do`, `undone`, `no do`."""
+    cause_ns: int
+    """Its condition is as it is since then."""
+    why: str
+    """Why nothing was done or it failed; empty where there is nothing to tell."""
+
+
 class Message(NamedTuple):
     """A message of another topic than the trace itself."""
 

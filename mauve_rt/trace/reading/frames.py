@@ -13,7 +13,8 @@ import numpy.typing as npt
 import pandas as pd
 
 from mauve_rt.trace.format.records import RECORD, Kind, Records
-from mauve_rt.trace.reading.facts import Deployment
+from mauve_rt.trace.reading.decisions import explained_decisions
+from mauve_rt.trace.reading.facts import Deployment, TracedDecision
 from mauve_rt.trace.reading.pairs import Indices, following, nested
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.reconfigurations import reconfigurations as find_reconfigurations
@@ -90,6 +91,16 @@ def marks(trace: Trace) -> pd.DataFrame:
     component, rows = _of_kind(trace, Kind.MARK)
     own = {key: rows[key] for key in ("time_ns", "a", "b", "c")}
     return pd.DataFrame({"component": component, "mark": _words(trace, rows["name"]), **own})
+
+
+def decisions(trace: Trace) -> pd.DataFrame:
+    """What rules decided: time_ns, rule, decision, cause_ns, why, reason, took_s, bound_s (unknown: NaN)."""
+    found = explained_decisions(trace)
+    columns = {name: [getattr(one.traced, name) for one in found] for name in TracedDecision._fields}
+    columns |= {name: [getattr(one, name) for one in found] for name in ("reason", "took_s", "bound_s")}
+    kinds = {"time_ns": "int64", "cause_ns": "int64", "took_s": "float64", "bound_s": "float64"}
+    words = dict.fromkeys(("rule", "decision", "why"), "category")
+    return pd.DataFrame(columns).astype(kinds | words)
 
 
 def deployments(trace: Trace) -> pd.DataFrame:
@@ -252,6 +263,11 @@ class Frames:
     def marks(self) -> pd.DataFrame:
         """As frames.marks."""
         return marks(self._trace)
+
+    @cached_property
+    def decisions(self) -> pd.DataFrame:
+        """As frames.decisions."""
+        return decisions(self._trace)
 
     @cached_property
     def deployments(self) -> pd.DataFrame:

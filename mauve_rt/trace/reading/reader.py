@@ -24,6 +24,7 @@ from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.format.records import RECORD, Records
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
+from mauve_rt.trace.reading.decisions import RULES, traced_decisions
 from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message
 from mauve_rt.trace.reading.trace import Trace
 
@@ -34,6 +35,7 @@ _ARCHITECTURE_TYPE = f"{_PACKAGE}/TraceArchitecture"
 _OWN_TYPES = (_BATCH_TYPE, _NAMES_TYPE, _ARCHITECTURE_TYPE)
 _DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
 _NOTHING = Batch(0, 0, (), (), b"")
+_NO_RECORDS = np.empty(0, RECORD)
 _RECORD_FIELDS = [
     ("uint64", "sequence"), ("int64", "time_ns"), ("int64", "a"), ("int64", "b"), ("int64", "c"),
     ("uint32", "name"), ("uint16", "kind"), ("uint16", "component"),
@@ -131,6 +133,8 @@ class _Content:
         pairs = pairs.reshape(-1, 2)
         pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
         records, losses = _per_component(self._batches, self._components)
+        losses.pop(RULES, None)
+        decided = records.pop(RULES, _NO_RECORDS)
         return Trace(
             records,
             self._names,
@@ -142,6 +146,7 @@ class _Content:
             files=tuple(self.files),
             topics=self._all_topics,
             kinds=self._kinds,
+            decisions=traced_decisions(decided, self._names, self._kinds),
         )
 
 

@@ -13,7 +13,7 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.kinds import RecordKind, kinds_known
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.architecture import ComponentInfo
-from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, MessageSource
+from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, MessageSource, TracedDecision
 
 if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
@@ -44,6 +44,8 @@ class Trace:
     """Of every topic in the bag, the trace's own too: type and number of messages."""
     kinds: Mapping[int, RecordKind] = field(default_factory=kinds_known)
     """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
+    decisions: tuple[TracedDecision, ...] = ()
+    """Of the executor's rules, by time; empty when it ran none."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -59,6 +61,8 @@ class Trace:
     def span_ns(self) -> tuple[int, int]:
         """Time of the first and of the last record; zeros when there is none."""
         rows = [records["time_ns"] for records in self.records.values() if len(records)]
+        if self.decisions:
+            rows.append(np.array([one.time_ns for one in self.decisions], np.int64))
         return (min(int(row.min()) for row in rows), max(int(row.max()) for row in rows)) if rows else (0, 0)
 
     def of(self, component: str, *kinds: int) -> Records:
@@ -115,7 +119,7 @@ class Trace:
 
 
 def merge_traces(traces: Mapping[str, Trace]) -> Trace:
-    """Return one trace of several executors; components are named <key>/<component>.
+    """Return one trace of several executors; components are named <key>/<component>, rules <key>/<rule>.
 
     Raises:
         TraceError: they were recorded on machines, or after boots, with different monotonic clocks.
@@ -162,7 +166,15 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         files=tuple(file for trace in traces.values() for file in trace.files),
         topics=_all_topics(traces.values()),
         kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
+        decisions=_all_decisions(traces),
     )
+
+
+def _all_decisions(traces: Mapping[str, Trace]) -> tuple[TracedDecision, ...]:
+    named = [
+        one._replace(rule=f"{key}/{one.rule}") for key, trace in traces.items() for one in trace.decisions
+    ]
+    return tuple(sorted(named, key=lambda one: one.time_ns))
 
 
 def _all_topics(traces: Iterable[Trace]) -> dict[str, tuple[str, int]]:

@@ -1,13 +1,14 @@
 """Everything the parts of a report tell about one trace, computed once."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, silent
+from mauve_rt.trace.reading.decisions import ExplainedDecision, explained_decisions
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.reading.statistics import ComponentStatistics, component_statistics
 from mauve_rt.trace.reading.trace import Trace
@@ -48,6 +49,8 @@ class Analysis:
     end_ns: int
     zero_ns: int
     """What the page's clock counts from."""
+    decisions: list[ExplainedDecision] = field(default_factory=list)
+    """Of the executor's rules, by time."""
 
     @property
     def duration_ns(self) -> int:
@@ -103,6 +106,7 @@ def analyse(
         begin_ns=begin_ns,
         end_ns=end_ns,
         zero_ns=begin_ns if zero_ns is None else zero_ns,
+        decisions=explained_decisions(trace),
     )
 
 

@@ -10,6 +10,7 @@ from mauve_rt.trace.report.analysis import Analysis, analyse
 from mauve_rt.trace.report.architecture_graph import architecture_section
 from mauve_rt.trace.report.blocks import Card, Section, cards
 from mauve_rt.trace.report.comparison import reconfigurations_section
+from mauve_rt.trace.report.decisions import decisions_section
 from mauve_rt.trace.report.detail import BUDGET
 from mauve_rt.trace.report.distributions import distributions_section
 from mauve_rt.trace.report.key_figures import key_figures
@@ -65,6 +66,7 @@ def write_report(
     described, data = timeline_data(analysis, budget=budget)
     makers: tuple[Callable[[Analysis], Section | None], ...] = (
         reconfigurations_section,
+        decisions_section,
         distributions_section,
         architecture_section,
         components_section,

@@ -9,6 +9,7 @@ import numpy as np
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.columns import Columns
 from mauve_rt.trace.report.cycles import Array, Times
+from mauve_rt.trace.report.decisions import decision_flags, decision_places
 from mauve_rt.trace.report.detail import BUDGET, Detail, choose_detail
 from mauve_rt.trace.report.markers import Markers, markers_of
 
@@ -33,6 +34,7 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
         "names": list(analysis.trace.names),
         "rows": rows,
         "swaps": _swaps(analysis)[:_SHOWN_SWAPS],
+        "decisions": decision_flags(analysis),
         "jumps": _jumps(analysis, markers),
         "kept": [] if detail.full else (detail.kept_ns - analysis.begin_ns).tolist(),
         "bucket": detail.bucket_ns,
@@ -42,8 +44,9 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
 
 
 def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) -> Times:
-    """Instants around which a person will look: reconfigurations, what went wrong, begin and end."""
+    """Instants to look around: reconfigurations, decisions, what went wrong, begin and end."""
     found: list[Any] = [[analysis.begin_ns, analysis.end_ns]]
+    found.append([one.traced.time_ns for one in analysis.decisions[:_JUMPS]])
     found += [[swap.measured.parked_ns, swap.measured.armed_ns] for swap in analysis.swaps[:_SHOWN_SWAPS]]
     for component, kinds in markers.items():
         for kind, entries in kinds:
@@ -155,6 +158,7 @@ def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, l
     found: dict[str, list[list[int]]] = {
         kind: [] for kind in ("swap", "overrun", "fault", "wakeup", "response")
     }
+    found["decision"] = decision_places(analysis)
     found["swap"] = [
         [one["row"], one["parked"], one["armed"] - one["parked"]] for one in _swaps(analysis)[:_JUMPS]
     ]

@@ -9,6 +9,7 @@ from mauve_rt.trace.report.units import counted, time_text
 
 _JUMPS = (
     ("swap", "Reconfigurations"),
+    ("decision", "Decisions"),
     ("overrun", "Overruns"),
     ("fault", "Faults"),
     ("wakeup", "Worst wake-ups"),
@@ -34,7 +35,9 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         return Section("Timeline", '<p class="nothing">The trace holds no record.</p>', anchor="timeline")
     jumps = "".join(_jump(kind, name, len(described["jumps"][kind])) for kind, name in _JUMPS)
     names = "".join(_row_name(analysis, index) for index in range(len(analysis.trace.components)))
-    shown = [*_KEYS, ("kept", "kept in full")] if described["bucket"] else _KEYS
+    rules = '<div class="rules-name"><b>rules</b></div>' if described["decisions"] else ""
+    shown = [*_KEYS, *([("decision", "decision of a rule")] if rules else [])]
+    shown += [("kept", "kept in full")] if described["bucket"] else []
     keys = "".join(f'<span><i class="key-{kind}"></i>{name}</span>' for kind, name in shown)
     html = (
         f'<div class="toolbar">{jumps}<span class="zoom">'
@@ -45,7 +48,7 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         'role="application" '
         'aria-label="timeline: arrow keys move, plus and minus zoom, 0 shows everything">'
         '<div class="overview"><canvas></canvas></div>'
-        f'<div class="lanes"><div class="names"><div class="axis-room"></div>{names}</div>'
+        f'<div class="lanes"><div class="names"><div class="axis-room"></div>{names}{rules}</div>'
         '<div class="plot"><canvas></canvas></div></div></div>'
         f'<p class="where" aria-live="polite"></p><p class="keys">{keys}</p>'
     )

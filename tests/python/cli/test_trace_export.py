@@ -16,6 +16,7 @@ from mauve_rt.trace.recording.trace_bag import TraceBag
 TABLES = {
     "components",
     "contention",
+    "decisions",
     "deployments",
     "marks",
     "overruns",

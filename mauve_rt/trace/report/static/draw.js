@@ -328,7 +328,8 @@
   // One whole picture of what is in view.
   mauve.drawTimeline = function (context, model, view, width, rowHeight, colours) {
     const scale = new Scale(view, width);
-    const height = mauve.AXIS_HEIGHT + model.rows.length * rowHeight;
+    const lanes = mauve.AXIS_HEIGHT + model.rows.length * rowHeight;
+    const height = lanes + mauve.rulesHeight(model);
     context.clearRect(0, 0, width, height);
     drawAxis(context, model, scale, height, colours);
     model.rows.forEach(function (row, index) {
@@ -343,6 +344,7 @@
       const top = mauve.AXIS_HEIGHT + index * rowHeight;
       drawMarkers(context, row, scale, top + 14, top + rowHeight - 5, colours);
     });
+    mauve.drawDecisions(context, model, scale, lanes, colours);
   };
 
   // The whole trace, small: a strip per row, then what went wrong, then the reconfigurations.

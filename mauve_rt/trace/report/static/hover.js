@@ -163,6 +163,7 @@
       if (executed.some((block) => block.merged)) found.push({ notes: [MERGED] });
       if (found.length) found.unshift({ title: row.name });
     }
+    if (index >= timeline.model.rows.length) found.push(...mauve.decisionsAt(timeline, time, pixel));
     return { index: row ? index : -1, blocks: found, time };
   };
 

@@ -1,9 +1,12 @@
-// Buttons that go to the next reconfiguration, overrun, worst wake-up, ...
+// Buttons that go to the next reconfiguration, decision, overrun, worst wake-up, ...
 (function (mauve) {
   "use strict";
 
+  const AROUND_DECISION = 50e6; // ns
+
   // How much is shown around a place: some of its length, some periods of its row.
   function around(timeline, kind, [row, time, length]) {
+    if (kind === "decision") return [time - AROUND_DECISION, time + AROUND_DECISION];
     const period = timeline.model.rows[row].period || 0;
     if (kind === "swap") {
       const half = Math.max(length * 4, 2e3);

@@ -38,7 +38,7 @@
     }
 
     resize() {
-      const height = mauve.AXIS_HEIGHT + this.model.rows.length * this.rowHeight;
+      const height = mauve.AXIS_HEIGHT + this.model.rows.length * this.rowHeight + mauve.rulesHeight(this.model);
       this.context = fitted(this.canvas, this.width, height);
       const box = this.overview.parentElement;
       this.overviewContext = fitted(this.overview, box.clientWidth, box.clientHeight);

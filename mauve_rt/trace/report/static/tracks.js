@@ -115,6 +115,7 @@
       rows,
       names: described.names,
       swaps: described.swaps,
+      decisions: described.decisions,
       jumps: described.jumps,
       kept: described.kept,
       bucket: described.bucket,
