@@ -82,12 +82,17 @@ def _swap(swap: dict[str, Any]) -> str:
     words = [f"{swap['component']}: {change}"]
     if swap["silence_ms"] is not None:
         words.append(f"{swap['silence_ms']:.0f} ms after the last sample")
+    if swap.get("took_ms") is not None:
+        bound = f" (at most {swap['bound_ms']:.1f} ms)" if swap["bound_ms"] is not None else ""
+        words.append(f"at work {swap['took_ms']:.1f} ms after the condition became so{bound}")
     if swap["prepare_us"] is not None:
         words.append(f"prepared in {swap['prepare_us']:.0f} us")
     if swap["blackout_us"] is not None:
         words.append(f"blackout {swap['blackout_us']:.0f} us")
     if swap["missed_releases"] is not None:
         words.append(f"{swap['missed_releases']} releases missed")
+    if swap.get("decided_by"):
+        words.append(f"decided by {swap['decided_by']}")
     return ", ".join(words)
 
 

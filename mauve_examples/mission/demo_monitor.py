@@ -84,7 +84,8 @@ class MissionMonitor:
         self._listen(MapUpdate, f"/{robot}/map_updates", to(hooks.map_update), QUEUE)
         self._listen(ArchitectureState, f"/{robot}/executor/state", to(hooks.state), LATCHED)
         self._listen(ReconfigurationEvent, f"/{robot}/executor/events", to(hooks.event), QUEUE)
-        self._listen(SupervisorDecision, f"/{robot}/supervisor/decisions", to(hooks.decision), RECENT)
+        for node in ("executor", "supervisor"):
+            self._listen(SupervisorDecision, f"/{robot}/{node}/decisions", to(hooks.decision), RECENT)
         self._listen(Bool, f"/{robot}/done", lambda message: hooks.done(robot, message.data), QUEUE)
 
     def _listen(self, kind: Any, topic: str, callback: Callable[[Any], None], qos: Any) -> None:

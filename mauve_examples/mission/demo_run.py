@@ -114,6 +114,7 @@ class MissionRun(Mission):
                 "bag": str(bag),
                 "autostart": "false",
                 "record_topics": json.dumps(RECORDED),
+                **({"rules": str(setup.rules)} if setup.rules is not None else {}),
             }
             arguments = ros_arguments(parameters)
             executor = "mauve_rt.node.executor.main"

@@ -25,7 +25,6 @@ from mauve_rt.trace import TraceError
 T = TypeVar("T")
 MS, S = 1_000_000, 1_000_000_000
 CARRY_PERIOD_NS = 10 * MS  # topics and radio
-RULES_PERIOD_NS = 20 * MS
 STATE_PERIOD_NS = 100 * MS
 RECORD_PERIOD_NS = 500 * MS
 FLUSH_PERIOD_NS = 10 * S
@@ -90,7 +89,12 @@ class SimulatedMission(Mission):
         for setup in setups:
             bag = options.out / "bag" / setup.name
             executor = SimulatedExecutor(
-                self._time, self._topics, setup.architecture, bag, complain=self.trouble.append
+                self._time,
+                self._topics,
+                setup.architecture,
+                bag,
+                complain=self.trouble.append,
+                rules=setup.rules,
             )
             self._executors[setup.name] = executor
             executor.record_topic(LINK)
@@ -109,7 +113,8 @@ class SimulatedMission(Mission):
         listen(f"/{robot}/map_updates", to(self.coverage.update))
         listen(f"/{robot}/executor/state", to(self.story.on_state))
         listen(f"/{robot}/executor/events", to(self.story.on_event))
-        listen(f"/{robot}/supervisor/decisions", to(self.story.on_decision))
+        for node in ("executor", "supervisor"):
+            listen(f"/{robot}/{node}/decisions", to(self.story.on_decision))
         listen(f"/{robot}/done", lambda sample: self.story.on_done(robot, sample.message().data))
         listen(f"/{robot}/radio/out", lambda sample: self._send(robot, sample))
 
@@ -132,7 +137,6 @@ class SimulatedMission(Mission):
         for executor in executors:
             executor.activate()
         simulated.every(first_ns, CARRY_PERIOD_NS, lambda: _each(executors, SimulatedExecutor.carry))
-        simulated.every(first_ns, RULES_PERIOD_NS, lambda: _each(self._supervisors, SimulatedSupervisor.tick))
         simulated.every(first_ns, STATE_PERIOD_NS, lambda: _each(executors, SimulatedExecutor.refresh))
         simulated.every(first_ns, RECORD_PERIOD_NS, lambda: _each(executors, SimulatedExecutor.record))
         simulated.every(first_ns, FLUSH_PERIOD_NS, lambda: _each(executors, SimulatedExecutor.flush))

@@ -18,6 +18,8 @@ COVERAGE_PERIOD_NS = 250_000_000
 Timed = list[tuple[int, Any]]
 """(ns of CLOCK_MONOTONIC, message), by time."""
 
+DECISIONS = ("executor/decisions", "supervisor/decisions")
+
 
 @dataclass(frozen=True, kw_only=True)
 class RobotEvidence:
@@ -61,8 +63,7 @@ def read_robot(directory: Path, robot: str, facts: MissionFacts) -> RobotEvidenc
     """
     trace = open_trace(directory)
     topics = {
-        name: f"/{robot}/{name}"
-        for name in ("pose", "goal", "map_updates", "executor/events", "supervisor/decisions")
+        name: f"/{robot}/{name}" for name in ("pose", "goal", "map_updates", "executor/events", *DECISIONS)
     }
     found: dict[str, Timed] = {topic: [] for topic in topics.values()}
     for message in trace.messages(*topics.values()):
@@ -74,7 +75,7 @@ def read_robot(directory: Path, robot: str, facts: MissionFacts) -> RobotEvidenc
         goals=_places(found[topics["goal"]], facts),
         map_updates=found[topics["map_updates"]],
         events=found[topics["executor/events"]],
-        decisions=found[topics["supervisor/decisions"]],
+        decisions=sorted((one for name in DECISIONS for one in found[topics[name]]), key=lambda one: one[0]),
     )
 
 

@@ -114,13 +114,17 @@ def swap_in_words(swap: Swap) -> str:
     what = f"is reconfigured ({one.what})"
     if swap.to_core:
         what = f"replaces {short(swap.from_core)} by {short(swap.to_core)}"
-    cause = f" ({swap.cause})" if swap.cause else ""
+    by = f", decided by {swap.decided_by}" if swap.decided_by else ""
+    cause = f" ({swap.cause}{by})" if swap.cause else ""
     return f"{swap.robot} {what} in its component {one.component}{cause}: {', '.join(_costs(swap))}."
 
 
 def _costs(swap: Swap) -> list[str]:
     one = swap.measured
     costs = [f"parked for {time_text(one.blackout_ns)}"]
+    if swap.took_ms is not None:
+        bound = f", {time_text(swap.bound_ms * 1e6)} at most" if swap.bound_ms is not None else ""
+        costs.append(f"released {time_text(swap.took_ms * 1e6)} after the condition became so{bound}")
     if swap.prepare_us:  # nothing in simulated time
         costs.insert(0, f"prepared in {time_text(swap.prepare_us * 1e3)} while the old core ran on")
     if one.missed_releases is not None:

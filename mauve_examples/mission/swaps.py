@@ -26,6 +26,12 @@ class Swap:
     silence_ms: float | None
     """Silence on which the supervisor decided; None when nobody decided on silence."""
     prepare_us: float | None
+    decided_by: str = ""
+    """The node whose rule it was; empty when it was no rule's."""
+    took_ms: float | None = None
+    """From the instant at which the rule's condition became true to the first release after."""
+    bound_ms: float | None = None
+    """How long that takes at most."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the entry of summary.json."""
@@ -36,6 +42,9 @@ class Swap:
             "to": self.to_core,
             "cause": self.cause,
             "silence_ms": self.silence_ms,
+            "decided_by": self.decided_by or None,
+            "took_ms": self.took_ms,
+            "bound_ms": self.bound_ms,
             "prepare_us": self.prepare_us,
             "blackout_us": one.blackout_ns / 1e3,
             "missed_releases": one.missed_releases,
@@ -72,20 +81,43 @@ def swap_problems(facts: MissionFacts, robot: str, swaps: list[Swap]) -> list[st
 
 def _joined(evidence: RobotEvidence, one: Reconfiguration, request: RequestTold | None) -> Swap:
     cause = "" if request is None else request.cause
+    decision, done = _decided(evidence.decisions, cause, one.parked_ns)
     return Swap(
         robot=evidence.robot,
         measured=one,
         from_core=(request.from_core or None) if request is not None else None,
         to_core=(request.to_core or None) if request is not None else None,
         cause=cause,
-        silence_ms=_silence_ms(evidence.decisions, cause),
+        silence_ms=_ms(decision, "silence_s"),
+        decided_by=request.requested_by if request is not None and decision is not None else "",
+        took_ms=_ms(done, "took_s"),
+        bound_ms=_ms(done, "bound_s"),
         prepare_us=None if request is None else (request.prepare_ns or 0) / 1e3,
     )
 
 
-def _silence_ms(decisions: Timed, cause: str) -> float | None:
-    """Of the supervisor's decision to act that the event names as its cause, whenever it was recorded."""
-    for _, message in decisions:
-        if message.decision in _ACTED and f"{message.rule}: {message.reason}" == cause:
-            return None if message.silence_s < 0 else float(message.silence_s) * 1e3
-    return None
+def _decided(decisions: Timed, cause: str, parked_ns: int) -> tuple[Any, Any]:
+    """The decision to act that the event names as its cause, and the one that says it is done, if any.
+
+    Of several with this cause the one nearest to the reconfiguration: each may be told some 100 ms late.
+    """
+    acted = [one for one in decisions if _is_named(one[1], cause)]
+    if not acted:
+        return None, None
+    time_ns, message = min(acted, key=lambda one: abs(one[0] - parked_ns))
+    after = (
+        each
+        for at_ns, each in decisions
+        if at_ns >= time_ns and (each.rule, each.decision) == (message.rule, "done")
+    )
+    return message, next(after, None)
+
+
+def _is_named(decision: Any, cause: str) -> bool:
+    return decision.decision in _ACTED and f"{decision.rule}: {decision.reason}" == cause
+
+
+def _ms(decision: Any, name: str) -> float | None:
+    """A time of a decision; None where it is not known, as in bags of before."""
+    seconds = getattr(decision, name, -1.0)
+    return None if seconds < 0 else float(seconds) * 1e3

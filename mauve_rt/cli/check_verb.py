@@ -85,18 +85,17 @@ def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
-    from mauve_rt.supervision.rehearsal import try_rule  # noqa: PLC0415
-    from mauve_rt.supervision.rule_types import heard_type  # noqa: PLC0415
+    from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
+    from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(path)
-    rules = file.rules.rules
-    for index in range(len(rules)):
-        for leaf in rules[index].when.leaves():
-            heard_type(file, leaf)
-        if model is not None:
-            try_rule(file, index, model)
-    print(f"{path}: {len(rules)} rules{_tried_on(model)}: no error found")
+    found = standing_findings(file, model)
+    if model is not None:
+        found += rehearsal_problems(file, model)[0]
+    if found:
+        raise ArchitectureFileError(path, found)
+    print(f"{path}: {len(file.rules.rules)} rules{_tried_on(model)}: no error found")
 
 
 def _tried_on(model: "ArchitectureModel | None") -> str:

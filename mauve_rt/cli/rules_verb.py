@@ -1,4 +1,4 @@
-"""`mauve rules ...`: what can be asked of rules before they matter. Its sub-verbs: the table at the end."""
+"""`mauve rules ...`: what can be asked of rules before, while and after they matter; the table at the end."""
 
 import argparse
 import sys
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mauve_rt.cli import rules_live
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, Problem
 
@@ -44,12 +45,12 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 def _check(args: argparse.Namespace) -> int:
     from mauve_rt.model import load_architecture  # noqa: PLC0415
     from mauve_rt.supervision.rule_checks import logic_findings  # noqa: PLC0415
-    from mauve_rt.supervision.rule_names import name_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(args.file)
     model = load_architecture(args.architecture) if args.architecture else None
-    found = [*name_findings(file, model), *logic_findings(file)]
+    found = [*standing_findings(file, model), *logic_findings(file)]
     periods: Mapping[str, float] = {}
     if model is not None:
         from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
@@ -101,9 +102,8 @@ def _try(args: argparse.Namespace) -> int:
 
     rules = RulesFile(args.file).rules.rules
     trial = Trial(rules, load_script(args.script, rules))
-    for told in trial.story:
-        said = told.decision
-        print(f"{told.at_s:9.3f} s  {said.rule}: {said.decision}: {said.reason}")
+    for said in trial.story:
+        print(f"{said.time_ns / 1e9:9.3f} s  {said.rule}: {said.decision}: {said.reason}")
     print("", *trial.timeline(), LEGEND, sep="\n")
     return OK
 
@@ -111,4 +111,6 @@ def _try(args: argparse.Namespace) -> int:
 SUB_VERBS = (
     Verb("check", "find what is wrong with rules, and how long each may take", _add_file, _check),
     Verb("try", "play a script to rules in virtual time and tell what they decide", _add_try, _try),
+    Verb("list", "show how the rules of an executor fare", rules_live.add_list, rules_live.list_rules),
+    Verb("load", "let an executor run other rules, all or none", rules_live.add_load, rules_live.load_rules),
 )

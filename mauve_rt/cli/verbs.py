@@ -298,7 +298,12 @@ VERBS = (
     ),
     Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
     Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),
-    Verb("rules", "ask about rules before they matter", rules_verb.add_arguments, rules_verb.main),
+    Verb(
+        "rules",
+        "ask about rules before, while and after they matter",
+        rules_verb.add_arguments,
+        rules_verb.main,
+    ),
     Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

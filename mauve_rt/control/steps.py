@@ -16,6 +16,7 @@ What is loaded for a name that comes by request, and where the name has to be li
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 from mauve_rt._kernel import (
     ComponentDescription,
@@ -72,15 +73,17 @@ class Plan:
         *,
         limits: RequestLimits,
         taken: Mapping[str, int],
+        transaction: Any = None,
     ) -> None:
         """Check and translate every step for the present components; loads the plug-ins that they name.
 
+        `transaction` takes the steps in the place of the kernel's, by its functions' names.
         `taken`: bytes that requests took before, by name of what they added; `self.taken`, those afterwards.
 
         Raises:
             RefusalError: naming the step, where there are several.
         """
-        self.transaction = Transaction()
+        self.transaction = transaction if transaction is not None else Transaction()
         self.added: dict[str, ComponentModel] = {}
         self.removed: set[str] = set()
         self.bound = Bound()

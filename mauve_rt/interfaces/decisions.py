@@ -5,10 +5,11 @@ from typing import Any
 
 from mauve_msgs.msg import ComponentInfo, SupervisorDecision
 from mauve_rt.control.requests import Code, Outcome
-from mauve_rt.supervision.engine import Decision
+from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
 from mauve_rt.supervision.rule import ArchitectureView, ComponentView
 
+UNKNOWN_S = -1.0
 STATES = {
     getattr(ComponentInfo, name): name
     for name in ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")
@@ -21,7 +22,7 @@ def architecture_view(state: Any) -> ArchitectureView:
         status.name: ComponentView(STATES.get(status.state, str(status.state)), status.core)
         for status in state.components
     }
-    return ArchitectureView(state.instance_id, state.revision, components)
+    return ArchitectureView(state.instance_id, state.revision, components, frozenset(state.rules))
 
 
 def outcome_of(reply: Any) -> Outcome:
@@ -49,7 +50,9 @@ def _listed_component(info: Any) -> ListedComponent:
     )
 
 
-def decision_message(decision: Decision, stamp: Any) -> Any:
+def decision_message(
+    decision: Decision, stamp: Any, *, took_s: float = UNKNOWN_S, bound_s: float = UNKNOWN_S
+) -> Any:
     """mauve_msgs/msg/SupervisorDecision."""
     return SupervisorDecision(
         stamp=stamp,
@@ -59,4 +62,8 @@ def decision_message(decision: Decision, stamp: Any) -> Any:
         silence_s=decision.silence_s,
         revision=decision.revision,
         message=decision.message,
+        act=decision.act,
+        measured=decision.measured,
+        took_s=took_s,
+        bound_s=bound_s,
     )

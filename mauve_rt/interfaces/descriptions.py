@@ -1,6 +1,6 @@
 """The executor's values as messages of mauve_msgs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mauve_msgs.msg import (
@@ -97,8 +97,13 @@ def realtime_status(runtime: Runtime) -> Any:
     return RealtimeStatus(granted=status.granted, missing=list(status.missing))
 
 
-def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, error: str = "") -> Any:
-    """ArchitectureState as it was observed; `error`: why the last lifecycle transition failed."""
+def architecture_state(
+    runtime: Runtime, observed: Observed, stamp: Any, *, error: str = "", rules: Sequence[str] = ()
+) -> Any:
+    """ArchitectureState as it was observed.
+
+    `error`: why the last lifecycle transition failed; `rules`: that the executor runs.
+    """
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
@@ -116,6 +121,7 @@ def architecture_state(runtime: Runtime, observed: Observed, stamp: Any, *, erro
         ],
         realtime=realtime_status(runtime),
         error=error,
+        rules=list(rules),
     )
 
 

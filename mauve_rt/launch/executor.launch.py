@@ -1,4 +1,4 @@
-"""An executor and, where it is given rules, its supervisor.
+"""An executor and, where it is given rules, its supervisor, which has the same ones: the second line.
 
     ros2 launch mauve_rt executor.launch.py architecture:=FILE [rules:=FILE] [namespace:=/robot_1] [bag:=DIR]
         [params_file:=FILE] [remappings:="goal:=/goal executor:target:=waypoint"]
@@ -26,6 +26,7 @@ from mauve_rt.supervision.rules import RulesFile
 # Arguments that are parameters of the executor, which is not given the empty ones.
 _PARAMETERS = {
     "architecture": str,
+    "rules": str,
     "bag": str,
     "autostart": bool,
     "require_realtime": bool,
@@ -41,7 +42,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument("architecture", description="architecture file"),
             _optional("namespace", "of both nodes (default: as in the architecture file)"),
-            _optional("rules", "rules file of a supervisor (default: none)"),
+            _optional("rules", "rules file of the executor and its supervisor (default: none)"),
             _optional("bag", "folder of the bag to record, which must not exist yet (default: none)"),
             _optional("record_topics", "further topics to record, as in [chatter:std_msgs/msg/String]"),
             _optional("autostart", "false: wait for lifecycle transitions"),

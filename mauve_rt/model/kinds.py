@@ -29,7 +29,7 @@ class Fault:
         self.what = what
         self.limit = limit  # of "more", "least", "most", "few", "many"; text of "form", "rule" and "choice"
         self.found = found
-        self.known = known  # keys, where one is unknown; kinds that have a foreign one
+        self.known = known  # keys, where one is unknown; kinds that have a foreign one; values of a choice
         self.hint = ""
 
 
@@ -131,7 +131,8 @@ class Choice(Kind):
     def read(self, value: Any, place: Location, faults: Faults) -> Any:
         """As Kind."""
         if not any(type(value) is type(each) and value == each for each in self.values):
-            faults.append(Fault(place, "choice", limit=listed(map(str, self.values)), found=value))
+            words = tuple(map(str, self.values))
+            faults.append(Fault(place, "choice", limit=listed(words), found=value, known=words))
         return value
 
 

@@ -127,7 +127,9 @@ class Section:
             if key not in known:
                 faults.append(Fault((*place, key), "unknown", known=tuple(known)))
         if len(faults) == before and (misfit := self.misfit()):
-            faults.append(Fault(place, misfit.what, limit=misfit.limit, found=values))
+            found = values if misfit.found is None else misfit.found
+            inside = (*place, *misfit.place)
+            faults.append(Fault(inside, misfit.what, limit=misfit.limit, found=found, known=misfit.known))
 
 
 class Part(Kind):

@@ -26,6 +26,7 @@ class StepKind:
     removes: bool = False  # its target
     needs_running: bool = False  # a rule with such a step waits until its component runs
     changes_parameters: bool = False  # those of the executor's node
+    is_prepared: bool = True  # an executor can make it ready for a rule of its own, so that it only commits
 
     @property
     def needs_value(self) -> bool:
@@ -45,12 +46,14 @@ STEP_KINDS: Mapping[str, StepKind] = {
     "set_property": StepKind(name="property", value="scalar", needs_running=True, changes_parameters=True),
     "connect": StepKind(name="port", value="resource.service"),
     "disconnect": StepKind(name="port"),
-    "add_component": StepKind(target="new component", value="section", changes_parameters=True),
+    "add_component": StepKind(
+        target="new component", value="section", changes_parameters=True, is_prepared=False
+    ),
     "remove_component": StepKind(removes=True, changes_parameters=True),
-    "add_resource": StepKind(target="new resource", value="section"),
+    "add_resource": StepKind(target="new resource", value="section", is_prepared=False),
     "remove_resource": StepKind(target="resource", removes=True),
     "start": StepKind(leaves=PRESENT),
     "stop": StepKind(leaves=("STOPPED",)),
-    "configure": StepKind(leaves=("STOPPED", *PRESENT)),
-    "resynchronise": StepKind(target="all"),
+    "configure": StepKind(leaves=("STOPPED", *PRESENT), is_prepared=False),
+    "resynchronise": StepKind(target="all", is_prepared=False),
 }

@@ -20,7 +20,7 @@ from mauve_rt.model.schema import IDENTIFIER_OR_NONE
 from mauve_rt.model.schema_errors import expected
 from mauve_rt.model.section import Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.words import cut, did_you_mean, shown
+from mauve_rt.model.words import cut, did_you_mean, nearest, shown
 from mauve_rt.model.yaml_file import Location, YamlFile
 
 _SHOWN_VALUE = 60
@@ -151,7 +151,9 @@ def _problem(file: YamlFile, fault: Fault) -> Problem:
     if fault.what == "form":
         return file.problem(location, f"bad {element}", expected=expected(fault), found=found)
     text = _SHOULD.get(fault.what, f"input should be {expected(fault)}").format(limit=fault.limit)
-    return file.problem(location, f"{element or 'the file'}: {text}", found=found)
+    near = nearest(fault.found, fault.known) if isinstance(fault.found, str) else ""
+    remedy = f"did you mean {near}?" if near else ""
+    return file.problem(location, f"{element or 'the file'}: {text}", found=found, remedy=remedy)
 
 
 def dotted(location: Location) -> str:

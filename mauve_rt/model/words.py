@@ -7,14 +7,19 @@ _SHORT = 60
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """The remedy for an unknown word: the nearest known one, else all that are known."""
+    names = sorted(set(known))
+    if near := nearest(word, names):
+        return f"did you mean {near}?"
+    return f"known: {', '.join(names)}" if names else "there are none"
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The known word that is most like it; empty: none is."""
     import difflib  # noqa: PLC0415 - only when something is wrong
 
-    names = sorted(set(known))
-    by_lower = {name.lower(): name for name in names}
+    by_lower = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean {by_lower[close[0]]}?"
-    return f"known: {', '.join(names)}" if names else "there are none"
+    return by_lower[close[0]] if close else ""
 
 
 def shown(value: object, limit: int = _SHORT) -> str:

@@ -19,10 +19,14 @@ from mauve_rt.interfaces.descriptions import (
     trace_architecture,
 )
 from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.interfaces.told_decisions import DECISION_TYPE, Done
 from mauve_rt.model import load_architecture
 from mauve_rt.model.schema import ResourceModel, TopicModel
 from mauve_rt.simulation.messages import serialize
+from mauve_rt.simulation.rules import DECISIONS_QOS, SimulatedRules
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
+from mauve_rt.supervision.rule_actions import rule_actions
+from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.trace.bag.recorded import SentMessage
 from mauve_rt.trace.recording.trace_bag import TraceBag
 
@@ -47,13 +51,17 @@ class SimulatedExecutor:
         bag: Path,
         *,
         complain: Callable[[str], None],
+        rules: Path | None = None,
     ) -> None:
         """Configure the architecture; it joins the simulation, which is not deployed yet.
+
+        `rules`: a rules file, of which it runs those that are `in: executor`.
 
         Raises:
             ArchitectureFileError: the file cannot be used.
             TraceError: the bag cannot be created.
         """
+        self._rules: SimulatedRules | None = None
         self._simulation = simulation
         self._topics = topics
         self._runtime = SimulatedRuntime(simulation, lambda: load_architecture(architecture))
@@ -63,6 +71,7 @@ class SimulatedExecutor:
         self.name = resolved("executor", model.namespace)
         self._control = Control(self._runtime)
         self._outgoing: dict[str, _Outgoing] = {}
+        self._heard: dict[str, str] = {}  # the resource that takes the messages of each topic
         for resource, described in model.resources.items():
             if described.topic is not None:
                 self._bind(resource, described, described.topic)
@@ -72,8 +81,11 @@ class SimulatedExecutor:
         self._refused = 0
         self._architecture = b""
         self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
-        for topic in (f"{self.name}/state", f"{self.name}/events"):
-            self.record_topic(topic)
+        self._rules_file = RulesFile(rules) if rules is not None else None
+        if self._rules_file is not None:
+            rule_actions(self._rules_file, self._runtime)  # whether they can be used
+        for topic in ("state", "events", "decisions"):
+            self.record_topic(f"{self.name}/{topic}")
 
     def _bind(self, resource: str, described: ResourceModel, bound: TopicModel) -> None:
         topic = resolved(bound.name, self.namespace)
@@ -84,6 +96,9 @@ class SimulatedExecutor:
 
         def receive(sample: Sample) -> None:
             self._runtime.host.write_resource(resource, sample.data)
+            self._look_at_rules()
+
+        self._heard[topic] = resource
 
         self._topics.listen(topic, receive)
         self.record_topic(topic)
@@ -95,6 +110,16 @@ class SimulatedExecutor:
     def activate(self) -> None:
         """Start, with the others of the simulation."""
         self._runtime.activate()
+        if self._rules_file is not None:
+            self._rules = SimulatedRules(
+                self._simulation,
+                self._runtime,
+                self._rules_file,
+                self._heard,
+                name=self.name,
+                namespace=self.namespace,
+                tell=self._decided,
+            )
         self.refresh()
 
     def components(self) -> list[ComponentDescription]:
@@ -117,11 +142,23 @@ class SimulatedExecutor:
         event = reconfiguration_event(request, outcome, stamp=now, instance_id=self._runtime.instance_id)
         self._say("events", "mauve_msgs/msg/ReconfigurationEvent", event, _EVENT_QOS)
 
+    def _decided(self, message: Any, done: Done | None) -> None:
+        self.refresh()
+        self._say("decisions", DECISION_TYPE, message, DECISIONS_QOS)
+        if done is not None:
+            self._event(done.request, done.outcome)
+
+    def _look_at_rules(self) -> None:
+        if self._rules is not None:
+            self._rules.look()
+
     def refresh(self) -> None:
         """Publish the state if it has changed, and that a fallback core took over."""
         observed = self._runtime.observe()
         if observed.revision != self._published_revision:
-            state = architecture_state(self._runtime, observed, stamp(self._simulation.now_ns()))
+            rules = self._rules.names if self._rules is not None else ()
+            now = stamp(self._simulation.now_ns())
+            state = architecture_state(self._runtime, observed, now, rules=rules)
             self._published_revision = state.revision
             self._architecture = serialize(trace_architecture(self._runtime, observed))
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
@@ -130,7 +167,8 @@ class SimulatedExecutor:
                 self._event(*fault.event(observed.revision))
 
     def carry(self) -> None:
-        """Publish what was written to the resources that are bound to topics."""
+        """Publish what was written to bound resources; rules see what befell components."""
+        self._look_at_rules()
         for resource, data, time_ns in self._runtime.host.wait_published(0):
             topic, type_name, qos = self._outgoing[resource]
             sample = Sample(topic, type_name, data, time_ns, qos)
@@ -152,6 +190,7 @@ class SimulatedExecutor:
 
     def close(self) -> None:
         """Stop the components, send and record what they wrote last, seal the bag."""
+        self._rules = None
         self._runtime.deactivate()
         self.carry()
         self.refresh()

@@ -4,32 +4,31 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_rt._kernel import Simulation
 from mauve_rt.control.requests import Request
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
+from mauve_rt.interfaces.outside_feeds import OutsideFeeds
 from mauve_rt.simulation.executor import SimulatedExecutor
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
-from mauve_rt.supervision.condition_tree import TreeCondition
-from mauve_rt.supervision.conditions import TopicCondition, topic_condition
-from mauve_rt.supervision.engine import Decision, RuleEngine
-from mauve_rt.supervision.message_fields import field_value
-from mauve_rt.supervision.rule_types import heard_type
+from mauve_rt.supervision.decisions import Decision
+from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rules import RulesFile
-from mauve_rt.supervision.when import When
 
 _DECISIONS_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_NEVER_NS = 2**62
 
 
 class SimulatedSupervisor:
-    """In the namespace of its executor. Whoever drives the simulation calls tick() at 20 Hz or more."""
+    """In the namespace of its executor. It looks at its rules at the instants at which a node would."""
 
     def __init__(
         self, simulation: Simulation, topics: SimulatedTopics, executor: SimulatedExecutor, rules: Path
     ) -> None:
-        """Listen to the topics of the rules; the executor must not have been activated yet.
+        """Listen to what the rules look at; the executor must not have been activated yet.
 
         Raises:
             ArchitectureFileError: the rules cannot be used.
@@ -40,48 +39,65 @@ class SimulatedSupervisor:
         self.name = resolved("supervisor", executor.namespace)
         self.decisions = f"{self.name}/decisions"
         file = RulesFile(rules)
-        pairs = [
-            (rule, TreeCondition(rule.when, lambda leaf: self._condition(file, leaf)))
-            for rule in file.rules.rules
-        ]
-        ids = (f"{self.name}/{number}" for number in count(1))
-        self._engine = RuleEngine(pairs, act=self._act, decide=self._decide, look=self._look, ids=ids)
+        self._rules = RemoteRules(
+            file.rules.rules,
+            act=self._act,
+            decide=self._decide,
+            look=self._look,
+            ids=(f"{self.name}/{number}" for number in count(1)),
+            name=self._full_name,
+        )
+        self._due_ns = _NEVER_NS
         self._ended = False
+        self._feeds = OutsideFeeds(file, self._rules, listen=self._listen, now_ns=simulation.now_ns)
         topics.listen(f"{executor.name}/state", self._on_state)
-
-    def tick(self) -> None:
-        """Check the rules."""
-        self._engine.tick(self._now_s())
 
     def close(self) -> None:
         """Look no longer: that the executor stops is no business of the rules."""
         self._ended = True
 
+    def _full_name(self, topic: str) -> str:
+        return resolved(topic, self._executor.namespace)
+
+    def _listen(
+        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, latched: bool = False
+    ) -> None:
+        del message, latched  # whoever listens does so from the start on
+
+        def hear(sample: Sample) -> None:
+            heard(sample.data if raw else sample.message())
+            if self._rules.is_stirred:
+                self._tick()
+
+        self._topics.listen(self._full_name(topic), hear)
+
     def _on_state(self, sample: Sample) -> None:
         if not self._ended:
-            self._engine.on_state(self._now_s(), architecture_view(sample.message()))
+            self._rules.on_state(self._simulation.now_ns(), architecture_view(sample.message()))
+            self._tick()
 
-    def _now_s(self) -> float:
-        return self._simulation.now_ns() / 1e9
+    def _tick(self) -> None:
+        """Look at the rules now, and again when that has to be."""
+        if self._ended:
+            return
+        feeds_due_ns = self._feeds.tick()
+        due_ns = self._rules.tick(self._simulation.now_ns())
+        if feeds_due_ns is not None:
+            due_ns = min(due_ns, feeds_due_ns)
+        if due_ns < _NEVER_NS and due_ns != self._due_ns:
+            self._simulation.at(due_ns, self._tick_when_due)
+        self._due_ns = due_ns
 
-    def _condition(self, file: RulesFile, leaf: When) -> TopicCondition:
-        heard_type(file, leaf)
-        topic = resolved(leaf.parameters["topic"], self._executor.namespace)
-        condition = topic_condition(leaf, topic)
-        self._topics.listen(topic, self._hearer(condition, leaf.parameters.get("field", "")))
-        return condition
-
-    def _hearer(self, condition: TopicCondition, path: str) -> Callable[[Sample], None]:
-        if path:
-            return lambda sample: condition.hear(self._now_s(), field_value(sample.message(), path))
-        return lambda _sample: condition.hear(self._now_s())
+    def _tick_when_due(self) -> None:
+        if self._simulation.now_ns() >= self._due_ns:
+            self._tick()
 
     def _look(self) -> None:
-        self._engine.on_inventory(self._now_s(), inventory(*self._executor.listed()))
+        self._rules.on_inventory(self._simulation.now_ns(), inventory(*self._executor.listed()))
 
     def _act(self, request: Request) -> None:
         outcome = self._executor.handle(replace(request, requested_by=self.name))
-        self._engine.on_outcome(self._now_s(), request.request_id, outcome)
+        self._rules.on_outcome(self._simulation.now_ns(), request.request_id, outcome)
 
     def _decide(self, decision: Decision) -> None:
         now_ns = self._simulation.now_ns()

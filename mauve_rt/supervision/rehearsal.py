@@ -14,7 +14,10 @@ from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.steps import Change, Step, place_of_step
 from mauve_rt.model.yaml_file import YamlFile
+from mauve_rt.supervision.rule_hearing import own_leaves, unheard
+from mauve_rt.supervision.rule_names import full_name, leaf_findings
 from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.when import When
 
 
 class RefusedStepError(Exception):
@@ -32,6 +35,10 @@ class Rehearsal:
     def __init__(self, runtime: SimulatedRuntime) -> None:
         self._runtime = runtime
         self._control = Control(runtime, outside=_NoRos())
+
+    def unheard(self, file: RulesFile, leaf: When, topics: Mapping[str, str]) -> Problem | None:
+        """As rule_hearing.unheard(), of this executor."""
+        return unheard(file, leaf, self._runtime.host, topics)
 
     def periods_s(self) -> Mapping[str, float]:
         """Of every component."""
@@ -116,13 +123,30 @@ def rehearsal_problems(
     """
     with rehearsal(model) as executor:
         periods_s = executor.periods_s()
-    found: list[Problem] = []
+        found = list(_unheard(executor, file, model))
     for index in range(len(file.rules.rules)):
         try:
             try_rule(file, index, model)
         except ArchitectureFileError as error:
             found += error.problems
     return found, periods_s
+
+
+def _unheard(executor: Rehearsal, file: RulesFile, model: ArchitectureModel) -> Iterator[Problem]:
+    """Of conditions whose names are as they should be."""
+    topics = {
+        full_name(each.topic.name, model.namespace): name
+        for name, each in model.resources.items()
+        if each.topic is not None and each.topic.direction == "subscribe"
+    }
+    for leaf in own_leaves(file):
+        if any(leaf_findings(file, leaf, model)):
+            continue
+        topic = str(leaf.parameters.get("topic") or "")
+        resource = topics.get(full_name(topic, model.namespace))
+        problem = executor.unheard(file, leaf, {topic: resource} if resource else {})
+        if problem is not None:
+            yield problem
 
 
 class _NoRos:

@@ -1,25 +1,13 @@
-"""The life of one rule of a supervisor, without ROS and with injected time.
-
-A rule does (`do`) once its condition has held for `for_s`, and undoes (`undo`) once it has not held for
-`undo.for_s`. It never fights a person: what it wants and finds already done is not done again, and what
-somebody changes while the rule is in effect stays as it is until the condition ends.
-"""
+"""What somebody outside of an executor knows of it, and of how its rules stand with it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 from mauve_rt.model.step_kinds import PRESENT
 from mauve_rt.model.steps import Step
-from mauve_rt.supervision.conditions import Condition, Look
 from mauve_rt.supervision.rules import Rule
 
-FIRST_RETRY_S = 0.5
-LONGEST_RETRY_S = 30.0
-REVISION_RETRY_S = 0.05  # somebody else changed the architecture meanwhile: look again soon
-
-
-Kind = Literal["do", "undo"]
+NOT_THERE = "not in the architecture"
 
 
 @dataclass(frozen=True)
@@ -37,12 +25,21 @@ class ArchitectureView:
     instance_id: str
     revision: int
     components: Mapping[str, ComponentView]
+    rules: frozenset[str] = frozenset()  # that the executor runs itself
 
-    def shows(self, steps: Iterable[Step], *, unknown: bool) -> bool:
-        """Whether the steps' effect is in place; `unknown` stands for steps that ~/state does not show."""
-        return all(self._shows_step(step, unknown=unknown) for step in steps)
+    def state_of(self, component: str) -> str:
+        """Its state, in words."""
+        found = self.components.get(component)
+        return found.state if found is not None else NOT_THERE
 
-    def _shows_step(self, step: Step, *, unknown: bool) -> bool:
+    def shows(self, steps: Iterable[Step]) -> bool | None:
+        """Whether the steps' effect is in place; None: ~/state does not tell of all of them."""
+        shown = [self._shows_step(step) for step in steps]
+        if False in shown:
+            return False
+        return None if None in shown or not shown else True
+
+    def _shows_step(self, step: Step) -> bool | None:
         component = self.components.get(step.target)
         if step.kind == "replace_core":
             return component is not None and component.core == step.name
@@ -50,7 +47,7 @@ class ArchitectureView:
             return component is not None and component.state in PRESENT
         if step.kind == "stop":
             return component is not None and component.state == "STOPPED"
-        return unknown
+        return None
 
     def describe(self, steps: Iterable[Step]) -> str:
         """What the steps' targets are now, for a reason."""
@@ -62,100 +59,24 @@ class ArchitectureView:
         return ", ".join(texts)
 
 
-class RuleLife:
-    """One rule. Called by the engine's thread only; times in seconds of one steady clock."""
+@dataclass
+class WatchedRule:
+    """One rule, as its supervisor stands with it. `number`: of the engine's."""
 
-    def __init__(self, rule: Rule, condition: Condition) -> None:
-        self.rule = rule
-        self.condition = condition
-        self.last_look = Look(holds=False, reason="")
-        self.armed = False
-        self.in_effect = False
-        self.left_alone = False
-        self.checked = False  # the executor was asked about it, or is being asked
-        self.untouched = True  # nothing was done for it yet since the executor's start
-        self.not_before_s = 0.0
-        self.revision_floor = 0  # the view must have reached it before the next action
-        self.failures = 0
-        self.excused = ""  # the last reason given for not acting, so that it is given once
-        self._since_s = 0.0
-
-    def arm(self, now_s: float) -> None:
-        """Start watching; what is in effect stays so, until the condition is seen to be false."""
-        self.armed = True
-        self.condition.arm(now_s)
-        if self.in_effect:
-            self.condition.assume()
-        self.last_look = Look(holds=False, reason="")
-        self._since_s = now_s
-
-    def adopt(self, now_s: float) -> None:
-        """What it does was done before it was armed: undo it once the condition has been seen to be false."""
-        self.in_effect = True
-        self.condition.assume()
-        self._since_s = now_s
+    number: int
+    rule: Rule
+    deaf: str = ""  # why it cannot be heard outside of the executor
+    left: bool = False  # to the executor, which runs it itself
+    told_deaf: bool = False
+    checked: bool = False  # the executor was asked about it, or is being asked
+    untouched: bool = True  # nothing was done for it yet since the executor's start
+    standing: str = ""  # of what it is about, in words
 
     def forget(self) -> None:
-        """The executor was started anew: nothing of before counts."""
-        self.armed = self.in_effect = self.left_alone = self.checked = False
+        """The executor was started anew, or runs the rule itself: nothing of before counts."""
+        self.left = self.told_deaf = self.checked = False
         self.untouched = True
-        self.not_before_s, self.revision_floor, self.failures, self.excused = 0.0, 0, 0, ""
 
-    def watch(self, now_s: float) -> bool:
-        """Look at the condition; True when it changed."""
-        before = self.last_look.holds
-        self.last_look = self.condition.look(now_s)
-        if self.last_look.holds == before:
-            return False
-        self._since_s = now_s
-        self.failures = 0
-        self.excused = ""
-        return True
-
-    def wants(self, now_s: float) -> Kind | None:
-        """What the dwell times ask for now, whether it may be done or not."""
-        lasted_s = now_s - self._since_s
-        if self.last_look.holds:
-            due = not self.in_effect and not self.left_alone and lasted_s >= self.rule.for_s
-            return "do" if due else None
-        undo = self.rule.undo
-        if lasted_s < (undo.for_s if undo else 0.0):
-            return None
-        self.left_alone = False
-        if self.in_effect and undo is None:
-            self.in_effect = False
-        return "undo" if self.in_effect else None
-
-    def steps(self, kind: Kind) -> list[Step]:
-        """The transaction of `do` or `undo`."""
-        if kind == "do":
-            return self.rule.do
-        return self.rule.undo.do if self.rule.undo else []
-
-    def max_missed(self, kind: Kind) -> int:
-        """How many releases each component may miss for it."""
-        if kind == "do":
-            return self.rule.max_missed
-        return self.rule.undo.max_missed if self.rule.undo else 0
-
-    def cause(self, kind: Kind, now_s: float) -> str:
-        """Why, in words for the executor's record."""
-        lasted = f" for {now_s - self._since_s:.2f} s" if kind == "undo" else ""
-        return f"{self.rule.name}: {self.last_look.reason}{lasted}"
-
-    def settle(self, kind: Kind, now_s: float) -> None:
-        """An action is in place."""
-        self.in_effect = kind == "do"
-        self.untouched = False
-        self.failures = 0
-        self.excused = ""
-        self.not_before_s = now_s + self.rule.cooldown_s
-
-    def fail(self, now_s: float, *, wrong_revision: bool) -> float:
-        """An action failed; returns the delay before the next one, s, doubled with every failure in a row."""
-        first_s = REVISION_RETRY_S if wrong_revision else max(self.rule.cooldown_s, FIRST_RETRY_S)
-        delay_s = min(first_s * 2.0**self.failures, max(LONGEST_RETRY_S, self.rule.cooldown_s))
-        self.failures = min(self.failures + 1, 16)
-        self.excused = ""
-        self.not_before_s = now_s + delay_s
-        return delay_s
+    def absent(self, view: ArchitectureView) -> str:
+        """A component that it is about and that does not run; empty: all do."""
+        return min((name for name in self.rule.targets() if view.state_of(name) not in PRESENT), default="")

@@ -1,16 +1,32 @@
-"""How long at most from the cause of a rule to the first release of the new part, and what that assumes."""
+"""How long at most from the cause of a rule to the first release of the new part, and what that assumes.
+
+In the executor: what the condition itself names as a time passes, or what happened is told at once; the
+thread of the rules decides and commits a transaction that was ready. A component that does not overrun
+comes to its wait before its next instant, where it goes on as the new part: it is released within one of
+its periods from then on. Where the instant comes while the commit is on its way the component goes, and
+is released anew one period later: so the time of the commit counts, and one period. Of several components
+each may go so before the others have come. That all are at their waits at once within one period of the
+slowest is assumed.
+
+In the supervisor the request travels and the new part is built when it is asked for; both are assumed.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from mauve_rt.supervision.condition_table import conditions
+from mauve_rt.supervision.condition_table import parameters_of
 from mauve_rt.supervision.effects import touched
-from mauve_rt.supervision.engine import CHECK_PERIOD_S
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.when import COMBINATIONS, NOT, When
+from mauve_rt.supervision.when_spec import heard
 
+WOKEN_S = (
+    0.001  # assumed of the executor: its thread of the rules decides, commits, and the component wakes up
+)
+FOLLOWED_S = 0.020  # assumed of the executor's ordinary thread, which sees that the architecture changed
 SENT_S = 0.020  # assumed of a supervisor: it is late by no more, and its request arrives
 BUILT_S = 0.200  # assumed of the executor, which builds the new part when it is asked
+TOLD_S = 1.0  # assumed of who sends /diagnostics, or of another executor's state: at least so often
 
 
 @dataclass(frozen=True)
@@ -41,44 +57,58 @@ class Bound:
 
 
 def bound_of(rule: Rule, periods_s: Mapping[str, float]) -> Bound:
-    """The bound of a rule's `do`; `periods_s`: of components, as far as they are known."""
-    parts = [*_noticing(rule.when, periods_s)]
-    if rule.for_s > 0:
-        parts.append(BoundPart("for_s of the rule", rule.for_s))
-    looks = _looks(rule)
-    parts.append(BoundPart(f"{looks} looks of the supervisor", looks * CHECK_PERIOD_S))
-    parts.append(BoundPart("the supervisor runs, and its request arrives", SENT_S, assumed=True))
-    parts.append(BoundPart("the executor builds, checks and commits", BUILT_S, assumed=True))
-    parts += _release(rule, periods_s)
-    return Bound(tuple(parts))
+    """The bound of a rule's `do`; `periods_s`: of components, as far as they are known; 0: it has none."""
+    return Bound((*_noticing(rule.when, periods_s), *_reaction(rule, periods_s)))
 
 
-def _looks(rule: Rule) -> int:
-    """A silence is believed at the second look; what must last is counted from a look and ends at one."""
-    return 2 + (rule.for_s > 0) + sum(node.for_s > 0 for node in rule.when.nodes())
+def reaction_s(rule: Rule, periods_s: Mapping[str, float], *, act: str = "do") -> float | None:
+    """From the instant at which the condition became true, of `undo` false, to the first release.
+
+    None when it is not known.
+    """
+    return Bound(tuple(_reaction(rule, periods_s, act=act))).total_s
 
 
-def _release(rule: Rule, periods_s: Mapping[str, float]) -> Iterator[BoundPart]:
-    names = sorted(touched(rule.do))
-    missing = [name for name in names if name not in periods_s]
+def _reaction(rule: Rule, periods_s: Mapping[str, float], *, act: str = "do") -> Iterator[BoundPart]:
+    for_s = rule.for_s if act == "do" or rule.undo is None else rule.undo.for_s
+    if for_s > 0:
+        yield BoundPart("for_s of the rule", for_s)
+    if rule.where == "executor":
+        yield BoundPart("the executor decides, commits and wakes up", WOKEN_S, assumed=True)
+    else:
+        yield BoundPart("the supervisor runs, and its request arrives", SENT_S, assumed=True)
+        yield BoundPart("the executor builds, checks and commits", BUILT_S, assumed=True)
+    yield from _release(sorted(touched(rule.steps(act))), periods_s)
+
+
+def _release(names: list[str], periods_s: Mapping[str, float]) -> Iterator[BoundPart]:
+    """Until the last of these components is released."""
+    missing = ", ".join(name for name in names if name not in periods_s)
+    timeless = ", ".join(name for name in names if periods_s.get(name) == 0)
     if missing:
-        yield BoundPart(f"one period of {', '.join(missing)} (not known: give --architecture)", None)
+        yield BoundPart(f"one period of {missing} (not known: give --architecture)", None)
+    elif timeless:
+        yield BoundPart(f"the next event of {timeless}, which has no period", None)
     elif names:
         slowest = max(names, key=lambda name: periods_s[name])
+        if len(names) > 1:
+            all_ = f"until {', '.join(names)} are at their waits at once: one period of {slowest}"
+            yield BoundPart(all_, periods_s[slowest], assumed=True)
         yield BoundPart(f"one period of {slowest}", periods_s[slowest])
 
 
-def _noticing(tree: When, periods_s: Mapping[str, float]) -> list[BoundPart]:
-    """From the last thing that makes the tree true to the instant at which it is seen to hold."""
-    if tree.kind == NOT:
-        parts = [] if tree.parts[0].kind in COMBINATIONS else [BoundPart(f"not {_words(tree.parts[0])}", 0.0)]
-    elif tree.kind in COMBINATIONS:
-        each = [_noticing(part, periods_s) for part in tree.parts]
+def _noticing(tree: When, periods_s: Mapping[str, float], *, negated: bool = False) -> list[BoundPart]:
+    """From the last thing that makes the tree true (or false) to the instant at which it is."""
+    if tree.kind in COMBINATIONS:
+        inside = negated is not (tree.kind == NOT)
+        each = [_noticing(part, periods_s, negated=inside) for part in tree.parts]
         parts = max(each, key=_seconds, default=[])
     else:
-        parts = [BoundPart(_words(tree), _age(tree, periods_s))]
-    if tree.for_s > 0:
+        parts = _of_leaf(tree, periods_s, negated=negated)
+    if tree.for_s > 0 and not negated:
         parts = [*parts, BoundPart(f"for_s of {tree.kind}", tree.for_s)]
+    if tree.within_s > 0 and negated:
+        parts = [*parts, BoundPart(f"within_s of {tree.kind}", tree.within_s)]
     return parts
 
 
@@ -86,15 +116,35 @@ def _seconds(parts: list[BoundPart]) -> float:
     return float("inf") if any(part.seconds is None for part in parts) else Bound(tuple(parts)).known_s
 
 
-def _age(leaf: When, periods_s: Mapping[str, float]) -> float | None:
-    """How old the cause is when the condition holds: 0 of what an event tells."""
-    if "periods" in leaf.parameters:
-        period_s = periods_s.get(str(leaf.parameters.get("component")))
-        return None if period_s is None else float(leaf.parameters["periods"]) * period_s
-    return float(leaf.parameters.get("longer_than_s", 0.0))
+def _of_leaf(leaf: When, periods_s: Mapping[str, float], *, negated: bool) -> list[BoundPart]:
+    parts = [
+        BoundPart(f"not {_words(leaf)}" if negated else _words(leaf), _age(leaf, periods_s, negated=negated))
+    ]
+    signals = heard(leaf)
+    if any(signal.kind == "change" for signal in signals):
+        parts.append(BoundPart("the executor sees what was changed", FOLLOWED_S, assumed=True))
+    if any(signal.kind in ("diagnostic", "peer") for signal in signals):
+        parts.append(BoundPart("who tells it tells it", TOLD_S, assumed=True))
+    return parts
+
+
+def _age(leaf: When, periods_s: Mapping[str, float], *, negated: bool) -> float | None:
+    """How old the cause is when the condition comes to hold, or to hold no more: 0 of what an event tells."""
+    told = leaf.parameters
+    if "at_least" in told:  # so many within a time: the last of them is the cause, or that they are past
+        return float(told["within_s"]) if negated else 0.0
+    if negated:
+        return 0.0
+    if "periods" in told:
+        period_s = periods_s.get(str(told.get("component")))
+        return None if period_s is None else float(told["periods"]) * period_s
+    return float(told.get("longer_than_s", 0.0))
 
 
 def _words(leaf: When) -> str:
-    known = conditions()[leaf.kind].parameters
-    said = [str(leaf.parameters[name]) for name in known if leaf.parameters.get(name) not in ("", None)]
+    said = [
+        str(leaf.parameters[name])
+        for name in parameters_of(leaf.kind)
+        if leaf.parameters.get(name) not in ("", None)
+    ]
     return " ".join([leaf.kind, *said[:1]])

@@ -8,12 +8,13 @@ from mauve_rt.supervision.condition_table import roles
 from mauve_rt.supervision.effects import disagreement, touched
 from mauve_rt.supervision.rule_logic import can_meet, clash_in
 from mauve_rt.supervision.rules import Rule, RulesFile
-from mauve_rt.supervision.when import When
+from mauve_rt.supervision.when import COMBINATIONS, NOT, When
+from mauve_rt.supervision.when_spec import heard
 
 
 def logic_findings(file: RulesFile) -> list[Problem]:
     """What the rules say that cannot be meant, in the order of the file."""
-    found = [*_impossible(file), *_rivals(file), *_own_triggers(file), *_oscillations(file)]
+    found = [*_impossible(file), *_endless(file), *_rivals(file), *_own_triggers(file), *_oscillations(file)]
     return sorted(found, key=lambda problem: (problem.line, problem.column))
 
 
@@ -23,8 +24,26 @@ def _impossible(file: RulesFile) -> Iterator[Problem]:
         if clash is not None:
             what = f"rule '{rule.name}' can never hold: {clash}"
             yield file.problem(("rules", index, "when"), what)
+        yield from _unarmed(file, rule, rule.when)
         for node in rule.when.nodes():
             yield from _useless_times(file, rule, node)
+
+
+def _endless(file: RulesFile) -> Iterator[Problem]:
+    """Values that are beyond one of two bounds whatever they are, or for ever once they were."""
+    for rule in file.rules.rules:
+        for leaf in rule.when.leaves():
+            above, below = leaf.parameters.get("above"), leaf.parameters.get("below")
+            if above is None or below is None:
+                continue
+            place, between = (*leaf.place, leaf.kind), above - below
+            if between < 0:
+                what = f"rule '{rule.name}': every number is above {above:g} or below {below:g}"
+                yield file.problem((*place, "above"), what, remedy="let above be the greater one")
+            elif between < 2 * leaf.parameters["hysteresis"]:
+                what = f"rule '{rule.name}': no number is so far within both bounds: it holds for ever"
+                remedy = f"let hysteresis be no more than {between / 2:g}"
+                yield file.problem((*place, "hysteresis"), what, remedy=remedy)
 
 
 def _useless_times(file: RulesFile, rule: Rule, node: When) -> Iterator[Problem]:
@@ -34,6 +53,22 @@ def _useless_times(file: RulesFile, rule: Rule, node: When) -> Iterator[Problem]
             what = f"rule '{rule.name}': for_s {part.for_s:g} within {node.within_s:g} s looks back further"
             remedy = "let within_s be no shorter than for_s"
             yield file.problem((*part.place, "for_s"), what, remedy=remedy)
+
+
+def _unarmed(file: RulesFile, rule: Rule, tree: When, *, negated: bool = False) -> Iterator[Problem]:
+    """A rule is armed only while what it replaces or sets something of runs: not while that is FAULTED."""
+    for part in tree.parts:
+        yield from _unarmed(file, rule, part, negated=negated is not (tree.kind == NOT))
+    if tree.kind in COMBINATIONS or negated:
+        return
+    for signal in heard(tree):
+        if signal.kind == "state" and signal.target in rule.targets():
+            what = (
+                f"rule '{rule.name}' can never act: it waits until {signal.target} is FAULTED, "
+                f"and for what it does {signal.target} has to run"
+            )
+            remedy = f"give {signal.target} a fallback core, or let the supervisor configure and start it"
+            yield file.problem((*tree.place, tree.kind), what, remedy=remedy)
 
 
 def _rivals(file: RulesFile) -> Iterator[Problem]:
@@ -54,7 +89,8 @@ def _own_triggers(file: RulesFile) -> Iterator[Problem]:
         if rule.undo is None:
             continue
         for leaf in rule.when.leaves():
-            if leaf.kind != "since_change" or not _heard(leaf) <= (touched(rule.do) | touched(rule.undo.do)):
+            is_change = any(signal.kind == "change" for signal in heard(leaf))
+            if not is_change or not _heard(leaf) <= (touched(rule.do) | touched(rule.undo.do)):
                 continue
             about = ", ".join(_heard(leaf)) or "any component"
             what = f"rule '{rule.name}' triggers itself: what it does and undoes is a change of {about}"

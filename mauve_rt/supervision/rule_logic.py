@@ -74,8 +74,7 @@ class _Search:
             return self.ways(tree.parts[0], negated=not negated)
         if tree.kind in (ALL, ANY, AT_LEAST):
             return self._ways_of_parts(tree.parts, _needed(tree, negated=negated), negated=negated)
-        said = claims(tree, negated=negated)
-        return [()] if said is None else self._possible((each,) for each in said)
+        return self._possible((each,) for each in claims(tree, negated=negated))
 
     def _ways_of_parts(self, parts: Sequence[When], needed: int, *, negated: bool) -> list[Way]:
         ways = [self.ways(part, negated=negated) for part in parts]

@@ -1,6 +1,6 @@
 """The names in conditions, held against an architecture and what is installed; the nearest one is told."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from math import isinf
 from typing import Any
@@ -51,10 +51,10 @@ class _Names:
         if model is not None:
             yield from self._unknown("component", model.components)
             yield from self._unknown("resource", model.resources)
-            if "peer" in self._said and model.peers:
-                yield from self._unknown("peer", model.peers)
+            yield from self._peer(model.peers)
         bound = self._bound()
-        yield from self._topic(bound)
+        yield from self._other_type(bound)
+        yield from self._nearly_bound(bound)
         type_name = self._type_name(bound)
         if "message_type" in self._said and message_class(type_name) is None:
             yield self._problem(
@@ -69,6 +69,17 @@ class _Names:
         if role in self._said and (name := self._said[role][1]) not in known:
             yield self._problem(role, f"{role} '{name}' is unknown", remedy=did_you_mean(name, known))
 
+    def _peer(self, peers: Collection[str]) -> Iterator[Problem]:
+        """An executor is named by its namespace, or from there on down; peers are namespaces."""
+        if "executor" not in self._said or not peers:
+            return
+        name = self._said["executor"][1]
+        if not set(name.strip("/").split("/")) & set(peers):
+            remedy = did_you_mean(name.strip("/").split("/")[0], peers)
+            yield self._problem(
+                "executor", f"executor '{name}' is none of the architecture's peers", remedy=remedy
+            )
+
     def _bound(self) -> Mapping[str, ResourceModel]:
         """Resources of the architecture that are bound to topics, by the topics' full names."""
         if self._model is None:
@@ -77,31 +88,37 @@ class _Names:
         resources = self._model.resources.values()
         return {full_name(each.topic.name, space): each for each in resources if each.topic is not None}
 
-    def _topic(self, bound: Mapping[str, ResourceModel]) -> Iterator[Problem]:
+    def _listened_to(self, bound: Mapping[str, ResourceModel]) -> ResourceModel | None:
+        """The resource of the architecture that is named, or bound to the topic that is."""
+        if self._model is None:
+            return None
+        if "topic" in self._said:
+            return bound.get(full_name(self._said["topic"][1], self._model.namespace))
+        return self._model.resources.get(self._said.get("resource", ("", ""))[1])
+
+    def _other_type(self, bound: Mapping[str, ResourceModel]) -> Iterator[Problem]:
+        resource = self._listened_to(bound)
+        wanted = self._said.get("message_type", ("", ""))[1]
+        if resource is not None and wanted and resource.topic_type not in ("", wanted):
+            role = "topic" if "topic" in self._said else "resource"
+            what = f"{role} {self._said[role][1]} is of another type in the architecture"
+            yield self._problem("message_type", what, expected=resource.topic_type, found=wanted)
+
+    def _nearly_bound(self, bound: Mapping[str, ResourceModel]) -> Iterator[Problem]:
         """A topic that nothing is bound to may be another node's; one that is nearly ours is a mistake."""
         if self._model is None or "topic" not in self._said:
             return
         said = self._said["topic"][1]
         name = full_name(said, self._model.namespace)
-        if name in bound:
-            wanted, has = self._said.get("message_type", ("", ""))[1], bound[name].topic_type
-            if wanted and has and wanted != has:
-                what = f"topic {said} is of another type in the architecture"
-                yield self._problem("message_type", what, expected=has, found=wanted)
-        elif near := get_close_matches(name, bound, n=1, cutoff=_NEARLY):
+        if name not in bound and (near := get_close_matches(name, bound, n=1, cutoff=_NEARLY)):
             remedy = f"did you mean {near[0]}?"
             yield self._problem("topic", f"no resource is bound to topic {said}", remedy=remedy)
 
     def _type_name(self, bound: Mapping[str, ResourceModel]) -> str:
         if "message_type" in self._said:
             return self._said["message_type"][1]
-        if self._model is None:
-            return ""
-        if "topic" in self._said:
-            found = bound.get(full_name(self._said["topic"][1], self._model.namespace))
-        else:
-            found = self._model.resources.get(self._said.get("resource", ("", ""))[1])
-        return found.topic_type if found is not None else ""
+        resource = self._listened_to(bound)
+        return resource.topic_type if resource is not None else ""
 
     def _field(self, type_name: str) -> Iterator[Problem]:
         path = self._said["field"][1]

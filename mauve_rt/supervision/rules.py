@@ -1,11 +1,11 @@
-"""The rules file of a supervisor: schema, loading, checks.
+"""A rules file: schema, loading, checks.
 
     mauve: 1
     executor: executor              # relative to the supervisor's namespace
     rules:
       - name: link_lost
         when: {silence: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 1.0}}
-        in: supervisor              # who runs it; there is nobody else yet
+        in: executor                # who runs it: the executor itself, or its supervisor
         priority: 0                 # of several that hold, the highest decides
         for_s: 0.0                  # the condition must hold so long before `do`
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
@@ -13,10 +13,12 @@
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
         max_missed: 0               # releases that each component may miss for `do`; in undo: for that
 
-What may stand in `when`: see supervision/when.py. Names of topics and of the executor are resolved
-against the supervisor's namespace, as ROS 2 does.
+What may stand in `when`: see supervision/when.py. One file serves both: the executor runs the rules that are
+`in: executor`; its supervisor runs the others, and those too where the executor does not. Names of topics and
+of the executor are resolved against the namespace of who runs the rule, as ROS 2 does.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -25,9 +27,11 @@ from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.steps import MISSED, STEPS, Step, form_error
+from mauve_rt.model.steps import MISSED, STEPS, Step, dotted, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
+from mauve_rt.supervision.outside import inside_only
 from mauve_rt.supervision.when import When, WhenPart
+from mauve_rt.supervision.when_spec import refusal
 
 _SECONDS = Real(least=0)
 MOST_PRIORITY = 1000
@@ -46,13 +50,21 @@ class Rule(Section):
 
     name: str = setting(IDENTIFIER)
     when: When = setting(WhenPart())
-    where: Literal["supervisor"] = setting(Choice("supervisor"), default="supervisor", key="in")
+    where: Literal["executor", "supervisor"] = setting(
+        Choice("executor", "supervisor"), default="executor", key="in"
+    )
     priority: int = setting(Whole(0, MOST_PRIORITY), default=0)
     for_s: float = setting(_SECONDS, default=0.0)
     do: list[Step] = setting(STEPS)
     undo: Undo | None = setting(Part(Undo), default=None)
     cooldown_s: float = setting(_SECONDS, default=0.0)
     max_missed: int = setting(MISSED, default=0)
+
+    def steps(self, act: str) -> list[Step]:
+        """The transaction of `do` or `undo`."""
+        if act == "do":
+            return self.do
+        return self.undo.do if self.undo is not None else []
 
     def targets(self) -> set[str]:
         """Components that must run before the rule is armed: those of which it replaces or sets something."""
@@ -65,6 +77,12 @@ class Rules(Section):
     mauve: Literal[1] = setting(Choice(1))
     executor: str = setting(ROS_NAME, default="executor")
     rules: list[Rule] = setting(ListOf(Part(Rule), few=1))
+
+
+def lacks_type(leaf: When) -> bool:
+    """Whether a condition listens to a topic and does not say of which type."""
+    told = leaf.parameters
+    return bool(told.get("topic")) and not told.get("type")
 
 
 class RulesFile:
@@ -82,11 +100,39 @@ class RulesFile:
         self.rules = Rules.read(self._file.data, (), faults)
         if faults:
             raise form_error(self._file, faults)
+        if problems := list(self._refused()):
+            raise ArchitectureFileError(self.path, problems)
         seen: set[str] = set()
         for index, rule in enumerate(self.rules.rules):
             if rule.name in seen:
                 raise self.error(("rules", index, "name"), f"a second rule named '{rule.name}'")
             seen.add(rule.name)
+
+    def _refused(self) -> Iterator[Problem]:
+        """Of conditions whose parameters are each what they may be, but not together."""
+        for rule in self.rules.rules:
+            for leaf in rule.when.leaves():
+                place = (*leaf.place, leaf.kind)
+                if (error := refusal(leaf)) is not None:
+                    yield self.problem(
+                        (*place, error.element),
+                        f"bad {dotted(place)}: {error.statement}",
+                        expected=error.expected,
+                        found=error.found,
+                        remedy=error.remedy,
+                    )
+                elif rule.where == "supervisor" and lacks_type(leaf):
+                    yield self.untyped(leaf)
+                elif rule.where == "supervisor" and (what := inside_only(leaf)):
+                    remedy = "let the executor run the rule, `in: executor`"
+                    yield self.problem((*place,), f"only in the executor {what}", remedy=remedy)
+
+    def untyped(self, leaf: When) -> Problem:
+        """That a condition in the supervisor lacks the type of the topic to which it listens."""
+        place = (*leaf.place, leaf.kind)
+        what = f"{dotted((*place, 'type'))} is missing: a supervisor has nothing else to tell it the type"
+        remedy = "add the type of the topic, as type: std_msgs/msg/Float64"
+        return self.problem((*place, "topic"), what, remedy=remedy)
 
     @property
     def path(self) -> Path:

@@ -5,43 +5,120 @@
     heard:
       - {topic: radio/in, every_s: 0.1, until_s: 5.0}    # from the start on
       - {topic: radio/in, every_s: 0.1, from_s: 12.0}    # to the end
+      - {state: control, is: FAULTED, from_s: 7.0}       # once
 
-Topics are named as in the rules; `value` is that of the field at which a condition looks.
-What is not said does not happen.
+Each line tells of one thing: messages of a topic, named as in the rules; writes to a resource; overruns,
+late wake-ups or responses, executions longer than declared, releases, the state or changes of a component
+(changes of '': of the architecture); the state of a peer; the level of a diagnostic. `value` is that of
+the field at which a condition looks; counts grow by one with each. What is not said does not happen.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
-from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.model.kinds import Choice, Faults, ListOf, Real
+from mauve_rt._kernel import SignalSpec
+from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Real, Text
 from mauve_rt.model.schema import ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.steps import form_error
-from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.words import did_you_mean, listed
 from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.when_spec import heard
 
 LONGEST_S = 3600.0
 SHORTEST_PERIOD_S = 0.001
+# What each line may be about: the signals of the engine that it tells.
+_SIGNALS: Mapping[str, tuple[str, ...]] = {
+    "topic": ("message", "field"),
+    "resource": ("write", "field"),
+    "overruns": ("overruns",),
+    "late": ("late",),
+    "over_declared": ("over_declared",),
+    "released": ("release",),
+    "state": ("state",),
+    "peer": ("peer",),
+    "diagnostic": ("diagnostic",),
+    "change": ("change",),
+}
+_COUNTED = ("overruns", "late", "over_declared")
+# The values of what has words for them, from 0 on.
+_WORDS: Mapping[str, tuple[str, ...]] = {
+    "state": ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED"),
+    "peer": ("unheard", "there", "another_instance", "faulted", "gone"),
+    "diagnostic": ("OK", "WARN", "ERROR", "STALE"),
+}
 
 
 class Heard(Section):
-    """Samples on a topic, at equal distances. `value`: of the field at which a condition looks."""
+    """One thing that happens, once or at equal distances."""
 
-    topic: str = setting(ROS_NAME)
+    topic: str | None = setting(ROS_NAME, default=None)
+    resource: str | None = setting(Text(), default=None)
+    overruns: str | None = setting(Text(), default=None)
+    late: str | None = setting(Text(), default=None)
+    over_declared: str | None = setting(Text(), default=None)
+    released: str | None = setting(Text(), default=None)
+    state: str | None = setting(Text(), default=None)
+    peer: str | None = setting(Text(), default=None)
+    diagnostic: str | None = setting(Text(), default=None)
+    change: str | None = setting(Text(), default=None)
+    word: str | None = setting(
+        Choice(*dict.fromkeys(each for words in _WORDS.values() for each in words)), default=None, key="is"
+    )
     value: float = setting(Real(), default=0.0)
-    every_s: float = setting(Real(least=SHORTEST_PERIOD_S))
+    every_s: float | None = setting(Real(least=SHORTEST_PERIOD_S), default=None)  # absent: once
     from_s: float = setting(Real(least=0, most=LONGEST_S), default=0.0)
     until_s: float = setting(Real(least=0, most=LONGEST_S), default=LONGEST_S)
 
-    def instants_s(self, end_s: float) -> Iterator[float]:
-        """When there is one, up to and with `end_s`."""
+    def misfit(self) -> Fault | None:
+        """It is about one thing, and has a word where that has words."""
+        named = [name for name in _SIGNALS if getattr(self, name) is not None]
+        if len(named) != 1:
+            found = " and ".join(named) or "none of them"
+            return Fault((), "form", limit=f"exactly one of {listed(_SIGNALS)}", found=found)
+        words = _WORDS.get(named[0], ())
+        if words and self.word is None:
+            return Fault((), "missing", limit="is")
+        if words and self.word not in words:
+            return Fault(("is",), "choice", limit=listed(words), found=self.word, known=words)
+        if not words and self.word is not None:
+            return Fault(("is",), "rule", limit=f"what is said of {named[0]} has no words", found=self.word)
+        return None
+
+    @property
+    def what(self) -> str:
+        """The key that names it."""
+        return next(name for name in _SIGNALS if getattr(self, name) is not None)
+
+    @property
+    def of(self) -> str:
+        """The name of what it is about."""
+        return str(getattr(self, self.what))
+
+    def tells(self, signal: SignalSpec) -> bool:
+        """Whether a condition that listens to this hears it."""
+        return signal.kind in _SIGNALS[self.what] and signal.target == self.of
+
+    def samples(self, end_s: float) -> Iterator[tuple[float, float]]:
+        """When it happens, up to and with `end_s`, and the value that is told then."""
         number = 0
-        while (at_s := self.from_s + number * self.every_s) <= min(self.until_s, end_s):
-            yield at_s
+        while (at_s := self.from_s + number * (self.every_s or 0.0)) <= min(self.until_s, end_s):
             number += 1
+            yield at_s, self._value_of(number)
+            if self.every_s is None:
+                return
+
+    def _value_of(self, number: int) -> float:
+        if self.word is not None:
+            return float(_WORDS[self.what].index(self.word))
+        if self.what in _COUNTED:
+            return float(number)
+        if self.what == "released":  # with it the component's period
+            return self.every_s or self.value
+        return self.value
 
 
 class Script(Section):
@@ -56,23 +133,25 @@ def load_script(path: Path, rules: Sequence[Rule]) -> Script:
     """A checked script for these rules.
 
     Raises:
-        ArchitectureFileError: it cannot be read, is no YAML, breaks the schema or names a topic of no rule.
+        ArchitectureFileError: it cannot be read, is no YAML, breaks the schema or tells nobody anything.
     """
     file = YamlFile(path)
     faults: Faults = []
     script = Script.read(file.data, (), faults)
     if faults:
         raise form_error(file, faults)
-    known = sorted({leaf.parameters["topic"] for rule in rules for leaf in rule.when.leaves()})
+    signals = [signal for rule in rules for leaf in rule.when.leaves() for signal in heard(leaf)]
     problems = [
-        file.problem(
-            ("heard", index, "topic"),
-            f"no rule listens to topic {heard.topic}",
-            remedy=did_you_mean(heard.topic, known),
-        )
-        for index, heard in enumerate(script.heard)
-        if heard.topic not in known
+        _unheard(file, index, told, signals)
+        for index, told in enumerate(script.heard)
+        if not any(told.tells(signal) for signal in signals)
     ]
     if problems:
         raise ArchitectureFileError(path, problems)
     return script
+
+
+def _unheard(file: YamlFile, index: int, told: Heard, signals: Sequence[SignalSpec]) -> Problem:
+    known = {signal.target for signal in signals if signal.kind in _SIGNALS[told.what]}
+    what = f"no rule listens to {told.what} {told.of}"
+    return file.problem(("heard", index, told.what), what, remedy=did_you_mean(told.of, known))

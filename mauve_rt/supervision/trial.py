@@ -2,106 +2,116 @@
 
 import heapq
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import count
 
 from mauve_rt.control.requests import Request
-from mauve_rt.supervision.condition_tree import TreeCondition
-from mauve_rt.supervision.conditions import TopicCondition, topic_condition
-from mauve_rt.supervision.engine import CHECK_PERIOD_S, Decision, RuleEngine, Standing
+from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.pretended_executor import PretendedExecutor
+from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rules import Rule
-from mauve_rt.supervision.script import Script
-from mauve_rt.supervision.when import When
+from mauve_rt.supervision.script import Heard, Script
 
 COLUMNS = 60
-_SIGNS: dict[Standing, str] = {"not armed": " ", "false": ".", "true": "?", "in effect": "#"}
-LEGEND = "topics: - heard   rules: . false   ? true, not acted on   # in effect"
-
-
-@dataclass(frozen=True)
-class Told:
-    """A decision and when it was made, s from the start."""
-
-    at_s: float
-    decision: Decision
+LEGEND = "heard: -   rules: . false   ? true, not acted on   # in effect"
 
 
 class Trial:
     """One run of a script. The story and the timeline are known when it is made."""
 
     def __init__(self, rules: Sequence[Rule], script: Script) -> None:
-        self.story: list[Told] = []
+        self.story: list[Decision] = []
         self._script = script
+        self._end_ns = round(script.lasts_s * 1e9)
+        self._now_ns = 0
         self._names = [rule.name for rule in rules]
-        self._now_s = 0.0
-        self._heard: dict[str, list[TopicCondition]] = {}
-        self._topic_rows: dict[str, list[str]] = {}
+        self._heard_rows = {one.of: [" "] * COLUMNS for one in script.heard}
         self._rule_rows = {name: [" "] * COLUMNS for name in self._names}
+        self._drawn = 0  # columns of the rules
         self._executor = PretendedExecutor(rules)
         self._wanted: list[Request] = []
-        self._engine = RuleEngine(
-            [(rule, TreeCondition(rule.when, self._condition)) for rule in rules],
+        self._rules = RemoteRules(
+            rules,
             act=self._wanted.append,
-            decide=lambda decision: self.story.append(Told(self._now_s, decision)),
-            look=lambda: self._engine.on_inventory(self._now_s, self._executor.inventory()),
+            decide=self.story.append,
+            look=lambda: self._rules.on_inventory(self._now_ns, self._executor.inventory()),
             ids=map(str, count(1)),
+            hears_all=True,
         )
         self._run()
 
     def timeline(self) -> Iterator[str]:
-        """A row for each topic and each rule, over the script's time."""
-        rows = {**self._topic_rows, **self._rule_rows}
+        """A row for each thing that is heard and each rule, over the script's time."""
+        rows = {**self._heard_rows, **self._rule_rows}
         width = max(map(len, rows))
         end = f"{self._script.lasts_s:g} s"
         yield f"{'':{width}}  0{end:>{COLUMNS - 1}}"
         for name, row in rows.items():
             yield f"{name:{width}} |{''.join(row)}|"
 
-    def _condition(self, leaf: When) -> TopicCondition:
-        topic = leaf.parameters["topic"]
-        condition = topic_condition(leaf, topic)
-        self._heard.setdefault(topic, []).append(condition)
-        self._topic_rows.setdefault(topic, [" "] * COLUMNS)
-        return condition
-
     def _run(self) -> None:
-        self._engine.on_state(0.0, self._executor.view())
-        samples = self._samples()
-        sample = next(samples, None)
-        for number in range(int(self._script.lasts_s / CHECK_PERIOD_S + 1e-6) + 1):
-            look_s = number * CHECK_PERIOD_S
-            while sample is not None and sample[0] <= look_s:
-                self._hear(*sample)
-                sample = next(samples, None)
-            self._now_s = look_s
-            self._engine.tick(look_s)
-            self._answer()
-            for name, standing in self._engine.standing().items():
-                self._rule_rows[name][self._column()] = _SIGNS[standing]
+        self._rules.on_state(0, self._executor.view())
+        due_ns = self._tick()
+        for at_ns, one, value in self._samples():
+            while due_ns < at_ns:
+                due_ns = self._tick(due_ns)
+            self._move(at_ns)
+            self._hear(one, value)
+            if self._rules.is_stirred:
+                due_ns = self._tick()
+        while due_ns <= self._end_ns:
+            due_ns = self._tick(due_ns)
+        self._move(self._end_ns)
+        self._draw(COLUMNS)
 
-    def _samples(self) -> Iterator[tuple[float, str, float]]:
-        """Instants, topics and values, in the order of time."""
+    def _samples(self) -> Iterator[tuple[int, Heard, float]]:
+        """Instants, what is heard, values, in the order of time."""
         end_s = self._script.lasts_s
         each = (
-            [(at_s, one.topic, one.value) for at_s in one.instants_s(end_s)] for one in self._script.heard
+            ((round(at_s * 1e9), number, value) for at_s, value in one.samples(end_s))
+            for number, one in enumerate(self._script.heard)
         )
-        return heapq.merge(*each)
+        for at_ns, number, value in heapq.merge(*each):
+            yield at_ns, self._script.heard[number], value
 
-    def _hear(self, at_s: float, topic: str, value: float) -> None:
-        self._now_s = at_s
-        for condition in self._heard[topic]:
-            condition.hear(at_s, value)
-        self._topic_rows[topic][self._column()] = "-"
+    def _hear(self, one: Heard, value: float) -> None:
+        for number, signal in enumerate(self._rules.signals):
+            if one.tells(signal):
+                self._rules.hear(number, self._now_ns, value)
+        self._heard_rows[one.of][self._column()] = "-"
 
-    def _column(self) -> int:
-        return min(int(self._now_s / self._script.lasts_s * COLUMNS), COLUMNS - 1)
-
-    def _answer(self) -> None:
-        """The executor's, to what was wanted: at once."""
+    def _tick(self, at_ns: int = 0) -> int:
+        """Let the rules look, now or at an instant to come; when they have to look again."""
+        self._move(max(at_ns, self._now_ns))
+        due_ns = self._rules.tick(self._now_ns)
         while self._wanted:
             request = self._wanted.pop(0)
             outcome = self._executor.handle(request)
-            self._engine.on_outcome(self._now_s, request.request_id, outcome)
+            self._rules.on_outcome(self._now_ns, request.request_id, outcome)
             if not request.dry_run:
-                self._engine.on_state(self._now_s, self._executor.view())
+                self._rules.on_state(self._now_ns, self._executor.view())
+            due_ns = self._rules.tick(self._now_ns)
+        for name, row in self._rule_rows.items():
+            row[self._column()] = self._sign(name)
+        return due_ns
+
+    def _move(self, now_ns: int) -> None:
+        """Time goes on; until then the rules stand as they do."""
+        self._now_ns = now_ns
+        self._draw(self._column())
+
+    def _draw(self, columns: int) -> None:
+        for name, row in self._rule_rows.items():
+            for column in range(self._drawn, columns):
+                row[column] = self._sign(name)
+        self._drawn = max(self._drawn, columns)
+
+    def _sign(self, name: str) -> str:
+        status = self._rules.status(self._names.index(name))
+        if status.in_effect:
+            return "#"
+        if not status.armed:
+            return " "
+        return "?" if status.holds else "."
+
+    def _column(self) -> int:
+        return min(int(self._now_ns / self._end_ns * COLUMNS), COLUMNS - 1)

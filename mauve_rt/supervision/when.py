@@ -16,7 +16,7 @@ from typing import Any
 
 from mauve_rt.model.kinds import Fault, Faults, Kind, ListOf, Real, Whole
 from mauve_rt.model.yaml_file import Location
-from mauve_rt.supervision.condition_table import conditions, parameter_kind
+from mauve_rt.supervision.condition_table import conditions, parameter_kind, parameters_of
 
 ALL, ANY, NOT, AT_LEAST = "all", "any", "not", "at_least"
 COMBINATIONS = (ALL, ANY, NOT, AT_LEAST)
@@ -113,21 +113,19 @@ def read_condition(kind: str, value: Any, place: Location, faults: Faults) -> di
     if not isinstance(value, dict):
         faults.append(Fault(place, "mapping", found=value))
         return {}
-    known = conditions()[kind].parameters
+    known = parameters_of(kind)
     read = {}
     for key, each in value.items():
         if key in known:
             read[key] = parameter_kind(known[key]).read(each, (*place, key), faults)
         else:
             faults.append(Fault((*place, key), "unknown", known=tuple(known)))
+    is_misspelt = any(key not in known for key in value)  # then that is the key which is missing
     for key, parameter in known.items():
-        if key in value:
+        if key in value or (parameter.required and is_misspelt):
             continue
         if parameter.required:
             faults.append(Fault(place, "missing", limit=key))
         else:
             read[key] = parameter.initial
-    any_of = conditions()[kind].any_of
-    if any_of and not any(name in value for name in any_of):
-        faults.append(Fault(place, "form", limit=f"{' or '.join(any_of)}, or both", found=", ".join(value)))
     return read

@@ -1,5 +1,8 @@
 """Cores in Python for the executor's tests."""
 
+import ctypes
+import os
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -130,3 +133,16 @@ class PyPatient(PyCounter):
         until_s = time.monotonic() + 60.0
         while not awaited.exists() and time.monotonic() < until_s:
             time.sleep(0.001)
+
+
+class PyKeeping(PyCounter):
+    """Keeps the interpreter for 5 s, once there is a file of the process; says in it that it does."""
+
+    def act(self) -> None:
+        """Count once, or keep it: a PyDLL's functions are called without letting go of the interpreter."""
+        awaited = Path(tempfile.gettempdir()) / f"mauve_keeping_{os.getpid()}"
+        if awaited.exists() and not awaited.stat().st_size:
+            awaited.write_text("keeping", encoding="utf-8")
+            ctypes.PyDLL(None).usleep(5_000_000)
+            awaited.write_text("over", encoding="utf-8")
+        super().act()

@@ -255,11 +255,40 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
         "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
     ),
-    "It has the executor check its rules when it arms them": (
+    "The executor runs them itself (`-p rules:=FILE`), on native threads beside the components": (
+        "ros/executor/test_rules.py::test_acts_undoes_and_tells",
+    ),
+    "what a rule does is prepared while the rule is armed": (
+        "bench: , later than 1 period + 1 ms",
+        "ReflexTest.PreparesNothingWhenItIsTime",
+        "ReflexTest.ActsWhileNothingCanBePrepared",
+        "ros/executor/test_rules.py::test_what_cannot_be_made_ready_is_an_error_at_once",
+    ),
+    "`mauve rules list` shows how those of an executor fare": (
+        "ros/executor/test_rules.py::test_the_command_lists_and_loads",
+    ),
+    "so that it acts while a component keeps Python's interpreter": (
+        "ros/executor/test_rules.py::test_acts_while_a_component_in_python_keeps_the_interpreter",
+    ),
+    "and while its supervisor is stopped or dead": (
+        "ros/executor/test_rules.py::test_acts_without_its_supervisor",
+    ),
+    "Every decision is told on `~/decisions` and in the bag": (
+        "ros/executor/test_rules.py::test_acts_undoes_and_tells",
+        "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
+    ),
+    "what can no longer be prepared is an ERROR in `/diagnostics` at once": (
+        "ros/executor/test_rules.py::test_what_cannot_be_made_ready_is_an_error_at_once",
+    ),
+    "`~/load_rules` puts the rules of a file in the place of the present ones, all or none": (
+        "ros/executor/test_rules.py::test_rules_are_loaded_anew_whole_or_not_at_all",
+    ),
+    "it runs the rules that are `in: supervisor`, and those that the executor does not run": (
         "ros/supervisor/test_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
     ),
-    "undoes what a supervisor before it did": (
+    "who starts while something is in effect takes it as its own": (
         "ros/supervisor/test_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
+        "ros/executor/test_rules.py::test_takes_up_what_is_in_effect",
     ),
     "Conditions are combined by `all`, `any`, `not`, `at_least`, `for_s` and `within_s`": (
         "python/supervision/test_rule_trees.py::test_what_is_combined",
@@ -272,7 +301,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`mauve rules check FILE` finds rules that cannot be meant and says how long each may take at most": (
         "python/cli/test_rules.py::test_a_rule_that_can_never_hold",
         "python/cli/test_rules.py::test_two_that_want_different_things_at_once",
-        "python/cli/test_rules.py::test_good_rules_and_their_bounds",
+        "python/cli/test_rules_bounds.py::test_in_the_executor",
     ),
     "plays a script to them in virtual time, tells what they decide and draws it": (
         "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
@@ -601,7 +630,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "*when* nothing was heard for so long, *do* this transaction, and *undo* it": (
         "ros/supervisor/test_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
-        "python/supervision/test_rules_engine.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
+        "python/supervision/test_remote_rules.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
     ),
     "fixed-size records that component threads put into wait-free rings": (
         "TraceRing.LosesNothingBetweenTwoThreads",
@@ -716,6 +745,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| page faults of a component's thread after its core was replaced": (
         "bench: page faults of a component's thread after its core was replaced by one with 8 MiB",
     ),
+    "| from the deadline of an input's silence to the safe core's first release": (
+        "bench: from the deadline of an input's silence to the first release of the safe core at 1 kHz",
+    ),
+    "| of these later than 1 period + 1 ms": ("bench: , later than 1 period + 1 ms",),
+    "| from the input's last write to that release, worst": (
+        "bench: from the last write to that release, worst",
+    ),
     "| wake-ups a second of 8 components that wait": (
         "bench: 8 components that wait, none with a bound: wake-ups a second of all threads",
     ),
@@ -824,6 +860,7 @@ PROMISE_NOTHING = (
     "Your machine will show others",
     "The soak is from `--full`",
     "(5*) Of 2026-11-23",
+    "(6*) Of the evening",
     "(**) Of the same day",
     "(***) Of the evening",
     "(****) Of the night after",
@@ -833,5 +870,5 @@ PROMISE_NOTHING = (
     "| `benchmarks/`",
     "Licence:",
     "From Python:",
-    "The **supervisor** watches topics and applies rules",
+    "**Rules** (`mauve_examples/architecture/supervisor.yaml`) let a robot degrade gracefully:",
 )

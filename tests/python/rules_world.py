@@ -5,13 +5,11 @@ from dataclasses import dataclass, field
 from itertools import count
 
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.supervision.condition_tree import TreeCondition
-from mauve_rt.supervision.conditions import TopicCondition, topic_condition
-from mauve_rt.supervision.engine import Decision, RuleEngine
+from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rule import ArchitectureView, ComponentView
 from mauve_rt.supervision.rules import Rule
-from mauve_rt.supervision.when import When
 
 TICK_S = 0.05
 LOCAL = "mauve_examples/LocalExploration"
@@ -51,6 +49,7 @@ class World:
     telling: bool = True  # the executor publishes ~/state
     listing: bool = True  # the executor answers ~/list_components
     inactive: bool = False
+    own_rules: frozenset[str] = frozenset()  # that the executor runs itself
     value: float = 0.0  # of every field
     quiet: set[str] = field(default_factory=set)  # topics on which nobody speaks
     properties: dict[str, str] = field(default_factory=dict)  # of every component
@@ -65,10 +64,14 @@ class World:
     components: dict[str, ComponentView] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._heard: list[tuple[str, TopicCondition]] = []  # by topic
-        pairs = [(rule, TreeCondition(rule.when, self._condition)) for rule in self.rules]
-        ids = map(str, count(1))
-        self.engine = RuleEngine(pairs, act=self._act, decide=self.decisions.append, look=self._look, ids=ids)
+        self.engine = RemoteRules(
+            self.rules,
+            act=self._act,
+            decide=self.decisions.append,
+            look=self._look,
+            ids=map(str, count(1)),
+            name=lambda topic: f"/{topic}",
+        )
         self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
         self._last_word_s = self.now_s
 
@@ -77,8 +80,8 @@ class World:
         self.components.update(components or {})
         self.revision += 1
         if self.telling:
-            view = ArchitectureView(self.instance_id, self.revision, dict(self.components))
-            self.engine.on_state(self.now_s, view)
+            view = ArchitectureView(self.instance_id, self.revision, dict(self.components), self.own_rules)
+            self.engine.on_state(self.now_ns, view)
 
     def run(self, seconds: float) -> None:
         end_s = self.now_s + seconds - TICK_S / 2
@@ -87,19 +90,17 @@ class World:
             if self.talking and self.now_s - self._last_word_s >= 0.2:
                 self._last_word_s = self.now_s
                 self.hear()
-            self.engine.tick(self.now_s)
+            self.engine.tick(self.now_ns)
+
+    @property
+    def now_ns(self) -> int:
+        return round(self.now_s * 1e9)
 
     def hear(self) -> None:
         """A sample on every topic that is not quiet."""
-        for topic, condition in self._heard:
-            if topic not in self.quiet:
-                condition.hear(self.now_s, self.value)
-
-    def _condition(self, leaf: When) -> TopicCondition:
-        topic = leaf.parameters["topic"]
-        condition = topic_condition(leaf, f"/{topic}")
-        self._heard.append((topic, condition))
-        return condition
+        for number, signal in enumerate(self.engine.signals):
+            if signal.target not in self.quiet and signal.kind in ("message", "field"):
+                self.engine.hear(number, self.now_ns, self.value)
 
     def _look(self) -> None:
         if not self.listing:
@@ -108,7 +109,7 @@ class World:
             name: ListedComponent(state=view.state, core=view.core, properties=self.properties)
             for name, view in self.components.items()
         }
-        self.engine.on_inventory(self.now_s, Inventory(self.instance_id, components))
+        self.engine.on_inventory(self.now_ns, Inventory(self.instance_id, components))
 
     def _try(self, request: Request) -> None:
         self.trials.append(request)
@@ -117,7 +118,7 @@ class World:
         words = "not active" if self.inactive else f"no core {strange[0]}" if strange else ""
         code = Code.NOT_ACTIVE if self.inactive else Code.UNKNOWN_CORE if words else Code.OK
         outcome = Outcome(code=code, message=words)
-        self.engine.on_outcome(self.now_s, request.request_id, outcome)
+        self.engine.on_outcome(self.now_ns, request.request_id, outcome)
 
     def _act(self, request: Request) -> None:
         if request.dry_run:
@@ -128,12 +129,12 @@ class World:
         if not self.answering:
             return
         if self.refusals:
-            self.engine.on_outcome(self.now_s, request.request_id, self.refusals.pop(0))
+            self.engine.on_outcome(self.now_ns, request.request_id, self.refusals.pop(0))
             return
         step = request.steps[0]
         self.tell({step.target: ComponentView("RUNNING", step.name)})
         outcome = Outcome(code=Code.OK, message="done", revision=self.revision)
-        self.engine.on_outcome(self.now_s, request.request_id, outcome)
+        self.engine.on_outcome(self.now_ns, request.request_id, outcome)
 
     def said(self) -> list[str]:
         return [decision.decision for decision in self.decisions]

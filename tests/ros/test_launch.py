@@ -46,6 +46,7 @@ mauve: 1
 rules:
   - name: quiet
     when: {silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 60.0}}
+    in: supervisor
     do: [{kind: stop, target: guard}]
 """
 

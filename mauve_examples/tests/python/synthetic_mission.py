@@ -246,6 +246,10 @@ class FakeRobot:
             silence_s=SILENCE_S if decision == "do" else 0.04,
             revision=1,
             message="",
+            act=decision,
+            measured=SILENCE_S,
+            took_s=-1.0,
+            bound_s=-1.0,
         )
         topic = f"/{self.name}/supervisor/decisions"
         self.sent.append((topic, "mauve_msgs/msg/SupervisorDecision", message, time_ns))

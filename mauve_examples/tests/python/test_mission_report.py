@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from mauve_examples.mission.evidence import CoverageHistory, read_robot, replay_
 from mauve_examples.mission.facts import MissionArea, MissionFacts
 from mauve_examples.mission.results import write_results
 from mauve_examples.mission.summary import build_summary, failure_reasons
+from mauve_examples.mission.swaps import find_swaps
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +78,9 @@ def test_the_summary_tells_what_was_measured(mission: Mission, summary: dict[str
         "to": ALONE,
         "cause": "link_lost: peer silent for 1.0 s",
         "silence_ms": SILENCE_S * 1e3,
+        "decided_by": "/robot_1/supervisor",
+        "took_ms": None,
+        "bound_ms": None,
         "prepare_us": PREPARE_NS / 1e3,
         "blackout_us": BLACKOUT_NS / 1e3,
         "missed_releases": 0,
@@ -93,6 +98,23 @@ def test_the_summary_tells_what_was_measured(mission: Mission, summary: dict[str
         "priority": 70,
         "cpus": [1],
     }
+
+
+def test_of_decisions_with_the_same_cause_each_swap_has_its_own(mission: Mission):
+    evidence = read_robot(mission.out / "bag" / "robot_1", "robot_1", mission.facts)
+    away_ns, away = next(one for one in evidence.decisions if one[1].decision == "do")
+
+    def told(after_s: float, took_s: float) -> list[tuple[int, Any]]:
+        more = {"rule": away.rule, "reason": away.reason, "bound_s": 1.0, "silence_s": 1.0, "took_s": took_s}
+        at_ns = away_ns + round(after_s * S)
+        return [
+            (at_ns, SimpleNamespace(decision="do", **more)),
+            (at_ns + 1, SimpleNamespace(decision="done", **more)),
+        ]
+
+    decisions = [*told(-1.5, 0.1), *told(0.0, 0.2), *told(1.5, 0.3)]
+    swaps = find_swaps(replace(evidence, decisions=decisions))
+    assert [swap.took_ms for swap in swaps] == [200.0, None]
 
 
 def test_coverage_is_that_of_the_robots_maps(mission: Mission, summary: dict[str, Any]):

@@ -65,6 +65,10 @@ def test_the_summary_tells_of_both_swaps_of_every_robot(summary: dict[str, Any])
         assert there["silence_ms"] > 1000.0
         assert back["silence_ms"] < 1000.0
         for swap in swaps:
+            assert swap["decided_by"] == f"/{robot}/executor"
+            assert swap["took_ms"] > 0.0
+            assert swap["bound_ms"] > 0.0
+        for swap in swaps:
             assert swap["prepare_us"] > 0.0
             assert swap["blackout_us"] > 0.0
             assert swap["missed_releases"] == 0
@@ -98,7 +102,14 @@ def test_the_bags_open_and_agree_with_the_summary(mission: Demo, summary: dict[s
         bag = mission.out / "bag" / robot
         assert_rosbag2_reads(bag)
         counts = topics(bag)
-        names = ("pose", "goal", "map_updates", "executor/events", "supervisor/decisions")
+        names = (
+            "pose",
+            "goal",
+            "map_updates",
+            "executor/events",
+            "executor/decisions",
+            "supervisor/decisions",
+        )
         assert {f"/{robot}/{name}" for name in names} <= counts.keys()
         events = [event for event in messages(bag, f"/{robot}/executor/events") if event.to_core]
         swaps = summary["robots"][robot]["reconfigurations"]
@@ -106,8 +117,8 @@ def test_the_bags_open_and_agree_with_the_summary(mission: Demo, summary: dict[s
         assert [event.cause for event in events] == [swap["cause"] for swap in swaps]
         for event, swap in zip(events, swaps, strict=True):
             assert event.report[0].blackout_ns / 1e3 == pytest.approx(swap["blackout_us"], abs=1.0)
-            assert event.requested_by == f"/{robot}/supervisor"
-        decisions = [decision.decision for decision in messages(bag, f"/{robot}/supervisor/decisions")]
+            assert event.requested_by == f"/{robot}/executor"
+        decisions = [decision.decision for decision in messages(bag, f"/{robot}/executor/decisions")]
         assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
 
 

@@ -97,12 +97,18 @@ def test_both_robots_swap_there_and_back_and_miss_nothing(mission: Demo):
 
 def test_the_bags_hold_what_those_of_the_real_demo_hold(mission: Demo):
     own = ("pose", "goal", "done", "map_updates", "radio/out", "radio/in", "supervisor/decisions")
-    executor = ("executor/state", "executor/events", "executor/trace/batches", "executor/trace/names")
+    executor = (
+        "executor/state",
+        "executor/events",
+        "executor/decisions",
+        "executor/trace/batches",
+        "executor/trace/names",
+    )
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
         assert_rosbag2_reads(bag)
         assert {*(f"/{robot}/{name}" for name in own + executor), "/radio/link"} <= topics(bag).keys()
-        decisions = [one.decision for one in messages(bag, f"/{robot}/supervisor/decisions")]
+        decisions = [one.decision for one in messages(bag, f"/{robot}/executor/decisions")]
         assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
 
 

@@ -174,6 +174,11 @@ class BoundResources:
             found.setdefault(call.resource, {})[side] = call.service
         return found
 
+    def heard(self) -> dict[str, str]:
+        """The resource that takes the messages of each topic; of several the last."""
+        names = self.bindings()
+        return {sides["subscribes"]: name for name, sides in names.items() if "subscribes" in sides}
+
     def topics(self) -> list[TopicReport]:
         """How each bound topic fares."""
         bridge = self._bridge

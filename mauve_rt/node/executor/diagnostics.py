@@ -9,12 +9,13 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import CallReport, TopicReport
-from mauve_rt._kernel import ComponentDescription, RecentMaxima, allocation_counting
+from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, allocation_counting
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
+from mauve_rt.node.executor.rules import OwnRules
 
 _ONE = ThresholdModel(warn=1)
 _DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
@@ -22,15 +23,21 @@ _PYTHON_DEFAULTS = DiagnosticsModel(overruns=_ONE)  # the interpreter allocates 
 
 
 class Diagnostics:
-    """/diagnostics: a status per component, bound topic and service, the bag, the process. On the timer."""
+    """/diagnostics: of every component, bound topic and service, rule, the bag, the process. On the timer."""
 
     def __init__(
-        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, recording: Recording
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        bound: BoundResources,
+        recording: Recording,
+        rules: OwnRules,
     ) -> None:
         self._node = node
         self._runtime = runtime
         self._bound = bound
         self._recording = recording
+        self._rules = rules
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -44,6 +51,7 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
+        array.status += [self._rule(facts) for facts in self._rules.facts()]
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
         array.status.append(self._process(error))
@@ -158,6 +166,22 @@ class Diagnostics:
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(name, level, "; ".join(remarks) or "no trouble", values)
 
+    def _rule(self, facts: RuleFacts) -> Any:
+        """What cannot be made ready is told before it is needed."""
+        status = facts.status
+        level, message = DiagnosticStatus.OK, _standing(facts)
+        if facts.problem:
+            level, message = DiagnosticStatus.ERROR, f"cannot act: {facts.problem}"
+        values: dict[str, object] = {
+            "armed": status.armed,
+            "condition": status.holds,
+            "in_effect": status.in_effect,
+            "ready": facts.ready,
+            "measured": status.measured,
+            "memory_bytes": facts.memory_bytes,
+        }
+        return self._status(f"rule {facts.name}", level, message, values)
+
     def _bag(self, status: RecordingStatus) -> Any:
         remarks = self._grown("recording", {"messages dropped": status.dropped})
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
@@ -218,3 +242,15 @@ class Diagnostics:
             hardware_id=self._node.get_namespace(),
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def _standing(facts: RuleFacts) -> str:
+    """How a rule stands, in words."""
+    status = facts.status
+    if not status.armed:
+        return "not armed: what it is about does not run"
+    if status.in_effect:
+        return "in effect"
+    if status.left_alone:
+        return "left alone: its work was changed by another hand"
+    return "its condition holds" if status.holds else "watching"

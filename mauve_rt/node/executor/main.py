@@ -1,8 +1,8 @@
 """The executor process: runs the architecture of a file.
 
-    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-r __ns:=/robot_1] [-p bag:=DIR]
-        [-p autostart:=false] [-p require_realtime:=true] [-p trace:=false] [-p peers:=[robot_2]]
-        [-p COMPONENT.PROPERTY:=VALUE]
+    ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-p rules:=FILE] [-r __ns:=/robot_1]
+        [-p bag:=DIR] [-p autostart:=false] [-p require_realtime:=true] [-p trace:=false]
+        [-p peers:=[robot_2]] [-p COMPONENT.PROPERTY:=VALUE]
         [-p record_topics:="['supervisor/decisions:mauve_msgs/msg/SupervisorDecision:transient_local']"]
 
 Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.

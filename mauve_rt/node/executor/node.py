@@ -11,6 +11,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from mauve_rt.control.control import Control
 from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
@@ -19,6 +20,7 @@ from mauve_rt.node.executor.diagnostics import Diagnostics
 from mauve_rt.node.executor.parameter_services import ParameterServices
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
+from mauve_rt.node.executor.rules import OwnRules, load_reply
 from mauve_rt.node.executor.services import Services
 from mauve_rt.node.executor.settings import PARAMETERS
 from mauve_rt.node.executor.state import StatePublisher
@@ -62,8 +64,18 @@ class ExecutorNode(LifecycleNode):
         self._bound = BoundResources(self)
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
-        self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording)
         self._properties = Parameters(self, runtime)
+        self._rules = OwnRules(
+            self,
+            runtime,
+            topics=self._bound.heard,
+            publish=self._state.send,
+            event=self._state.event,
+            follow=self._properties.follow,
+            watch=self.watch,
+        )
+        self._state.rules = self._rules.names
+        self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording, self._rules)
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
         control = Control(
@@ -80,6 +92,8 @@ class ExecutorNode(LifecycleNode):
             bound=self._bound,
             state=self._state,
             parameters=self._properties,
+            rules=self._rules,
+            load_rules=self._load_rules,
             watch=self.watch,
             warnings=self._name_watch.warnings,
             control_group=control_group,
@@ -153,8 +167,9 @@ class ExecutorNode(LifecycleNode):
         self._properties.follow()
         self._bound.configure(self._runtime.model, self._runtime.architecture)
         with self._properties.lock:
-            names = ("bag", "record_topics", "bag_split_s", "bag_split_bytes")
-            bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
+            names = ("rules", "bag", "record_topics", "bag_split_s", "bag_split_bytes")
+            rules, bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
+        self._rules.configure(rules)
         if bag:
             self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
         self._log_realtime()
@@ -167,6 +182,7 @@ class ExecutorNode(LifecycleNode):
         with self._starting_or_ending:
             self._runtime.activate()
             self._bound.start()
+            self._rules.start()  # first, so that ~/state names them from the first time on
             self._state.start(self._runtime.host)
         self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
 
@@ -218,6 +234,7 @@ class ExecutorNode(LifecycleNode):
     def quiesce(self) -> None:
         """Outputs safe, components parked, last words published, threads joined. May be called again."""
         with self._starting_or_ending:
+            self._rules.stop()
             if self._runtime.active:
                 self._runtime.deactivate()
                 self.watch.guarded("~/state", self._state.refresh)()
@@ -237,6 +254,7 @@ class ExecutorNode(LifecycleNode):
             except MauveError as error:
                 self.get_logger().error(str(error))
                 self._recording.stop()
+                self._rules.close()
                 self._bound.close()
         finally:
             self._state.close()
@@ -255,9 +273,20 @@ class ExecutorNode(LifecycleNode):
         self._runtime.require_parked()
         self._state.flush()
         self._recording.stop()
+        self._rules.close()
         self._bound.close()
         self._runtime.cleanup()
         self._properties.follow()
+
+    def _load_rules(self, path: str) -> tuple[Code, str]:
+        """Rules in the place of the present ones; not while a transition starts or ends threads."""
+        with self._starting_or_ending:
+            if not self._runtime.configured:
+                return (
+                    Code.NOT_ACTIVE,
+                    "configure the executor first: nothing is there that rules could be about",
+                )
+            return load_reply(self._rules, path)
 
     def _tell_health(self) -> None:
         self._state.look_for_hung()

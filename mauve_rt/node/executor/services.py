@@ -10,6 +10,8 @@ from rclpy.lifecycle import LifecycleNode
 
 from mauve_msgs.srv import (
     ListComponents,
+    ListRules,
+    LoadRules,
     Reconfigure,
     ReplaceCore,
     Start,
@@ -18,7 +20,7 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.control.control import Control
-from mauve_rt.control.requests import Outcome, RecordingOrder, Request
+from mauve_rt.control.requests import Code, Outcome, RecordingOrder, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
 from mauve_rt.model.step_kinds import STEP_KINDS
@@ -27,6 +29,7 @@ from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import log_request
 from mauve_rt.node.executor.events import Event
 from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.rules import OwnRules
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.shared.watch import Watch
 
@@ -52,6 +55,8 @@ class Services:
         bound: BoundResources,
         state: StatePublisher,
         parameters: Parameters,
+        rules: OwnRules,
+        load_rules: Callable[[str], tuple[Code, str]],
         warnings: Callable[[], list[str]],
         watch: Watch,
         control_group: CallbackGroup,
@@ -62,11 +67,15 @@ class Services:
         self._control = control
         self._bound = bound
         self._state = state
+        self._rules = rules
+        self._load_rules = load_rules
         self._logger = node.get_logger()
         # The change is made by then: what is wrong here is told, and no refusal of it.
         self._follow = watch.guarded("the parameters", parameters.follow)
         self._untold = _Untold()
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
+        node.create_service(ListRules, "~/list_rules", self._list_rules, callback_group=query_group)
+        node.create_service(LoadRules, "~/load_rules", self._on_load_rules, callback_group=control_group)
         for service, name, translate in (
             (Stop, "~/stop", _stop),
             (Start, "~/start", _start),
@@ -119,6 +128,24 @@ class Services:
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         response.warnings = self._warnings()
+        return response
+
+    def _list_rules(self, _request: Any, response: Any) -> Any:
+        response.instance_id = self._runtime.instance_id
+        response.revision = self._runtime.revision
+        response.rules = self._rules.infos()
+        return response
+
+    def _on_load_rules(self, request: Any, response: Any) -> Any:
+        code, response.message = self._load_rules(request.path)
+        response.success, response.code = code is Code.OK, int(code)
+        self._state.refresh(again=True)
+        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+        text = f"rules of {request.path or 'the same file'}: {response.message}"
+        if response.success:  # a call each: rclpy lets none change its severity
+            self._logger.info(text)
+        else:
+            self._logger.error(text)
         return response
 
     def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:

@@ -33,6 +33,9 @@ PARAMETERS: dict[str, Setting] = {
     "bag_split_bytes": Setting(
         0, "a recording goes on in a new file when one is so large; 0: never", _CONFIGURED, minimum=0
     ),
+    "rules": Setting(
+        "", "rules file, whose rules `in: executor` this executor runs itself; empty: none", _CONFIGURED
+    ),
     "autostart": Setting(default=True, description="configure and activate at the start"),
     "require_realtime": Setting(default=False, description="refuse to start without real-time rights"),
     "trace": Setting(default=True, description="component threads write traces"),

@@ -2,6 +2,7 @@
 
 import functools
 import threading
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode
@@ -36,6 +37,7 @@ class StatePublisher:
         self._event_qos = QoSProfile(depth=_EVENT_DEPTH)
         self._states = node.create_publisher(ArchitectureState, "~/state", self._state_qos)
         self._events = node.create_publisher(ReconfigurationEvent, "~/events", self._event_qos)
+        self.rules: Callable[[], list[str]] = list  # names of those at work
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
         self._published_revision = -1
@@ -52,10 +54,12 @@ class StatePublisher:
             if again or observed.revision != self._published_revision:
                 observed = self._runtime.observe(anew=True)  # how long states last is told as of the stamp
                 stamp = self._node.get_clock().now().to_msg()
-                state = architecture_state(self._runtime, observed, stamp, error=self.error)
+                state = architecture_state(
+                    self._runtime, observed, stamp, error=self.error, rules=self.rules()
+                )
                 self._published_revision = observed.revision
                 self._recording.tell_architecture(observed)
-                self._send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
+                self.send(self._states, "mauve_msgs/msg/ArchitectureState", state, self._state_qos)
             return observed
 
     def look_for_hung(self) -> None:
@@ -126,9 +130,10 @@ class StatePublisher:
         message = reconfiguration_event(
             event.request, event.outcome, stamp=event.stamp, instance_id=instance_id
         )
-        self._send(self._events, "mauve_msgs/msg/ReconfigurationEvent", message, self._event_qos)
+        self.send(self._events, "mauve_msgs/msg/ReconfigurationEvent", message, self._event_qos)
 
-    def _send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
+    def send(self, publisher: Any, type_name: str, message: Any, qos: QoSProfile) -> None:
+        """Publish a message, and record it."""
         data = serialize_message(message)
         publisher.publish(data)
         self._recording.record(publisher.topic_name, type_name, data, qos=qos)

@@ -1,18 +1,22 @@
 """The supervisor node: reconfigures one executor by the rules of a file, and tells every decision.
 
-It listens to the executor's ~/state and to the topics of its rules (serialized, but where a field is looked
-at), checks the rules at 50 Hz on the steady clock, asks by ~/reconfigure and publishes ~/decisions. One
-thread.
+It listens to the executor's ~/state and to what its rules look at (serialized, but where a field is looked
+at), looks at the rules when something of interest was heard and at the instant at which something may become
+true, asks by ~/reconfigure and publishes ~/decisions. One thread.
 """
 
 import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import count
 from typing import Any
 
 import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -24,21 +28,19 @@ from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
+from mauve_rt.interfaces.outside_feeds import OutsideFeeds
 from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.node.supervisor.settings import PARAMETERS, check_arguments
-from mauve_rt.supervision.condition_tree import TreeCondition
-from mauve_rt.supervision.conditions import TopicCondition, topic_condition
-from mauve_rt.supervision.engine import CHECK_PERIOD_S, Decision, RuleEngine
-from mauve_rt.supervision.message_fields import field_value
-from mauve_rt.supervision.rule_types import heard_type
+from mauve_rt.supervision.decisions import Decision
+from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rules import RulesFile
-from mauve_rt.supervision.when import When
 
 NODE_NAME = "supervisor"
 _SPIN_S = 0.2  # how long a stop may go unnoticed
+_LONGEST_S = 3600.0  # between two looks at the rules
 KEPT_DECISIONS = 100
 
 
@@ -54,49 +56,64 @@ class Supervisor:
         self._node = node
         self.watch = watch = Watch(node.get_logger().error)
         self._pending: dict[Any, Any] = {}  # by client (changes, dry runs): the last call
-        rules = rules_file.rules
-        conditions = [
-            TreeCondition(rule.when, lambda leaf: self._condition(rules_file, leaf)) for rule in rules.rules
-        ]
-        self._engine = RuleEngine(
-            list(zip(rules.rules, conditions, strict=True)),
+        self._rules = RemoteRules(
+            rules_file.rules.rules,
             act=self._act,
             decide=self._decide,
             look=self._look,
             ids=(str(uuid.uuid4()) for _ in count()),
+            name=node.resolve_topic_name,
         )
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         self._decisions = node.create_publisher(
             SupervisorDecision, "~/decisions", QoSProfile(depth=KEPT_DECISIONS, durability=latched)
         )
-        executor = node.resolve_topic_name(rules.executor)  # so `-r executor:=boss` names another one
+        executor = node.resolve_topic_name(rules_file.rules.executor)  # so `-r executor:=boss` names another
         self._service = node.resolve_service_name(f"{executor}/reconfigure")
         self._change = node.create_client(Reconfigure, f"{executor}/reconfigure")
         self._try = node.create_client(Reconfigure, f"{executor}/reconfigure")
         self._list = node.create_client(ListComponents, f"{executor}/list_components")
-        node.create_subscription(
-            ArchitectureState,
-            f"{executor}/state",
-            watch.guarded("~/state", self._on_state),
-            QoSProfile(depth=1, durability=latched),
+        self._timer = node.create_timer(
+            _LONGEST_S, watch.guarded("the rules", self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        node.create_timer(CHECK_PERIOD_S, watch.guarded("the rules", self._tick))
+        self._feeds = OutsideFeeds(rules_file, self._rules, listen=self._listen, now_ns=time.monotonic_ns)
+        self._listen(f"{executor}/state", ArchitectureState, self._on_state, raw=False, latched=True)
 
-    def _condition(self, rules_file: RulesFile, leaf: When) -> TopicCondition:
-        message, said = heard_type(rules_file, leaf), leaf.parameters["topic"]
-        topic = self._node.resolve_topic_name(said)  # to be told; resolved twice, it might be another
-        condition = topic_condition(leaf, topic)
-        path = leaf.parameters.get("field", "")
+    def _listen(
+        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, latched: bool = False
+    ) -> None:
+        def hear(sample: Any) -> None:
+            heard(sample)
+            if latched or self._rules.is_stirred:
+                self._tick()
+
         # Best effort hears reliable writers too; only that something came counts.
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(message, said, _hearer(condition, path), qos, raw=not path)
-        return condition
+        events = None
+        if latched:
+            qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            events = SubscriptionEventCallbacks(liveliness=partial(self._on_liveliness, topic))
+        guarded = self.watch.guarded(topic, hear)
+        self._node.create_subscription(message, topic, guarded, qos, raw=raw, event_callbacks=events)
+
+    def _on_liveliness(self, topic: str, event: Any) -> None:
+        """Sooner than silence tells, where the middleware does at all."""
+        if event.alive_count == 0:
+            self._feeds.lost(topic.removesuffix("/state"))
+            self._tick()
 
     def _tick(self) -> None:
-        self._engine.tick(time.monotonic())
+        """Look at the rules now, and again when that has to be."""
+        feeds_due_ns = self._feeds.tick()
+        due_ns = self._rules.tick(time.monotonic_ns())
+        if feeds_due_ns is not None:
+            due_ns = min(due_ns, feeds_due_ns)
+        left_ns = due_ns - time.monotonic_ns()
+        self._timer.timer_period_ns = min(max(left_ns, 0), round(_LONGEST_S * 1e9))
+        self._timer.reset()
 
     def _on_state(self, state: Any) -> None:
-        self._engine.on_state(time.monotonic(), architecture_view(state))
+        self._rules.on_state(time.monotonic_ns(), architecture_view(state))
 
     def _look(self) -> None:
         if self._list.service_is_ready():  # if not, the engine looks again
@@ -107,13 +124,14 @@ class Supervisor:
         if future.exception() is None:
             reply = future.result()
             listed = inventory(reply.instance_id, reply.components, reply.resources)
-            self._engine.on_inventory(time.monotonic(), listed)
+            self._rules.on_inventory(time.monotonic_ns(), listed)
+            self._tick()
 
     def _act(self, request: Request) -> None:
         client = self._try if request.dry_run else self._change
         if not client.service_is_ready():
             text = f"service {self._service} is not there"
-            self._engine.on_outcome(time.monotonic(), request.request_id, None, text)
+            self._rules.on_outcome(time.monotonic_ns(), request.request_id, None, text)
             return
         message = Reconfigure.Request(
             request_id=request.request_id,
@@ -141,7 +159,8 @@ class Supervisor:
     def _on_reply(self, request_id: str, future: Any) -> None:
         failure = future.exception()
         outcome = outcome_of(future.result()) if failure is None else None
-        self._engine.on_outcome(time.monotonic(), request_id, outcome, str(failure or ""))
+        self._rules.on_outcome(time.monotonic_ns(), request_id, outcome, str(failure or ""))
+        self._tick()
 
     def _decide(self, decision: Decision) -> None:
         reply = f" ({decision.message})" if decision.message else ""
@@ -203,10 +222,3 @@ def _rules_path(node: Node) -> str:
     if not path:
         raise ValueError("parameter 'rules' is missing: --ros-args -p rules:=FILE")
     return path
-
-
-def _hearer(condition: TopicCondition, path: str) -> Callable[[Any], None]:
-    """What takes samples, serialized ones where no field is looked at."""
-    if path:
-        return lambda message: condition.hear(time.monotonic(), field_value(message, path))
-    return lambda _sample: condition.hear(time.monotonic())

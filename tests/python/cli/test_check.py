@@ -33,6 +33,7 @@ rules:
       do:
         - {kind: replace_core, target: one, name: executor_tests/Counter}
         - {kind: remove_resource, target: spare}
+    in: supervisor
 """
 STEPS = """\
 - {kind: add_resource, target: sum, value: {kind: shared_data, type: std_msgs/msg/Float64,

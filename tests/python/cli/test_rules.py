@@ -1,90 +1,10 @@
 """`mauve rules check`: what is wrong with rules of good form, and how long each may take."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
+from checked_rules import QUIET, ROBOT, UNDO, Check, rule
 
-from mauve_rt.cli.main import main
-from mauve_rt.supervision import condition_table
-from mauve_rt.supervision.condition_table import ConditionKind, ConditionParameter
-
-Check = Callable[..., tuple[int, list[str], list[str]]]
-
-ROBOT = """\
-mauve: 1
-components:
-  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
-        alternatives: [executor_tests/Backwards]}
-resources:
-  set: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: set_point, direction: subscribe}}
-connections:
-  - [one.set, set.read]
-"""
-QUIET = "{silence: {topic: set_point, type: std_msgs/msg/Float64, longer_than_s: 1.0}}"
 HEARD = f"{{not: {QUIET}}}"
-UNDO = "    undo: {for_s: 1.0, do: [{kind: replace_core, target: one, name: executor_tests/Counter}]}\n"
 OTHER_DO = "[{kind: replace_core, target: one, name: executor_tests/Counter}]"
-
-
-def rule(name: str = "quiet", when: str = QUIET, *, more: str = "", undo: str = UNDO, do: str = "") -> str:
-    do = do or "[{kind: replace_core, target: one, name: executor_tests/Backwards}]"
-    return f"  - name: {name}\n    when: {when}\n    do: {do}\n{undo}{more}"
-
-
-@pytest.fixture
-def check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Check:
-    """check(*rules, robot=TEXT): status, lines of stdout and of stderr, without the folder's name."""
-
-    def run(*rules: str, robot: str = "") -> tuple[int, list[str], list[str]]:
-        file, architecture = tmp_path / "rules", tmp_path / "robot"
-        file.write_text("mauve: 1\nrules:\n" + "".join(rules), encoding="utf-8")
-        architecture.write_text(robot, encoding="utf-8")
-        beside = ["--architecture", str(architecture)] if robot else []
-        status = main(["rules", "check", str(file), *beside])
-        said = capsys.readouterr()
-        out, err = (text.replace(f"{tmp_path}/", "").splitlines() for text in (said.out, said.err))
-        return status, out, err
-
-    return run
-
-
-def test_good_rules_and_their_bounds(check: Check) -> None:
-    status, out, errors = check(rule(more="    for_s: 0.25\n"), robot=ROBOT)
-    assert (status, errors) == (0, [])
-    assert out[-1] == "rules: 1 rules, held against robot: no error found"
-    parts = [line.split(" ms  ") for line in out[1:-1]]
-    assert [what for _, what in parts] == [
-        "silence set_point",
-        "for_s of the rule",
-        "3 looks of the supervisor",
-        "the supervisor runs, and its request arrives (assumed)",
-        "the executor builds, checks and commits (assumed)",
-        "one period of one",
-    ]
-    assert [float(ms) for ms, _ in parts[:2]] == [1000.0, 250.0]
-    total_ms = sum(float(ms) for ms, _ in parts)
-    assert out[0].endswith(
-        f"(in the supervisor): at most from the cause to the first release: {total_ms:.3f} ms"
-    )
-
-
-def test_without_an_architecture_nobody_knows_the_period(check: Check) -> None:
-    status, out, errors = check(rule())
-    assert (status, errors) == (0, [])
-    assert out[0].endswith("1260.000 ms and what is not known")
-    assert out[-2].split() == [
-        "?",
-        "ms",
-        "one",
-        "period",
-        "of",
-        "one",
-        "(not",
-        "known:",
-        "give",
-        "--architecture)",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -195,18 +115,6 @@ def test_the_hysteresis_is_where_two_values_can_meet(check: Check) -> None:
         assert check(rule(when=VALUE, undo=""), lower)[0] == found
 
 
-@pytest.fixture
-def more_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Conditions about components: a row in the table each."""
-    about = ConditionParameter("component", "component")
-    since = ConditionParameter("longer_than_s", "float", required=True)
-    periods = ConditionParameter("periods", "float", required=True)
-    changed = ConditionKind("since_change", {"component": about, "longer_than_s": since})
-    released = ConditionKind("no_release", {"component": about, "periods": periods})
-    monkeypatch.setattr(condition_table, "CONDITIONS", (*condition_table.CONDITIONS, changed, released))
-
-
-@pytest.mark.usefixtures("more_conditions")
 def test_a_rule_that_triggers_itself(check: Check) -> None:
     for about in ("one", ""):
         own = rule(
@@ -220,7 +128,6 @@ def test_a_rule_that_triggers_itself(check: Check) -> None:
     assert check(rule(when=other))[0] == 0
 
 
-@pytest.mark.usefixtures("more_conditions")
 def test_a_rule_that_changes_what_it_looks_at(check: Check) -> None:
     own = "{no_release: {component: one, periods: 3}}"
     status, _, errors = check(rule(when=own))
@@ -228,12 +135,43 @@ def test_a_rule_that_changes_what_it_looks_at(check: Check) -> None:
     assert errors[0].startswith(
         "rules:4:5: rule 'quiet' changes what it looks at (one), and has no cooldown_s"
     )
-    status, out, errors = check(rule(when=own, more="    cooldown_s: 5\n"), robot=ROBOT)
+    status, _, errors = check(rule(when=own, more="    cooldown_s: 5\n"), robot=ROBOT)
     assert (status, errors) == (0, [])
-    parts = {what: float(ms) for ms, what in (line.split(" ms  ") for line in out[1:-1])}
-    assert parts["no_release one"] == 3 * parts["one period of one"]
     status, _, errors = check(rule(when=own.replace(": one", ": ona")), robot=ROBOT)
     assert "component 'ona' is unknown; did you mean one?" in errors[0]
+
+
+def test_a_fault_of_what_has_to_run_for_the_rule(check: Check) -> None:
+    calm = "    cooldown_s: 5\n"
+    for when, column in (
+        ("{fault: {component: one}}", 12),
+        (f"{{any: [{QUIET}, {{fault: {{component: one}}}}]}}", 98),
+    ):
+        status, _, errors = check(rule(when=when, more=calm))
+        assert (status, len(errors)) == (1, 1)
+        assert errors[0].startswith(
+            f"rules:4:{column}: rule 'quiet' can never act: it waits until one is FAULTED"
+        )
+    for when in ("{fault: {component: two}}", "{not: {fault: {component: one}}}"):
+        assert check(rule(when=when, more=calm))[0] == 0
+    revived = "[{kind: configure, target: one}, {kind: start, target: one}]"
+    text = rule(when="{fault: {component: one}}", do=revived, undo="", more=f"{calm}    in: supervisor\n")
+    assert check(text)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("bounds", "column", "words"),
+    [
+        ("above: 1, below: 2", 58, "every number is above 1 or below 2; let above be the greater one"),
+        ("above: 2, below: 1, hysteresis: 0.6", 83, "it holds for ever; let hysteresis be no more than 0.5"),
+        ("above: 2, below: 1, hysteresis: 0.5", 0, ""),
+        ("above: 1, hysteresis: 9", 0, ""),
+    ],
+)
+def test_a_value_that_is_always_beyond(check: Check, bounds: str, column: int, words: str) -> None:
+    status, _, errors = check(rule(when=f"{{value: {{topic: set_point, field: data, {bounds}}}}}"))
+    assert status == bool(words)
+    assert not words or (errors[0].startswith(f"rules:4:{column}: ") and errors[0].endswith(words)), errors
 
 
 def test_bad_input_is_no_finding(check: Check) -> None:

@@ -44,7 +44,8 @@ def _tests_of(file: Path) -> frozenset[str]:
 @cache
 def _kernel_cases() -> frozenset[str]:
     pattern = re.compile(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)", re.MULTILINE)
-    sources = (ROOT / "tests" / "kernel").glob("*/test_*.cpp")
+    tests = ROOT / "tests"
+    sources = [*(tests / "kernel").glob("*/test_*.cpp"), *(tests / "rules").glob("test_*.cpp")]
     return frozenset(
         ".".join(found) for file in sources for found in pattern.findall(file.read_text("utf-8"))
     )

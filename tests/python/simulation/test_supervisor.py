@@ -46,7 +46,6 @@ class Stage:
         self.decisions: list[Any] = []
         self.topics.listen(self.supervisor.decisions, lambda sample: self.decisions.append(sample.message()))
         self.executor.activate()
-        self.time.every(self.time.now_ns(), 20_000_000, self.supervisor.tick)
 
     def run(self, seconds: float, *, playing: bool = False, value: float = 0.0) -> None:
         for _ in range(round(seconds * 10)):

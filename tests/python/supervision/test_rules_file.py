@@ -29,7 +29,7 @@ def test_a_rule_with_its_defaults(tmp_path: Path):
     rule = rules.rules[0]
     assert rules.executor == "executor"
     assert (rule.when.kind, rule.when.parameters["longer_than_s"]) == ("silence", 1.0)
-    assert (rule.where, rule.priority) == ("supervisor", 0)
+    assert (rule.where, rule.priority) == ("executor", 0)
     assert (rule.for_s, rule.cooldown_s, rule.max_missed) == (0.0, 0.0, 0)
     assert rule.undo is not None
     assert rule.undo.for_s == 3.0
@@ -76,7 +76,12 @@ def test_a_scalar_value_becomes_yaml_text(tmp_path: Path):
         ("when: {silence", "when: {at_least: {count: 1}} #", "5:12", "of is missing"),
         ("    undo:", "    in: excutor\n    undo:", "7:9", "supervisor"),
         ("    undo:", "    priority: -1\n    undo:", "7:15", "greater than or equal to 0"),
-        ("silence: {", "value: {field: data, ", "5:12", "below or above, or both"),
+        (
+            "silence: {",
+            "value: {field: data, topic: in}} #",
+            "5:12",
+            "expected above, below, or both, found neither",
+        ),
         ("silence: {", "value: {field: a b, below: 1, ", "5:27", "a field such as"),
         ("topic: radio/in", "topic: radio//in", "5:29", "a ROS name"),
         ("do: [{kind: replace_core", "do: [{kind: explode", "6:17", "'explode'"),

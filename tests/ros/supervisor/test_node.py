@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -134,7 +135,7 @@ def supervised(graph: Graph, rules: Path) -> tuple[StandIn, list[Any]]:
     node = graph.add(Node("supervisor", namespace="/robot_1", context=graph.context))
     supervisor = Supervisor(node, RulesFile(rules))
     node.supervisor_kept_alive = supervisor  # type: ignore[attr-defined]
-    graph.until(lambda: node.count_subscribers("/robot_1/radio/in") > 0)
+    graph.until(lambda: node.count_subscribers("/robot_1/executor/state") > 0)
     graph.until(lambda: stand_in.node.count_clients("/robot_1/executor/reconfigure") > 0)
     graph.spin(0.5)
     stand_in.tell()
@@ -185,9 +186,72 @@ def test_the_value_of_a_field_and_a_tree(graph: Graph, rules: Path):
     assert said(decisions) == ["armed"]
     stand_in.number = 6
     graph.until(lambda: "done" in said(decisions))
-    assert "sequence of /robot_1/radio/in is 6" in stand_in.requests[0].cause
+    assert "sequence of /robot_1/radio/in above 5" in stand_in.requests[0].cause
     stand_in.number = 5
     graph.until(lambda: said(decisions).count("done") == 2)
+
+
+def watching(rules: Path, when: str) -> None:
+    """Let the rule be the supervisor's, and wait for something else."""
+    silence = RULES[RULES.index("{silence") : RULES.index("    do:")].strip()
+    rules.write_text(RULES.replace(silence, f"{when}\n    in: supervisor"), encoding="utf-8")
+
+
+@pytest.mark.parametrize("state", ["faulted", "another_instance", "gone"])
+def test_another_executor(graph: Graph, rules: Path, state: str):
+    watching(rules, f"{{peer: {{executor: robot_2, is: {state}}}}}")
+    stand_in, decisions = supervised(graph, rules)
+    node = graph.add(Node("executor", namespace="/robot_2", context=graph.context))
+    latched = QoSProfile(depth=1, durability=LATCHED)
+    states = node.create_publisher(ArchitectureState, "~/state", latched)
+    running = ComponentStatus(name="camera", state=ComponentInfo.RUNNING)
+    states.publish(ArchitectureState(instance_id="one", components=[running]))
+    graph.spin(1.0)
+    assert said(decisions) == ["armed"]
+    if state == "gone":
+        graph.executor.remove_node(node)
+        node.destroy_node()
+    else:
+        instance = "one" if state == "faulted" else "two"
+        states.publish(
+            ArchitectureState(
+                instance_id=instance,
+                components=[ComponentStatus(name="camera", state=ComponentInfo.FAULTED)]
+                if state == "faulted"
+                else [running],
+            )
+        )
+    graph.until(lambda: "done" in said(decisions))
+    assert f"executor robot_2: {state}" in stand_in.requests[0].cause
+
+
+def test_a_diagnostic(graph: Graph, rules: Path):
+    watching(rules, '{diagnostic: {status: "battery: cells", level: ERROR}}')
+    stand_in, decisions = supervised(graph, rules)
+    node = graph.add(Node("battery", context=graph.context))
+    diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+
+    def say(name: str, level: bytes) -> None:
+        diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(name=name, level=level)]))
+        graph.spin(0.5)
+
+    graph.spin(0.5)
+    say("battery: cells", DiagnosticStatus.WARN)
+    say("battery: case", DiagnosticStatus.ERROR)
+    assert said(decisions) == ["armed"]
+    say("battery: cells", DiagnosticStatus.STALE)
+    graph.until(lambda: "done" in said(decisions))
+    assert stand_in.requests[0].cause == "link_lost: diagnostic 'battery: cells' says ERROR or worse"
+    say("battery: cells", DiagnosticStatus.OK)
+    graph.until(lambda: said(decisions).count("done") == 2)
+
+
+def test_what_only_the_executor_hears_is_refused(graph: Graph, rules: Path):
+    watching(rules, "{overruns: {component: exploration}}")
+    with pytest.raises(
+        ArchitectureFileError, match=r":4:.*overruns of exploration are heard.*`in: executor`"
+    ):
+        RulesFile(rules)
 
 
 def test_a_field_that_is_not_there_is_refused_at_the_start(graph: Graph, rules: Path):

@@ -1,0 +1,116 @@
+"""What an executor's own rules decided, as messages: the decision, and the event of what it did."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from mauve_msgs.msg import RuleInfo
+from mauve_rt._kernel import NOT_MEASURED, RuleFacts, ToldDecision
+from mauve_rt.control.reports import message_of, reports_of
+from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.interfaces.decisions import UNKNOWN_S, decision_message
+from mauve_rt.model.steps import Step
+from mauve_rt.supervision.decisions import decision_of
+from mauve_rt.supervision.rule_bounds import reaction_s
+from mauve_rt.supervision.rules import Rule
+
+DECISION_TYPE = "mauve_msgs/msg/SupervisorDecision"
+
+
+class Done(NamedTuple):
+    """An action that has ended, as who asks for one by a request is told."""
+
+    request: Request
+    outcome: Outcome
+
+
+class DecisionMessages:
+    """Of the rules of one Reflex. One thread at a time."""
+
+    def __init__(
+        self, rules: Sequence[Rule], runtime: Runtime, *, who: str, name: Callable[[str], str]
+    ) -> None:
+        """`who`: the executor's full name; `name`: the full name of a topic."""
+        self._rules = rules
+        self._runtime = runtime
+        self._who = who
+        self._name = name
+        self._causes: dict[tuple[int, str], str] = {}  # by rule and act: why it was begun last
+
+    def message(self, told: ToldDecision, stamp: Any) -> tuple[Any, Done | None]:
+        """SupervisorDecision, and of an action that has ended what came of it."""
+        made = told.decision
+        rule = self._rules[made.rule]
+        done = self._done(rule, told)
+        decision = decision_of(
+            made,
+            self._rules,
+            name=self._name,
+            failure=told.failure,
+            revision=done.outcome.revision if done is not None else self._runtime.revision,
+            message=done.outcome.message if done is not None else "",
+        )
+        if made.decision in ("do", "undo"):
+            self._causes[made.rule, made.act] = f"{rule.name}: {decision.reason}"
+        message = decision_message(
+            decision, stamp, took_s=_took_s(told), bound_s=self._bound_s(rule, made.act)
+        )
+        return message, done
+
+    def _done(self, rule: Rule, told: ToldDecision) -> Done | None:
+        decision = told.decision
+        if told.report is None and not told.failure:
+            return None
+        steps: tuple[Step, ...] = tuple(rule.steps(decision.act))
+        revision = self._runtime.observe().revision
+        if told.report is None:
+            outcome = Outcome(code=Code.PREPARE_FAILED, message=told.failure, revision=revision)
+        else:
+            report = reports_of(steps, told.report)
+            swaps = [step for step in report if step.to_core]
+            only = swaps[0] if len(swaps) == 1 else None
+            outcome = Outcome(
+                code=Code.OK,
+                message=message_of(steps, told.report),
+                revision=revision,
+                report=report,
+                from_core=only.from_core if only is not None else "",
+                to_core=only.to_core if only is not None else "",
+            )
+        cause = self._causes.get((decision.rule, decision.act), rule.name)
+        return Done(Request(steps=steps, requested_by=self._who, cause=cause), outcome)
+
+    def _bound_s(self, rule: Rule, act: str) -> float:
+        periods = {part.name: part.period_ns / 1e9 for part in self._runtime.components()}
+        bound = reaction_s(rule, periods, act=act)
+        return UNKNOWN_S if bound is None else bound
+
+
+def rule_info(facts: RuleFacts, now_ns: int) -> Any:
+    """RuleInfo of a rule of the executor's own."""
+    status = facts.status
+    next_ns = status.next_ns
+    return RuleInfo(
+        name=facts.name,
+        where="executor",
+        armed=status.armed,
+        holds=status.holds,
+        in_effect=status.in_effect,
+        left_alone=status.left_alone,
+        ready=facts.ready,
+        next=status.next or "",
+        next_in_s=UNKNOWN_S if next_ns is None else max(next_ns - now_ns, 0) / 1e9,
+        since_s=max(now_ns - status.since_ns, 0) / 1e9 if status.armed else 0.0,
+        measured=status.measured,
+        problem=facts.problem,
+        memory_bytes=facts.memory_bytes,
+    )
+
+
+def _took_s(told: ToldDecision) -> float:
+    """From the cause to the last of the first releases after it."""
+    report = told.report
+    if told.decision.decision != "done" or report is None:
+        return UNKNOWN_S
+    releases = [step.released_ns for step in report.steps if step.released_ns != NOT_MEASURED]
+    return (max(releases) - told.decision.cause_ns) / 1e9 if releases else UNKNOWN_S

@@ -1,0 +1,234 @@
+"""The rules that an executor runs itself, natively. Python only tells what they decided."""
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from mauve_msgs.msg import SupervisorDecision
+from mauve_rt._kernel import Reflex, RuleActions, RuleFacts, ToldDecision, monotonic_ns
+from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
+from mauve_rt.interfaces.told_decisions import DECISION_TYPE, DecisionMessages, rule_info
+from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.node.shared.watch import Watch
+from mauve_rt.supervision.engine_rules import rule_specs
+from mauve_rt.supervision.rule_actions import own_rules, rule_actions
+from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unheard
+from mauve_rt.supervision.rules import Rule, RulesFile
+
+KEPT_DECISIONS = 100
+_WAIT_NS = 200_000_000  # how long the thread that tells may go on waiting when it should end
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """A rules file that the executor can run."""
+
+    path: Path
+    rules: Sequence[Rule]
+    actions: Sequence[RuleActions]
+
+
+class OwnRules:
+    """Those of one file at a time, from configure() to close(); they are at work from start() to stop().
+
+    | member     | written by                          | read by   | guarded by          |
+    | ---------- | ----------------------------------- | --------- | ------------------- |
+    | `_loaded`  | configure(), load(), close()        | the same  | `_lock`             |
+    | `_reflex`, | start(), stop(), load(), close()    | any       | `_lock` to write; each |
+    | `_at_work` |                                     |           | is exchanged whole  |
+    """
+
+    def __init__(
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        *,
+        topics: Callable[[], dict[str, str]],
+        publish: Callable[[Any, str, Any, QoSProfile], None],
+        event: Callable[[Request, Outcome], None],
+        follow: Callable[[], None],
+        watch: Watch,
+    ) -> None:
+        """`topics`: those that resources are bound to; `publish` sends and records a message.
+
+        `event` tells of what was done; `follow` lets parameters follow it.
+        """
+        self._node = node
+        self._runtime = runtime
+        self._topics = topics
+        self._publish = publish
+        self._event = event
+        self._follow = follow
+        self._watch = watch
+        self._qos = QoSProfile(depth=KEPT_DECISIONS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._decisions = node.create_publisher(SupervisorDecision, "~/decisions", self._qos)
+        self._lock = threading.RLock()
+        self._loaded: _Loaded | None = None
+        self._reflex: Reflex | None = None
+        self._at_work: list[str] = []
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    # ---- life cycle
+
+    def configure(self, path: str) -> None:
+        """Read and check the rules of a file; none: there are none.
+
+        Raises:
+            ArchitectureFileError: they cannot be used.
+        """
+        with self._lock:
+            self._loaded = self._load(Path(path)) if path else None
+
+    def start(self) -> None:
+        """Let them work; the host is deployed.
+
+        Raises:
+            MauveError: a rule hears something that there is not.
+        """
+        with self._lock:
+            if self._loaded is not None and self._loaded.rules:
+                self._begin(self._loaded)
+
+    def stop(self) -> None:
+        """Nothing is done any more; all that was decided is told."""
+        with self._lock:
+            self._end()
+
+    def close(self) -> None:
+        """Forget the file."""
+        with self._lock:
+            self._end()
+            self._loaded = None
+
+    def load(self, path: str) -> int:
+        """Put the rules of a file in the place of the present ones, all or none; returns how many there are.
+
+        Raises:
+            MauveError: they cannot be used; the present ones go on.
+        """
+        with self._lock:
+            before = self._loaded
+            if not path and before is None:
+                raise ParameterError("no rules were loaded yet: name a file")
+            loaded = self._load(Path(path) if path or before is None else before.path)
+            if self._reflex is not None or self._runtime.active:
+                self._end()
+                try:
+                    if loaded.rules:
+                        self._begin(loaded)
+                except MauveError:
+                    if before is not None and before.rules:
+                        self._begin(before)
+                    raise
+            self._loaded = loaded
+            return len(loaded.rules)
+
+    def _load(self, path: Path) -> _Loaded:
+        file = RulesFile(path)
+        rules = own_rules(file)
+        unheard_of = [*only_outside(file)]
+        if self._reflex is None:  # else its own error tells of the first, without the place
+            topics = self._topics_of(rules)
+            found = (unheard(file, leaf, self._runtime.host, topics) for leaf in own_leaves(file))
+            unheard_of += filter(None, found)
+        if unheard_of:
+            raise ArchitectureFileError(file.path, unheard_of)
+        return _Loaded(path, rules, rule_actions(file, self._runtime))
+
+    def _topics_of(self, rules: Sequence[Rule]) -> dict[str, str]:
+        """The resource that is bound to each topic, named as in the rules."""
+        bound = self._topics()
+        said = {str(leaf.parameters.get("topic") or "") for rule in rules for leaf in rule.when.leaves()}
+        full = {name: self._node.resolve_topic_name(name) for name in said if name}
+        return {name: bound[topic] for name, topic in full.items() if topic in bound}
+
+    def _begin(self, loaded: _Loaded) -> None:
+        topics = self._topics_of(loaded.rules)
+        reflex = Reflex(self._runtime.host, rule_specs(loaded.rules), loaded.actions, topics)
+        reflex.start()
+        self._reflex, self._at_work = reflex, [rule.name for rule in loaded.rules]
+        self._ending.clear()
+        tell = self._teller(reflex, loaded)
+        self._thread = self._watch.thread("rules", tell, ending=self._ending)
+        self._thread.start()
+
+    def _end(self) -> None:
+        reflex, self._reflex, self._at_work = self._reflex, None, []
+        if reflex is None:
+            return
+        reflex.stop()
+        self._ending.set()
+        reflex.wake()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    # ---- what there is
+
+    def names(self) -> list[str]:
+        """Of the rules that are at work."""
+        return self._at_work
+
+    def facts(self) -> list[RuleFacts]:
+        """How each of them fares."""
+        reflex = self._reflex
+        return reflex.facts() if reflex is not None else []
+
+    def infos(self) -> list[Any]:
+        """RuleInfo of each of them."""
+        return [rule_info(facts, monotonic_ns()) for facts in self.facts()]
+
+    # ---- telling
+
+    def _teller(self, reflex: Reflex, loaded: _Loaded) -> Callable[[], None]:
+        name = self._node.resolve_topic_name
+        who = self._node.get_fully_qualified_name()
+        messages = DecisionMessages(loaded.rules, self._runtime, who=who, name=name)
+        tell_one = self._watch.guarded("a decision", self._tell)
+
+        def tell() -> None:
+            for told in reflex.wait_told(_WAIT_NS):
+                tell_one(messages, told)
+
+        return tell
+
+    def _tell(self, messages: DecisionMessages, told: ToldDecision) -> None:
+        message, done = messages.message(told, self._stamp(told.decision.stamp_ns))
+        if done is not None:
+            if done.outcome.success and any(
+                STEP_KINDS[step.kind].changes_parameters for step in done.request.steps
+            ):
+                self._follow()
+            self._event(done.request, done.outcome)
+        text = f"{message.rule}: {message.decision}: {message.reason}"
+        if message.decision == "failed":  # a call each: rclpy lets none change its severity
+            self._node.get_logger().error(text)
+        else:
+            self._node.get_logger().info(text)
+        self._publish(self._decisions, DECISION_TYPE, message, self._qos)
+
+    def _stamp(self, monotonic: int) -> Any:
+        """An instant of the monotonic clock, as ROS counts."""
+        clock = self._node.get_clock()
+        past_ns = monotonic_ns() - monotonic
+        now = clock.now()
+        return type(now)(nanoseconds=now.nanoseconds - past_ns, clock_type=now.clock_type).to_msg()
+
+
+def load_reply(rules: OwnRules, path: str) -> tuple[Code, str]:
+    """What comes of loading a file: the code and the words of a reply."""
+    try:
+        count = rules.load(path)
+    except (ArchitectureFileError, ParameterError) as error:
+        return Code.INVALID, str(error)
+    except MauveError as error:
+        return Code.PREPARE_FAILED, str(error)
+    return Code.OK, f"rules at work: {count}" if count else "no rule is the executor's"

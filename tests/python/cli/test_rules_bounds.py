@@ -1,0 +1,109 @@
+"""The bounds that `mauve rules check` prints: their parts, by who runs the rule and what it waits for."""
+
+from pathlib import Path
+
+import pytest
+from checked_rules import QUIET, ROBOT, Check, rule
+
+from mauve_rt.supervision.rule_bounds import WOKEN_S, Bound, bound_of, reaction_s
+from mauve_rt.supervision.rules import Rule, RulesFile
+
+PERIODS_S = {"one": 0.010, "slow": 0.100, "told": 0.0}
+SWAP = "{kind: replace_core, target: one, name: executor_tests/Backwards}"
+SLOW = SWAP.replace("one", "slow")
+
+
+def parts(out: list[str]) -> dict[str, float]:
+    return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out[1:-1])}
+
+
+def loaded(folder: Path, when: str, do: str = SWAP, more: str = "") -> Rule:
+    path = folder / "rules"
+    path.write_text(
+        f"mauve: 1\nrules:\n  - name: one\n    when: {when}\n    do: [{do}]\n{more}", encoding="utf-8"
+    )
+    return RulesFile(path).rules.rules[0]
+
+
+def test_in_the_executor(check: Check) -> None:
+    status, out, errors = check(rule(more="    for_s: 0.25\n"), robot=ROBOT)
+    assert (status, errors) == (0, [])
+    assert out[-1] == "rules: 1 rules, held against robot: no error found"
+    assert parts(out) == {
+        "silence set_point": 1000.0,
+        "for_s of the rule": 250.0,
+        "the executor decides, commits and wakes up (assumed)": 1.0,
+        "one period of one": 10.0,
+    }
+    assert out[0] == "quiet (in the executor): at most from the cause to the first release: 1261.000 ms"
+
+
+def test_in_the_supervisor(check: Check) -> None:
+    status, out, errors = check(rule(more="    in: supervisor\n"), robot=ROBOT)
+    assert (status, errors) == (0, [])
+    assert parts(out) == {
+        "silence set_point": 1000.0,
+        "the supervisor runs, and its request arrives (assumed)": 20.0,
+        "the executor builds, checks and commits (assumed)": 200.0,
+        "one period of one": 10.0,
+    }
+    assert out[0] == "quiet (in the supervisor): at most from the cause to the first release: 1230.000 ms"
+
+
+def test_without_an_architecture_nobody_knows_the_period(check: Check) -> None:
+    status, out, errors = check(rule())
+    assert (status, errors) == (0, [])
+    assert out[0].endswith("1001.000 ms and what is not known")
+    assert out[-2].split(None, 2) == ["?", "ms", "one period of one (not known: give --architecture)"]
+
+
+@pytest.mark.parametrize(
+    ("when", "seconds"),
+    [
+        ("{silence: {resource: set, longer_than_s: 2}}", 2.0),
+        ("{since_change: {longer_than_s: 5}}", 5.020),  # an ordinary thread sees the change
+        ("{no_release: {component: slow, periods: 3}}", 0.3),
+        ("{value: {resource: set, field: data, above: 1}}", 0.0),
+        ("{late: {component: one, longer_than_s: 2}}", 0.0),  # told when it comes, however late that is
+        ("{overruns: {component: one, at_least: 3, within_s: 9}}", 0.0),
+        ("{not: {overruns: {component: one, within_s: 9}}}", 9.0),
+        ("{not: {silence: {topic: in, longer_than_s: 2}}}", 0.0),
+        ("{fault: {component: one}}", 0.0),
+        ("{all: [{silence: {topic: in, longer_than_s: 2}}, {fault: {component: one}}]}", 2.0),
+        ("{fault: {component: one}, for_s: 0.5}", 0.5),
+        ("{not: {fault: {component: one}, within_s: 0.5}}", 0.5),
+        ("{not: {fault: {component: one}, for_s: 0.5}}", 0.0),
+        ("{not: {any: [{not: {silence: {topic: in, longer_than_s: 2}}}]}}", 2.0),
+    ],
+)
+def test_what_passes_before_it_is_noticed(tmp_path: Path, when: str, seconds: float) -> None:
+    one = loaded(tmp_path, when)
+    assert bound_of(one, PERIODS_S).total_s == pytest.approx(seconds + WOKEN_S + PERIODS_S["one"])
+    assert reaction_s(one, PERIODS_S) == pytest.approx(WOKEN_S + PERIODS_S["one"])
+
+
+def test_several_components_have_to_meet_first(tmp_path: Path) -> None:
+    bound = bound_of(loaded(tmp_path, QUIET, f"{SWAP}, {SLOW}"), PERIODS_S)
+    assert [(part.what, part.seconds, part.assumed) for part in bound.parts[-2:]] == [
+        ("until one, slow are at their waits at once: one period of slow", 0.100, True),
+        ("one period of slow", 0.100, False),
+    ]
+
+
+def test_a_component_without_a_period_has_no_bound(tmp_path: Path) -> None:
+    one = loaded(tmp_path, QUIET, SWAP.replace("one", "told"))
+    assert reaction_s(one, PERIODS_S) is None
+    bound = bound_of(one, PERIODS_S)
+    assert bound.total_s is None
+    assert bound.known_s == pytest.approx(1.0 + WOKEN_S)
+    assert bound.parts[-1].what == "the next event of told, which has no period"
+
+
+def test_what_is_told_now_and_then_is_as_old_as_that(tmp_path: Path) -> None:
+    for when in ("{diagnostic: {status: gps}}", "{peer: {executor: robot_2}}"):
+        one = loaded(tmp_path, when, more="    in: supervisor\n")
+        bound, reaction = bound_of(one, PERIODS_S), reaction_s(one, PERIODS_S)
+        assert isinstance(bound, Bound)
+        assert reaction is not None
+        assert bound.known_s == pytest.approx(1.0 + reaction)
+        assert bound.parts[1].assumed

@@ -1,0 +1,321 @@
+"""Rules that the executor runs itself: they act without any Python, are told, and are loaded anew."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64
+
+from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
+from mauve_msgs.srv import ListRules, LoadRules, Reconfigure, ReplaceCore
+from mauve_rt.control.requests import Code
+
+NODE = "/robot_1/executor"
+USUAL, SAFE = "executor_tests/Counter", "executor_tests/Backwards"
+SILENCE_S, UNDO_S = 0.4, 0.3
+ROBOT = """\
+mauve: 1
+executor: {namespace: /robot_1}
+components:
+  counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+            alternatives: [executor_tests/Backwards, executor_tests/TwinShell, executor_tests/Twin,
+                           executor_tests/TwinFsm], priority: 40, properties: {period_ms: 20}}
+  python: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+           alternatives: [executor_tests/PyKeeping], properties: {period_ms: 50}}
+resources:
+  count: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: count, direction: publish}}
+  beat: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: beat, direction: subscribe}}
+connections:
+  - [counter.count, count.write]
+"""
+RULES = f"""\
+mauve: 1
+rules:
+  - name: quiet
+    when: {{silence: {{topic: beat, longer_than_s: {SILENCE_S}}}}}
+    do: [{{kind: replace_core, target: counter, name: {SAFE}}}]
+    undo: {{for_s: {UNDO_S}, do: [{{kind: replace_core, target: counter, name: {USUAL}}}]}}
+"""
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Voice:
+    """Speaks on /robot_1/beat every 50 ms while it is on, from a thread of its own."""
+
+    def __init__(self, graph: Any) -> None:
+        self._publisher = graph.voice(Float64, "/robot_1/beat")
+        self._on = threading.Event()
+        self._end = threading.Event()
+        self.stopped_ns = 0  # when it last spoke, by the clock of ROS
+        self._thread = threading.Thread(target=self._speak)
+        self._thread.start()
+
+    def _speak(self) -> None:
+        while not self._end.is_set():
+            if self._on.wait(0.05):
+                self._publisher.publish(Float64(data=0.0))
+                self.stopped_ns = time.time_ns()
+                time.sleep(0.05)
+
+    def on(self) -> None:
+        self._on.set()
+
+    def off(self) -> None:
+        self._on.clear()
+
+    def close(self) -> None:
+        self._end.set()
+        self._thread.join()
+
+
+class Robot:
+    """An executor with rules, as others see it."""
+
+    def __init__(self, graph: Any, process: Any) -> None:
+        self.graph, self.process = graph, process
+        self.decisions = graph.hear(SupervisorDecision, f"{NODE}/decisions", LATCHED)
+        self.states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
+        self.voice = Voice(graph)
+        self.voice.on()
+
+    def said(self, rule: str = "quiet") -> list[str]:
+        return [each.decision for each in self.decisions if each.rule == rule]
+
+    def core(self, component: str = "counter") -> str:
+        newest = self.states[-1].components if self.states else []
+        return next((each.core for each in newest if each.name == component), "")
+
+    def await_core(self, core: str) -> None:
+        self.graph.spin_until(lambda: self.core() == core, f"core {core}")
+
+    def await_said(self, decision: str, count: int = 1) -> Any:
+        self.graph.spin_until(lambda: self.said().count(decision) >= count, f"{count} times {decision}")
+        return [each for each in self.decisions if each.decision == decision][count - 1]
+
+    def nanoseconds(self, decision: Any) -> int:
+        return int(decision.stamp.sec) * 1_000_000_000 + int(decision.stamp.nanosec)
+
+
+@pytest.fixture
+def files(tmp_path: Path, plugin_prefix: Path) -> tuple[Path, Path]:
+    robot, rules = tmp_path / "robot.yaml", tmp_path / "rules.yaml"
+    robot.write_text(ROBOT, encoding="utf-8")
+    rules.write_text(RULES, encoding="utf-8")
+    return robot, rules
+
+
+Start = Callable[..., Robot]
+
+
+@pytest.fixture
+def start(files: tuple[Path, Path], graph: Any, start_executor: Callable[..., Any]) -> Iterator[Start]:
+    """start(): a robot whose executor runs RULES."""
+    robots: list[Robot] = []
+
+    def started(*arguments: str) -> Robot:
+        architecture, rules = files
+        words = ["-p", f"architecture:={architecture}", "-p", f"rules:={rules}", *arguments]
+        robots.append(Robot(graph, start_executor(*words)))
+        return robots[-1]
+
+    yield started
+    for robot in robots:
+        robot.voice.close()
+
+
+def test_acts_undoes_and_tells(start: Start, graph: Any):
+    robot = start()
+    events = graph.hear(ReconfigurationEvent, f"{NODE}/events")
+    robot.await_said("armed")
+    robot.await_core(USUAL)
+    assert list(robot.states[-1].rules) == ["quiet"]
+    robot.voice.off()
+    robot.await_core(SAFE)
+    done = robot.await_said("done")
+    assert robot.said()[-4:] == ["armed", "condition_true", "do", "done"]
+    do = robot.await_said("do")
+    assert do.reason.startswith("nothing on /robot_1/beat for 0.4")
+    assert do.silence_s >= SILENCE_S
+    assert robot.nanoseconds(do) - robot.voice.stopped_ns > 0.9 * SILENCE_S * 1e9, "no sooner than it may"
+    assert done.act == "do"
+    assert done.took_s > 0, "a release came after"
+    assert done.bound_s > 0
+    assert done.message == f"component 'counter' runs {SAFE}, before {USUAL}"
+    graph.spin_until(lambda: any(event.from_core == USUAL for event in events), "the event")
+    event = next(event for event in events if event.from_core == USUAL)
+    assert (event.requested_by, event.to_core) == (NODE, SAFE)
+    assert event.cause == f"quiet: {do.reason}"
+    robot.voice.on()
+    robot.await_core(USUAL)
+    undone = robot.await_said("done", 2)
+    assert undone.act == "undo"
+    assert robot.said()[-3:] == ["condition_false", "undo", "done"]
+
+
+def test_acts_while_a_component_in_python_keeps_the_interpreter(start: Start, graph: Any):
+    """5 s in one call that does not let go of it: no line of Python runs in the executor meanwhile."""
+    robot = start()
+    robot.await_said("armed")
+    counts = graph.hear(Float64, "/robot_1/count")
+    reply = graph.ask(
+        ReplaceCore, f"{NODE}/replace_core", component="python", core="executor_tests/PyKeeping"
+    )
+    assert reply.success, reply.message
+    keeping = Path(tempfile.gettempdir()) / f"mauve_keeping_{robot.process.process.pid}"
+    keeping.touch()
+    try:
+        graph.spin_until(lambda: keeping.read_text() == "keeping", "the interpreter to be kept")
+        began = time.monotonic()
+        robot.voice.off()
+
+        def counts_down() -> bool:
+            return len(counts) > 1 and counts[-1].data < counts[-2].data
+
+        graph.spin_until(counts_down, "the safe core at work")
+        assert time.monotonic() - began < 4.5, "it waited for Python"
+        assert keeping.read_text() == "keeping", "while the interpreter was still kept"
+    finally:
+        keeping.unlink()
+    robot.await_core(SAFE)
+    robot.await_said("done")
+
+
+@pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
+def test_acts_without_its_supervisor(start: Start, files: tuple[Path, Path], domain: int, number: Any):
+    robot = start()
+    robot.await_said("armed")
+    words = [sys.executable, "-m", "mauve_rt.node.supervisor.main", "--ros-args", "-p", f"rules:={files[1]}"]
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+    supervisor = subprocess.Popen([*words, "-r", "__ns:=/robot_1"], env=environment)
+    try:
+        told = robot.graph.hear(SupervisorDecision, "/robot_1/supervisor/decisions", LATCHED)
+        robot.graph.spin_until(lambda: supervisor.poll() is None and bool(robot.states), "both")
+        supervisor.send_signal(number)
+        robot.voice.off()
+        robot.await_core(SAFE)
+        robot.voice.on()
+        robot.await_core(USUAL)
+        assert not [each for each in told if each.decision in ("do", "undo", "done")], "it is the executor's"
+    finally:
+        supervisor.kill()
+        supervisor.wait()
+
+
+def test_takes_up_what_is_in_effect(start: Start, graph: Any, files: tuple[Path, Path]):
+    """Loaded anew while degraded: what the rule did is its own, and undone when it is time."""
+    robot = start()
+    robot.await_said("armed")
+    robot.voice.off()
+    robot.await_said("done")
+    reply = graph.ask(LoadRules, f"{NODE}/load_rules", path="")
+    assert (reply.success, reply.message) == (True, "rules at work: 1")
+    robot.await_said("adopted")
+    robot.voice.on()
+    robot.await_core(USUAL)
+
+
+def test_rules_are_loaded_anew_whole_or_not_at_all(start: Start, graph: Any, files: tuple[Path, Path]):
+    robot = start()
+    robot.await_said("armed")
+    rules = files[1]
+    for text, place, words in (
+        (RULES.replace("silence", "silense"), ":4:", "did you mean silence?"),
+        (RULES.replace(SAFE, "executor_tests/NoSuch"), ":5:", "is not installed"),
+        (RULES.replace("target: counter", "target: countre", 1), ":5:", "did you mean counter?"),
+        ("rules: [", ":1:", ""),
+    ):
+        rules.write_text(text, encoding="utf-8")
+        reply = graph.ask(LoadRules, f"{NODE}/load_rules", path=str(rules))
+        assert (reply.success, reply.code) == (False, Code.INVALID)
+        assert f"{rules}{place}" in reply.message
+        assert words in reply.message
+        listed = graph.ask(ListRules, f"{NODE}/list_rules")
+        assert [(each.name, each.armed, each.ready) for each in listed.rules] == [("quiet", True, True)]
+    second = RULES.partition("rules:\n")[2].replace("quiet", "quieter").replace(str(SILENCE_S), "5.0")
+    rules.write_text(RULES + second, encoding="utf-8")
+    reply = graph.ask(LoadRules, f"{NODE}/load_rules", path=str(rules))
+    assert reply.success, reply.message
+    graph.spin_until(lambda: list(robot.states[-1].rules) == ["quiet", "quieter"], "both in ~/state")
+    listed = graph.ask(ListRules, f"{NODE}/list_rules")
+    assert [each.name for each in listed.rules] == ["quiet", "quieter"]
+    assert 0 <= listed.rules[1].next_in_s <= 5.0 or not listed.rules[1].next
+    robot.voice.off()
+    robot.await_core(SAFE)
+
+
+def test_the_command_lists_and_loads(start: Start, files: tuple[Path, Path], domain: int):
+    robot = start()
+    robot.await_said("armed")
+
+    def mauve(*words: str) -> tuple[int, str, str]:
+        command = [sys.executable, "-m", "mauve_rt.cli", "rules", *words]
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "COLUMNS": "200"}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    status, out, error = mauve("list", NODE)
+    assert (status, error) == (0, "")
+    line = next(line.strip() for line in out.splitlines() if line.startswith(" quiet"))
+    assert re.fullmatch(r"quiet +yes +false for [\d.]+ s +watching +(do in [\d.]+ s|-) +\d+ KiB", line), line
+    status, out, _ = mauve("list", NODE, "--json")
+    (rule,) = json.loads(out)["rules"]
+    assert (rule["name"], rule["where"], rule["ready"]) == ("quiet", "executor", True)
+    files[1].write_text(RULES.replace("quiet", "calm"), encoding="utf-8")
+    assert mauve("load", NODE) == (0, "rules at work: 1\n", "")
+    status, out, _ = mauve("list", NODE)
+    assert "calm" in out
+    files[1].write_text(RULES.replace("silence", "silense"), encoding="utf-8")
+    status, _, error = mauve("load", NODE, str(files[1]))
+    assert status == 1
+    assert f"{files[1]}:4:" in error
+    assert "did you mean silence?" in error
+
+
+def test_what_cannot_be_made_ready_is_an_error_at_once(start: Start, graph: Any):
+    robot = start()
+    robot.await_said("armed")
+    health = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def status() -> Any:
+        found = [each for array in health for each in array.status if each.name == f"{NODE}: rule quiet"]
+        return found[-1] if found else DiagnosticStatus()
+
+    graph.spin_until(lambda: status().message == "watching", "a rule that watches")
+    assert status().level == DiagnosticStatus.OK
+    # Another shell, which the safe core is not for.
+    parts = [("shell", "TwinShell"), ("core", "Twin"), ("fsm", "TwinFsm")]
+    steps = [
+        ReconfigurationStep(kind=f"replace_{kind}", target="counter", name=f"executor_tests/{name}")
+        for kind, name in parts
+    ]
+    reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps)
+    assert reply.success, reply.message
+    graph.spin_until(lambda: status().level == DiagnosticStatus.ERROR, "the error, long before it is needed")
+    assert status().message.startswith("cannot act: ")
+    assert SAFE in status().message
+    (listed,) = graph.ask(ListRules, f"{NODE}/list_rules").rules
+    assert not listed.ready
+    assert SAFE in listed.problem
+
+
+def test_bad_rules_configure_nothing(
+    files: tuple[Path, Path], start_executor: Callable[..., Any], plugin_prefix: Path
+):
+    architecture, rules = files
+    rules.write_text(RULES.replace("target: counter", "target: countre", 1), encoding="utf-8")
+    process = start_executor("-p", f"architecture:={architecture}", "-p", f"rules:={rules}")
+    assert process.wait() == 2
+    assert f"{rules}:5:" in process.output
+    assert "did you mean counter?" in process.output
