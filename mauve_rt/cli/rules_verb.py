@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mauve_rt.cli import rules_live
+from mauve_rt.cli import rules_live, rules_of_bags
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, Problem
 
@@ -113,4 +113,16 @@ SUB_VERBS = (
     Verb("try", "play a script to rules in virtual time and tell what they decide", _add_try, _try),
     Verb("list", "show how the rules of an executor fare", rules_live.add_list, rules_live.list_rules),
     Verb("load", "let an executor run other rules, all or none", rules_live.add_load, rules_live.load_rules),
+    Verb(
+        "replay",
+        "compare what rules would have done on the day of a bag with what was done",
+        rules_of_bags.add_replay,
+        rules_of_bags.replay,
+    ),
+    Verb(
+        "explain",
+        "tell what rules decided, and why, according to a bag",
+        rules_of_bags.add_explain,
+        rules_of_bags.explain,
+    ),
 )

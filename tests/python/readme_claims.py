@@ -306,6 +306,14 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "plays a script to them in virtual time, tells what they decide and draws it": (
         "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
     ),
+    "`mauve rules explain BAG` tells why they acted and why not": (
+        "python/cli/test_rules_explain.py::test_the_story_has_each_decision_with_its_reason",
+        "python/cli/test_rules_explain.py::test_why_a_rule_did_not_act",
+    ),
+    "`mauve rules replay FILE BAG` what others would have done that day": (
+        "python/cli/test_rules_replay.py::test_other_rules_differ",
+        "system/test_demo_mission.py::test_its_rules_replayed_do_what_they_did",
+    ),
     "A class installed meanwhile is found": (
         "ros/executor/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
     ),

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -181,3 +182,16 @@ def shared_map(name: str) -> Path:
 def test_maps_of_others_work_as_they_are(start: Starter, name: str):
     demo = start("--map", str(shared_map(name)), *SHORT)
     assert demo.finish() == 0, demo.lines[-8:]
+
+
+def test_its_rules_replayed_do_what_they_did(mission: Demo, tmp_path: Path):
+    rules, bag = mission.out / "supervisor" / "robot_1.yaml", mission.out / "bag" / "robot_1"
+    replay = [sys.executable, "-m", "mauve_rt.cli", "rules", "replay"]
+    same = subprocess.run([*replay, rules, bag], capture_output=True, text=True, check=False)
+    assert (same.returncode, same.stderr) == (0, ""), same.stdout
+    assert same.stdout.endswith("rules: 1, actions: 2, differing: 0\n")
+    other = tmp_path / "other.yaml"
+    other.write_text(rules.read_text(encoding="utf-8").replace("longer_than_s: 1.0", "longer_than_s: 1.7"))
+    differing = subprocess.run([*replay, other, bag], capture_output=True, text=True, check=False)
+    assert differing.returncode == 1
+    assert re.search(r"link_lost  do .* \+0\.700  differs$", differing.stdout, re.MULTILINE)
