@@ -136,7 +136,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
 }
 
 PreparedCommit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
-  if (changes_.empty()) return PreparedCommit::Outcome::made;  // there is nobody to commit with
+  if (!prepared_commit_) return PreparedCommit::Outcome::made;  // there is nobody to commit with
   const PreparedCommit::Outcome outcome = prepared_commit_->carry_out(until_ns, conductor_.get());
   committed_ = outcome == PreparedCommit::Outcome::made;
   const bool is_changed = outcome == PreparedCommit::Outcome::refused && commit_->refused_by() == &guard_;

@@ -205,10 +205,15 @@ void Task::fault_parked(const std::string& what) {
   publish_state(ComponentState::faulted);
 }
 
+/// But for one that was posted after the park, and which this thread is to make, if it has not ended.
 void Task::refuse_commit() noexcept {
   if ((control_.load(std::memory_order_seq_cst) & kCommit) == 0) return;
-  withdraw_commit();
-  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+  const bool makes = ended_.load(std::memory_order_relaxed) == 0;  // written by this thread
+  place_.use([&](Participant& place) {
+    if (place.makes_parked && makes) return;
+    control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // in here: after it the next one may be posted
+    place.commit->call_off(Commit::Off::withdrawn, this);
+  });
 }
 
 void Task::leave_behind(std::shared_ptr<void> used) {

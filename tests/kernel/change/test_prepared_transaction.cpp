@@ -210,61 +210,61 @@ struct Doors {
   }
 };
 struct HangingCore : TestCore {
-  explicit HangingCore(Doors& shared) : doors(shared) {}
+  explicit HangingCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
   bool configure_hook() override {
-    doors.pass();
+    doors->pass();
     return true;
   }
-  Doors& doors;
+  std::shared_ptr<Doors> doors;  // its thread may end after the test
 };
 /// In a long state, so that a commit waits for it.
 struct BusyCore : TestCore {
-  explicit BusyCore(Doors& shared) : doors(shared) {}
+  explicit BusyCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
   void act() override {
     TestCore::act();
-    doors.pass();
+    doors->pass();
   }
-  Doors& doors;
+  std::shared_ptr<Doors> doors;
 };
 
 class PreparedBeside : public Prepared<OnThreads> {};
 
 TEST_F(PreparedBeside, ItWaitsForNoPreparation) {
-  Doors doors;
+  const auto doors = std::make_shared<Doors>();
   auto prepared = gain("a", 3.0);
   auto on_the_same = gain("b", 3.0);
   auto change = std::async(std::launch::async, [&] {
     commit(Transaction().replace_core("b", std::make_unique<HangingCore>(doors)));
   });
-  wait_until([&] { return doors.entered.load(); }, "the hook");
+  wait_until([&] { return doors->entered.load(); }, "the hook");
   EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
   EXPECT_EQ(PropertyValue(3.0), gain_of("a")) << "while the hook hangs";
   EXPECT_FALSE(on_the_same->is_current());
   EXPECT_EQ(PreparedOutcome::stale, on_the_same->commit(kTimeout)) << "at once";
-  EXPECT_FALSE(doors.open) << "and the hook hangs still";
-  doors.open = true;
+  EXPECT_FALSE(doors->open) << "and the hook hangs still";
+  doors->open = true;
   EXPECT_NO_THROW(change.get()) << "they touch nothing in common";
   prepared->complete();
 }
 
 TEST_F(PreparedBeside, AnOrdinaryChangeOfWhatItChangedMeanwhileIsRefused) {
-  Doors doors;
+  const auto doors = std::make_shared<Doors>();
   Transaction later;
   later.replace_core("b", std::make_unique<HangingCore>(doors)).replace_fsm("b", "t/Syncopated");
   auto structural = prepare(Transaction().replace_fsm("a", "t/Syncopated"));
   auto change = std::async(std::launch::async, [&] { return refusal([&] { commit(later); }); });
-  wait_until([&] { return doors.entered.load(); }, "the hook");
+  wait_until([&] { return doors->entered.load(); }, "the hook");
   EXPECT_EQ(PreparedOutcome::committed, structural->commit(kTimeout));
-  doors.open = true;
+  doors->open = true;
   EXPECT_EQ(ErrorCode::wrong_revision, change.get().code());
   EXPECT_EQ("t/Core", core_of("b"));
   structural->complete();
 }
 
 TEST_F(PreparedBeside, AnOrdinaryCommitUnderWayGivesWay) {
-  Doors doors;
+  const auto doors = std::make_shared<Doors>();
   commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
-  wait_until([&] { return doors.entered.load(); }, "the long state");
+  wait_until([&] { return doors->entered.load(); }, "the long state");
   auto prepared = gain("a", 3.0);
   auto change = std::async(std::launch::async, [&] {
     return refusal([&] { commit(Transaction().set_property("b", "gain", 2.0)); });
@@ -272,8 +272,8 @@ TEST_F(PreparedBeside, AnOrdinaryCommitUnderWayGivesWay) {
   std::this_thread::sleep_for(
       std::chrono::milliseconds(100));  // it waits at the gate by then; else it does later
   EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
-  EXPECT_FALSE(doors.open) << "the other waits still";
-  doors.open = true;
+  EXPECT_FALSE(doors->open) << "the other waits still";
+  doors->open = true;
   const Error error = change.get();
   EXPECT_EQ(ErrorCode::wrong_revision, error.code()) << error.what();
   EXPECT_EQ(PropertyValue(1.0), gain_of("b"));
@@ -281,13 +281,13 @@ TEST_F(PreparedBeside, AnOrdinaryCommitUnderWayGivesWay) {
 }
 
 TEST_F(PreparedBeside, ItTimesOutBesideALongState) {
-  Doors doors;
+  const auto doors = std::make_shared<Doors>();
   commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
-  wait_until([&] { return doors.entered.load(); }, "the long state");
+  wait_until([&] { return doors->entered.load(); }, "the long state");
   auto prepared = gain("b", 3.0);
   EXPECT_EQ(PreparedOutcome::timed_out, prepared->commit(ms_to_ns(20)));
   EXPECT_EQ(ErrorCode::timeout, failure(*prepared).code());
-  doors.open = true;
+  doors->open = true;
   EXPECT_EQ(PropertyValue(1.0), gain_of("b"));
 }
 
