@@ -79,8 +79,9 @@ def _executor_start(processes: Processes, talkers: Talkers, plugins: Path) -> St
     begin_ns = time.monotonic_ns()
     executor = ExecutorProcess(processes, talkers.architecture, plugins=plugins)
     _await_thread(executor.pid, talkers.names[-1])
-    cpu_ms, memory_mb = _cpu_ms(executor.pid), _memory_mb(executor.pid)
+    cpu_ms = _cpu_ms(executor.pid)
     time.sleep(_RELEASE_S)
+    memory_mb = _memory_mb(executor.pid)  # with what is loaded after the first release
     executor.end()
     found = talkers.releases()
     configured_ns = min(int(rows[0, 0]) for rows in found)

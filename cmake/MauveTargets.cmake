@@ -21,6 +21,21 @@ if(MAUVE_SANITIZE)
   target_link_options(mauve_sanitizers INTERFACE -fsanitize=${MAUVE_SANITIZE})
 endif()
 
+# mauve_compile_in_units(<target> <count> [ELSE_PRECOMPILED <header>]): with MAUVE_UNITS, compile the target's sources as
+# <count> units, since most of the time of each source goes into headers; else precompile <header> for all of them.
+# A unit may take 1 GB of memory, which is why large targets have two.
+function(mauve_compile_in_units target count)
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "ELSE_PRECOMPILED" "")
+  if(MAUVE_UNITS)
+    get_target_property(sources ${target} SOURCES)
+    list(LENGTH sources length)
+    math(EXPR batch "(${length} + ${count} - 1) / ${count}")
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${batch})
+  elseif(arg_ELSE_PRECOMPILED)
+    target_precompile_headers(${target} PRIVATE "${arg_ELSE_PRECOMPILED}")
+  endif()
+endfunction()
+
 # Parts are written one after the other: what is not there yet is left out.
 macro(mauve_add_part folder)
   if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/CMakeLists.txt")

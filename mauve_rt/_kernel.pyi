@@ -599,7 +599,17 @@ class Host:
 
         The architecture can be deployed again.
         """
-    def stop(self, component: str, timeout_ns: int = 1_000_000_000) -> None: ...
+    def stop(self, component: str, timeout_ns: int = 1_000_000_000, *, force: bool = False) -> bool:
+        """Stops a component at the end of its state; a wait ends at once.
+
+        By force: a component that still executes a state, or a guard, at the time-out is given up. It is
+        FAULTED, its outputs are written as on a stop, and its thread is left behind until the state ends.
+        True when that was done. A core that loops in Python is given up like any other. An extension that
+        never releases the interpreter's lock stops all Python of the process, this call included.
+
+        Raises:
+            MauveError: not_running; timeout, and the stop stays pending: it takes effect when the state ends.
+        """
     def start(self, component: str, clock_ns: int | None = None) -> None: ...
     def get_time(self, component: str) -> int: ...
     def commit(
@@ -611,8 +621,14 @@ class Host:
         commit_timeout_ns: int = 1_000_000_000,
         phase_timeout_ns: int = 1_000_000_000,
         max_missed: int = 0,
+        force: bool = False,
     ) -> TransactionReport:
         """Carries out a transaction, deployed or not; each component may miss `max_missed` releases for it.
+
+        By force: a component that is removed, stopped or given new parts, and whose state does not end within
+        the commit's time-out, is stopped by force, as stop() says. It stays FAULTED whatever becomes of the
+        transaction. The commit is tried once more, without the thread of one that is removed or stopped; for
+        new parts it is refused (faulted): remove the component and add it anew, in one transaction.
 
         Raises MauveError with the number of the failed step (`step`); nothing was changed then.
         """
@@ -624,6 +640,7 @@ class Host:
         expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
         max_missed: int = 0,
+        force: bool = False,
     ) -> Committed:
         """As commit(), but waits for no release that follows: ask what it returns."""
     def replace_core(

@@ -3,6 +3,7 @@
 
     scripts/count_results.py [--failed-stages N] FOLDER
     scripts/count_results.py --skipped FILE     print the skipped cases of a ctest run and why
+    scripts/count_results.py --slowest N FOLDER print the N slowest cases: seconds, stage, name
 
 Exit status 1 when a case failed or a stage did. Stages that failed when no case did (they did not build, say)
 count as failed cases.
@@ -11,10 +12,12 @@ count as failed cases.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
 import sys
 import xml.etree.ElementTree as ET
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 
@@ -43,6 +46,24 @@ def print_skipped(path: Path) -> None:
             sys.stdout.write(f"SKIPPED {case.get('name')}: {gtest_skip_reason(case)}\n")
 
 
+def cases_of(folder: Path) -> Iterator[tuple[str, ET.Element]]:
+    """Yield each case of a test run with its stage."""
+    for path in sorted(folder.glob("*.xml")):
+        for case in ET.parse(path).getroot().iter("testcase"):
+            yield path.stem, case
+
+
+def print_slowest(folder: Path, count: int) -> None:
+    """Print one line per case, the slowest first."""
+    cases = [
+        (float(case.get("time") or 0), stage, case.get("classname") or "", case.get("name") or "")
+        for stage, case in cases_of(folder)
+    ]
+    for seconds, stage, group, name in sorted(cases, reverse=True)[:count]:
+        shown = name if group in ("", name) else f"{group}::{name}"  # ctest repeats the name
+        sys.stdout.write(f"{seconds:7.1f} s  {stage:7} {shown}\n")
+
+
 def main() -> int:
     """Count, print, and return the exit status."""
     parser = argparse.ArgumentParser(
@@ -50,14 +71,17 @@ def main() -> int:
     )
     parser.add_argument("--failed-stages", type=int, default=0)
     parser.add_argument("--skipped", action="store_true")
+    parser.add_argument("--slowest", type=int)
     parser.add_argument("path", type=Path)
     arguments = parser.parse_args()
     if arguments.skipped:
         print_skipped(arguments.path)
         return 0
-    counts: Counter[str] = Counter()
-    for path in sorted(arguments.path.glob("*.xml")):
-        counts.update(outcome(case) for case in ET.parse(path).getroot().iter("testcase"))
+    if arguments.slowest is not None:
+        with contextlib.suppress(BrokenPipeError):  # `| head`
+            print_slowest(arguments.path, arguments.slowest)
+        return 0
+    counts = Counter(outcome(case) for _, case in cases_of(arguments.path))
     if arguments.failed_stages and not counts["failed"]:
         counts["failed"] = arguments.failed_stages
     sys.stdout.write(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped\n")

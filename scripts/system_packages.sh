@@ -1,5 +1,5 @@
 # The system's packages that building needs, and how they are installed: sourced by scripts/setup, never run.
-# shellcheck shell=bash disable=SC2154 # with_lint: what scripts/setup was asked for
+# shellcheck shell=bash disable=SC2154 # with_...: what scripts/setup was asked for
 
 readonly APT_PATIENCE_S=600
 
@@ -21,6 +21,7 @@ missing_system_packages() {
     echo python3-venv
     echo python3-dev
   fi
+  if $with_tests && ! command -v ccache >/dev/null; then echo ccache; fi # tests build most of it several times
   if $with_lint && ! command -v shellcheck >/dev/null; then echo shellcheck; fi
 }
 

@@ -10,10 +10,10 @@ namespace mauve_examples {
 
 namespace {
 
-constexpr std::int32_t kUnreached = std::numeric_limits<std::int32_t>::max();
+constexpr std::int32_t kUnreachedCost = std::numeric_limits<std::int32_t>::max();
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int32_t kStraight = 5;
-constexpr std::int32_t kDiagonal = 7;
+constexpr std::int32_t kStraightCost = 5;
+constexpr std::int32_t kDiagonalCost = 7;
 // A robot pushed against a wall stands where it does not plan to go: the search starts from the nearest good
 // cell.
 constexpr double kSnap_m = 0.8;
@@ -30,7 +30,7 @@ void FrontierFinder::configure(const GridGeometry& geometry, const FrontierOptio
   near_squared_ = clearance_.squared_cells(options.radius_m);
   const std::size_t count = geometry.cell_count();
   kind_.assign(count, 0);
-  cost_.assign(count, kUnreached);
+  cost_.assign(count, kUnreachedCost);
   next_.assign(count, kNone);
   previous_.assign(count, kNone);
   members_.assign(count, 0);
@@ -45,7 +45,7 @@ const FrontierList& FrontierFinder::find(std::span<const std::int8_t> cells, con
   member_count_ = 0;
   clearance_.compute(cells);
   classify(cells);
-  std::fill(cost_.begin(), cost_.end(), kUnreached);
+  std::fill(cost_.begin(), cost_.end(), kUnreachedCost);
   const auto start =
       nearest_cell(geometry_, geometry_.cell_at(robot.x, robot.y), cells_of(geometry_, kSnap_m),
                    [this](Cell cell) { return passable(geometry_.index(cell)); });
@@ -87,7 +87,7 @@ inline void FrontierFinder::unlink(std::uint32_t index) noexcept {
 
 inline void FrontierFinder::relax(std::uint32_t index, std::int32_t cost) noexcept {
   if (cost >= cost_[index]) return;
-  if (cost_[index] != kUnreached) unlink(index);
+  if (cost_[index] != kUnreachedCost) unlink(index);
   cost_[index] = cost;
   std::uint32_t& head = bucket_[static_cast<std::size_t>(cost) % kBuckets];
   next_[index] = head;
@@ -129,8 +129,8 @@ void FrontierFinder::spread_inside(std::uint32_t index) noexcept {
   const auto width = static_cast<std::uint32_t>(geometry_.width);
   const std::uint32_t below = index - width;
   const std::uint32_t above = index + width;
-  const std::int32_t straight = cost_[index] + kStraight;
-  const std::int32_t diagonal = cost_[index] + kDiagonal;
+  const std::int32_t straight = cost_[index] + kStraightCost;
+  const std::int32_t diagonal = cost_[index] + kDiagonalCost;
   const bool left = passable(index - 1);
   const bool right = passable(index + 1);
   if (passable(below)) {
@@ -158,7 +158,8 @@ void FrontierFinder::spread_at_border(Cell cell) noexcept {
                         passable(geometry_.index({cell.column, next.row})))) {
         continue;
       }
-      relax(static_cast<std::uint32_t>(geometry_.index(next)), cost + (diagonal ? kDiagonal : kStraight));
+      relax(static_cast<std::uint32_t>(geometry_.index(next)),
+            cost + (diagonal ? kDiagonalCost : kStraightCost));
     }
   }
 }
@@ -210,7 +211,7 @@ Frontier FrontierFinder::grow(std::uint32_t seed) noexcept {
     best = across * across + along * along;
     middle = stack_[i];
   }
-  const double per_cost_m = geometry_.resolution_m / kStraight;
+  const double per_cost_m = geometry_.resolution_m / kStraightCost;
   return {geometry_.centre(geometry_.cell(middle)), static_cast<double>(size) * geometry_.resolution_m,
           static_cast<double>(cost_[middle]) * per_cost_m};
 }
@@ -228,8 +229,8 @@ double FrontierFinder::cost_m(const Point& place) const noexcept {
   const Cell cell = geometry_.cell_at(place.x, place.y);
   if (!geometry_.contains(cell)) return std::numeric_limits<double>::infinity();
   const std::int32_t cost = cost_[geometry_.index(cell)];
-  if (cost == kUnreached) return std::numeric_limits<double>::infinity();
-  return cost * geometry_.resolution_m / kStraight;
+  if (cost == kUnreachedCost) return std::numeric_limits<double>::infinity();
+  return cost * geometry_.resolution_m / kStraightCost;
 }
 
 bool FrontierFinder::any_near(const Point& place, double reach_m) const noexcept {

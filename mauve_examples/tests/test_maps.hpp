@@ -14,9 +14,7 @@
 
 namespace mauve_examples::testing {
 
-inline std::filesystem::path source_folder() {
-  return std::filesystem::path(__FILE__).parent_path().parent_path();
-}
+std::filesystem::path source_folder();
 /// A map that the project ships.
 inline std::filesystem::path own_map(const std::string& name) {
   return source_folder() / "maps" / (name + ".yaml");

@@ -11,6 +11,7 @@
 template <>
 struct pybind11::detail::type_caster<std::string> : string_caster<std::string> {
   /// Text and bytes; a lone surrogate, which UTF-8 has not, as `\udcff`.
+  // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): pybind11 calls a caster by its type.
   bool load(handle source, bool convert) {
     if (string_caster<std::string>::load(source, convert)) return true;
     if (!source || PyUnicode_Check(source.ptr()) == 0) return false;

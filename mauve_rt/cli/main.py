@@ -19,11 +19,13 @@ import mauve_rt
 from mauve_rt.cli.pipe import piped
 from mauve_rt.cli.verb import run
 from mauve_rt.cli.verbs import VERBS
+from mauve_rt.node.shared.lean_start import leave_out_unused
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status."""
     gc.disable()  # short-lived: looking for garbage in what is loaded is a tenth of the work
+    leave_out_unused()
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:  # the shell asks for a completion
         import argcomplete  # noqa: PLC0415

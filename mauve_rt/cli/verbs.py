@@ -49,9 +49,23 @@ def _add_max_missed(parser: argparse.ArgumentParser, *, default: int | None = 0)
     )
 
 
+def _add_force(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="give up a component to be stopped, removed or changed whose state does not end in time",
+    )
+
+
+def _add_stop(parser: argparse.ArgumentParser) -> None:
+    _add_timed_request(parser)
+    _add_force(parser)
+
+
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_max_missed(parser)
+    _add_force(parser)
     parser.add_argument("core", help="the new core, package/Class")
 
 
@@ -62,6 +76,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     _add_record(parser)
     _add_timeout(parser)
     _add_max_missed(parser, default=None)
+    _add_force(parser)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -84,7 +99,8 @@ def _list(args: argparse.Namespace) -> int:
 def _stop(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Stop  # noqa: PLC0415
 
-    return _request(args, Stop, "stop", component=args.component, timeout_s=args.timeout)
+    fields = {"component": args.component, "timeout_s": args.timeout, "force": args.force}
+    return _request(args, Stop, "stop", **fields)
 
 
 def _start(args: argparse.Namespace) -> int:
@@ -104,6 +120,7 @@ def _replace_core(args: argparse.Namespace) -> int:
         core=args.core,
         commit_timeout_s=args.timeout,
         max_missed=args.max_missed,
+        force=args.force,
     )
 
 
@@ -131,6 +148,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
         max_missed=change.max_missed if args.max_missed is None else args.max_missed,
+        force=args.force or change.force,
     )
 
 
@@ -282,7 +300,7 @@ def _absolute(name: str) -> str:
 
 VERBS = (
     Verb("list", "show an executor's components", _add_executor, _list),
-    Verb("stop", "stop a component", _add_timed_request, _stop),
+    Verb("stop", "stop a component", _add_stop, _stop),
     Verb("start", "start a stopped component", _add_request, _start),
     Verb(
         "replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core

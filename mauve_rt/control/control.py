@@ -202,6 +202,7 @@ class Control:
                 expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
                 max_missed=request.max_missed,
+                force=request.force,
             )
         except MauveError as error:
             if error_code(error) in _CALLED_OFF:
@@ -248,8 +249,10 @@ class Control:
     def _start_or_stop(self, step: Step, request: Request) -> Outcome:
         """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
         if step.kind == "stop":
-            self._runtime.host.stop(step.target, _timeout_ns(request))
+            forced = self._runtime.host.stop(step.target, _timeout_ns(request), force=request.force)
             message = f"component '{step.target}' is stopped"
+            if forced:
+                message += " by force: it is FAULTED, and its thread is left behind until its state ends"
         else:
             self._runtime.host.start(step.target, request.clock_ns or None)
             message = f"component '{step.target}' is started"

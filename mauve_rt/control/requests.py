@@ -1,6 +1,6 @@
 """Requests to an executor and their outcomes, as plain values, and the memory of those already answered."""
 
-import hashlib
+from _blake2 import blake2b  # hashlib would load OpenSSL: 4 MB and 3 ms of each start
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -88,13 +88,16 @@ class Request:
     dry_run: bool = False
     timeout_s: float = 0.0  # 0: the default
     max_missed: int = 0  # releases that each component may miss for it
+    force: bool = (
+        False  # a component whose state does not end in time is given up: see Host.stop() and commit()
+    )
     clock_ns: int = 0  # of a start: reference instant of the grid, 0: the deployment's
 
     def __str__(self) -> str:
         if self.recording is not None:
             return str(self.recording)
         words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
-        return f"{words} (dry run)" if self.dry_run else words
+        return words + " by force" * self.force + " (dry run)" * self.dry_run
 
     @property
     def is_direct(self) -> bool:
@@ -111,7 +114,7 @@ class Request:
 
     def digest(self) -> bytes:
         """Of its contents: equal where two requests are, for all that anybody will ever see."""
-        return hashlib.sha256(repr(self).encode("utf-8", "surrogatepass")).digest()
+        return _digest(repr(self))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,4 +206,8 @@ def reused_id(request: Request, first: "Request | str") -> Outcome:
 
 
 def _key(request: Request) -> bytes:
-    return hashlib.sha256(request.request_id.encode("utf-8", "surrogatepass")).digest()
+    return _digest(request.request_id)
+
+
+def _digest(text: str) -> bytes:
+    return blake2b(text.encode("utf-8", "surrogatepass"), digest_size=32).digest()

@@ -228,6 +228,12 @@ class Runtime:
         architecture = self._architecture
         return architecture.components() if architecture is not None else []
 
+    def has_python_parts(self, part: ComponentDescription) -> bool:
+        """Whether the component runs under the interpreter's lock."""
+        named = (("shell", part.shell), ("core", part.core), ("fsm", part.fsm))
+        plugins = [self.index.find(kind, name) for kind, name in named]
+        return any(plugin is not None and plugin.is_python for plugin in plugins)
+
     def threads_left_behind(self) -> int:
         """Threads of removed components that still execute what they were condemned for."""
         architecture = self._architecture

@@ -27,6 +27,8 @@ class Done(NamedTuple):
 class DecisionMessages:
     """Of the rules of one Reflex. One thread at a time."""
 
+    TYPE = DECISION_TYPE
+
     def __init__(
         self, rules: Sequence[Rule], runtime: Runtime, *, who: str, name: Callable[[str], str]
     ) -> None:

@@ -1,6 +1,7 @@
 """What an architecture file says, held against the plug-ins it names."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 
 from mauve_rt._kernel import (
     PortDescription,
@@ -12,7 +13,7 @@ from mauve_rt._kernel import (
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, PortTypeError, Problem
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.kinds import Faults
-from mauve_rt.model.message_shapes import REMEDY, mismatches
+from mauve_rt.model.message_shapes import REMEDY, message_definition, mismatches
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.model.resource_kinds import given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
@@ -30,8 +31,11 @@ class Checks:
         self._model = model
         self._loader = loader
         self._shells: dict[str, ShellDescription] = {}  # by component
+        self._described: dict[str, ShellDescription] = {}  # by the shell's name: described and checked once
         self._resources: dict[str, ResourceDescription] = {}
         self._unlike: set[str] = set()  # types that were told to differ from their messages
+        # A message is looked up in the ament index's files: once for all ports of its type.
+        self._message_definition = cache(message_definition)
 
     def problems(self) -> list[Problem]:
         """Everything wrong; empty: the architecture can be built."""
@@ -52,8 +56,13 @@ class Checks:
         missing = [*self._plugin("shell", component.shell, (*place, "shell"))]
         yield from missing
         if not missing:
-            self._shells[name] = registry.describe_shell(component.shell)
-            yield from self._structs(self._shells[name].ports, (*place, "shell"))
+            shell = self._described.get(component.shell)
+            if shell is not None:
+                self._shells[name] = shell
+            else:
+                shell = registry.describe_shell(component.shell)
+                self._shells[name] = self._described[component.shell] = shell
+                yield from self._structs(shell.ports, (*place, "shell"))
         for kind, plugin, written_for in (
             ("core", component.core, registry.core_shell),
             ("fsm", component.fsm, registry.fsm_shell),
@@ -176,7 +185,7 @@ class Checks:
     ) -> Iterator[Problem]:
         """C++ structs that are not what the ROS messages of their names are; each once."""
         for carrier in carriers:
-            for found in mismatches(carrier.messages):
+            for found in mismatches(carrier.messages, find=self._message_definition):
                 if found.type in self._unlike:
                     continue
                 self._unlike.add(found.type)

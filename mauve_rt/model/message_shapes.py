@@ -1,7 +1,7 @@
 """C++ structs held against the ROS messages whose names they bear, field by field."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
@@ -44,18 +44,7 @@ class _Field(NamedTuple):
         return f"{text} {self.name}"
 
 
-def mismatches(messages: Iterable[MessageShape]) -> Iterator[Mismatch]:
-    """One for each struct that bears the name of an installed ROS message and is none."""
-    for message in messages:
-        definition = _definition(message.type)
-        if definition is None:
-            continue
-        found = _difference(definition, message.fields)
-        if found is not None:
-            yield Mismatch(message.type, *found)
-
-
-def _definition(name: str) -> Any:
+def message_definition(name: str) -> Any:
     """The class of a message, or of a service's request or response; None when it is not installed."""
     match = re.fullmatch(r"(.+/srv/.+)_(Request|Response)", name)
     if match is None:
@@ -64,7 +53,25 @@ def _definition(name: str) -> Any:
     return None if service is None else getattr(service, match[2])
 
 
-def _difference(definition: Any, fields: Iterable[FieldShape]) -> tuple[str, str, str] | None:
+def mismatches(
+    messages: Iterable[MessageShape], *, find: Callable[[str], Any] = message_definition
+) -> Iterator[Mismatch]:
+    """One for each struct that bears the name of an installed ROS message and is none.
+
+    `find`: message_definition, or a cache of it for a caller that asks about many ports of few types.
+    """
+    for message in messages:
+        definition = find(message.type)
+        if definition is None:
+            continue
+        found = _difference(definition, message.fields, find)
+        if found is not None:
+            yield Mismatch(message.type, *found)
+
+
+def _difference(
+    definition: Any, fields: Iterable[FieldShape], find: Callable[[str], Any]
+) -> tuple[str, str, str] | None:
     """Field, expected and found of the first difference."""
     declared: Mapping[str, str] = definition.get_fields_and_field_types()
     for (name, words), shape in zip_longest(declared.items(), fields, fillvalue=(None, "")):
@@ -77,8 +84,8 @@ def _difference(definition: Any, fields: Iterable[FieldShape]) -> tuple[str, str
         if not _same(expected, found):
             return expected.name, str(expected), str(found)
         assert isinstance(shape, FieldShape)  # noqa: S101 - else `found` were None
-        inner = _definition(expected.type) if shape.fields else None
-        if inner is not None and (difference := _difference(inner, shape.fields)) is not None:
+        inner = find(expected.type) if shape.fields else None
+        if inner is not None and (difference := _difference(inner, shape.fields, find)) is not None:
             return (f"{expected.name}.{difference[0]}", *difference[1:])
     return None
 

@@ -191,7 +191,7 @@ class PluginLoader:
 
     def _load_library(self, plugin: Plugin) -> None:
         if not plugin.library.is_file():
-            remedy = "build and install the package again"
+            remedy = "build and install its package again (of MAUVE RT: scripts/setup)"
             raise PluginError(f"{plugin.kind} '{plugin.name}': no library {plugin.library}", remedy=remedy)
         self._loaded.note(plugin.source, [plugin.library])
         try:

@@ -6,6 +6,7 @@
 - {kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}
 
 Or, where its components may miss releases for it: {max_missed: 2, steps: [...]}.
+Or, where components whose state does not end are given up for it: {force: true, steps: [...]}.
 """
 
 import json
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, Kind, ListOf, Text, Whole
+from mauve_rt.model.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text, Whole
 from mauve_rt.model.schema import IDENTIFIER_OR_NONE
 from mauve_rt.model.schema_errors import expected
 from mauve_rt.model.section import Section, setting
@@ -88,9 +89,10 @@ STEPS = ListOf(_StepPart(), few=1)
 
 
 class Change(Section):
-    """A transaction: its steps, and how many releases each component may miss for it."""
+    """A transaction: its steps, how many releases each component may miss, whether hung ones are given up."""
 
     max_missed: int = setting(MISSED, default=0)
+    force: bool = setting(Flag(), default=False)
     steps: list[Step] = setting(STEPS)
 
 

@@ -33,7 +33,6 @@ Why why_of(Ended how) noexcept {
   return Why::refused;
 }
 
-constexpr std::size_t index_of(Act act) noexcept { return static_cast<std::size_t>(act); }
 constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : Act::do_; }
 
 }  // namespace

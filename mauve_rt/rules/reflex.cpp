@@ -26,7 +26,6 @@ constexpr std::uint64_t kInPlace = 8;  // ... that what it asks for is so
 constexpr unsigned kEndsAt = 5;
 
 constexpr std::array kActs{Act::do_, Act::undo};
-constexpr unsigned index_of(Act act) noexcept { return static_cast<unsigned>(act); }
 
 }  // namespace
 

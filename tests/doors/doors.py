@@ -35,7 +35,6 @@ CHEAP_BUILD = (
     "-DCMAKE_BUILD_TYPE=Debug",
     "-DCMAKE_C_FLAGS_DEBUG=-DNDEBUG",  # an assertion names its source file
     "-DCMAKE_CXX_FLAGS_DEBUG=-DNDEBUG",
-    "-DCMAKE_UNITY_BUILD=ON",
 )
 NINJA = {"CMAKE_GENERATOR": "Ninja"}  # CMake's own choice is make, which a bare machine has not
 # A job for each processor. Left alone, colcon lets ninja start one only while the load is below that.

@@ -74,6 +74,7 @@ struct Stop {
     mauve::BoundedString<16> cause;
     mauve::BoundedString<16> component;
     double timeout_s{};
+    bool force{};
   };
   struct Response {
     bool success{};
@@ -103,7 +104,7 @@ MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", dat
 MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
-           requested_by, cause, component, timeout_s)
+           requested_by, cause, component, timeout_s, force)
 MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
            missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
@@ -228,11 +229,13 @@ struct Slow : Counter {
   }
 };
 
-/// Executes until it is told a number; says by counting -1 that it does. Tells of a lost message in half a minute.
+/// Executes until it receives a number; counts -1 when it begins. Gives up after half a minute; after three seconds where
+/// its label is "briefly": a condemned component receives nothing.
 struct Held : Counter {
   void act() override {
     shell().count.write({-1.0});
-    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(30);
+    const int longest_s = std::string(shell().label.value()) == "briefly" ? 3 : 30;
+    const mauve::time_ns_t until = mauve::monotonic_now_ns() + mauve::s_to_ns(longest_s);
     while (!shell().set.read().is_new() && mauve::monotonic_now_ns() < until) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }

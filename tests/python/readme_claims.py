@@ -77,8 +77,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "system packages through apt": (
         "python/project/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
     ),
-    "The first run takes a few minutes": (
+    "The first run takes about two minutes until the mission starts": (
         "python/project/test_scripts.py::test_progress_says_how_far_what_and_how_long",
+        "python/project/test_build.py::test_setup_tells_the_cpu_time_of_its_commands",
+    ),
+    "The demo builds only what it runs": (
+        "python/project/test_build.py::test_the_demo_builds_only_what_it_runs",
+    ),
+    "`scripts/setup` builds the rest": ("python/project/test_build.py::test_who_asked_for_all_keeps_all",),
+    "clones on one machine share what they compiled": (
+        "python/project/test_build.py::test_clones_in_different_folders_share_what_was_compiled",
+        "python/project/test_scripts.py::test_ccache_comes_with_the_tests",
     ),
     "A sourced ROS 2 Jazzy is used when there is one": (
         "python/project/test_readme_scripts.py::test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one",
@@ -242,6 +251,18 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "A state that does not end": (
         "ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",
+    ),
+    "`mauve stop --force` gives such a component up": (
+        "Rule11Force.AStopByForceGivesUpAStateThatDoesNotEnd",
+        "ros/executor/test_force.py::test_a_hung_component_is_stopped_by_force",
+    ),
+    "A component that comes to a wait in time is stopped as ever": (
+        "Rule11Force.AStateEndsOrIsGivenUpAndNeverBoth",
+        "HostConformance.ForceHarmsNobodyWhoIsWell",
+    ),
+    "removes one whose thread does not come back": (
+        "Rule11Force.ARemovalByForceGoesOnWithoutTheThread",
+        "ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",
     ),
     "What requests may take is limited by the executor's parameters": (
         "ros/executor/test_request_limits.py::test_memory_and_priority_that_requests_may_take",
@@ -794,6 +815,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench:  components, from its process to the first release",
         "bench: of it, until the components are being configured",
     ),
+    "The executor and `mauve` load numpy with one thread": (
+        "python/node/test_lean_start.py::test_neither_threads_of_numpy_nor_the_message_generator",
+    ),
     "| CPU time of it / memory resident after it": (
         "bench: CPU time of it, with some of the components' own",
         "bench: resident memory after it",
@@ -869,6 +893,8 @@ PROMISE_NOTHING = (
     "The soak is from `--full`",
     "(5*) Of 2026-11-23",
     "(6*) Of the evening",
+    "(7*) Of 2026-11-25",
+    "With one thread in both, the start takes 1.39 x",
     "(**) Of the same day",
     "(***) Of the evening",
     "(****) Of the night after",

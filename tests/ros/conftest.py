@@ -112,7 +112,7 @@ class Graph:
 
 @pytest.fixture(scope="module")
 def domain() -> int:
-    """A ROS domain of this module's own; the stage `system`, which may run meanwhile, has 51 to 100."""
+    """A ROS domain of this module's own; the stage `system`, which runs in parallel, has 51 to 100."""
     return random.SystemRandom().randint(1, 50)
 
 

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,28 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 
 NODE = "/robot_1/executor"
-HEAVY = {"matplotlib", "mcap", "networkx", "pandas", "pydantic", "rich", "rosbags", "ruamel"}
+HEAVY = {
+    "_hashlib",
+    "lark",
+    "matplotlib",
+    "mcap",
+    "networkx",
+    "pandas",
+    "pydantic",
+    "rich",
+    "rosbags",
+    "ruamel",
+}
 ROS = {"mauve_msgs", "numpy", "rclpy"}
+# An executor without rules and Python components loads these after its components have started, or never.
+AFTER_THE_START = {
+    "diagnostic_msgs",
+    "mauve_rt.control.control",
+    "mauve_rt.node.executor.diagnostics",
+    "mauve_rt.node.executor.parameter_services",
+    "mauve_rt.node.executor.services",
+}
+WITHOUT_RULES = {"mauve_rt.node.executor.rules_file", "mauve_rt.supervision.rules"}
 FORBIDDEN = {
     ("--help",): HEAVY | ROS,
     ("plugins", "--json"): HEAVY | ROS,
@@ -27,10 +47,15 @@ FORBIDDEN = {
 }
 
 
+def modules(log: str) -> set[str]:
+    """The modules in what `python -X importtime` wrote."""
+    lines = [line for line in log.splitlines() if line.startswith("import time:")]
+    return {line.rpartition("|")[2].strip() for line in lines}
+
+
 def loaded(log: str) -> set[str]:
     """The packages in what `python -X importtime` wrote."""
-    lines = [line for line in log.splitlines() if line.startswith("import time:")]
-    found = {line.rpartition("|")[2].strip().partition(".")[0] for line in lines}
+    found = {name.partition(".")[0] for name in modules(log)}
     assert "mauve_rt" in found, log
     return found
 
@@ -41,13 +66,37 @@ def traced(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPROFILEIMPORTTIME", "1")
 
 
-def test_start_of_an_executor(traced: None, executor: Any, graph: Any) -> None:
+def log_until_active(executor: Any, graph: Any) -> tuple[str, str]:
+    """What an executor wrote before and after its components were started."""
+
     def state() -> int:
         return int(graph.ask(GetState, f"{NODE}/get_state").current_state.id)
 
     graph.spin_until(lambda: state() == State.PRIMARY_STATE_ACTIVE, "active")
     assert executor.end(signal.SIGINT)[0] == 0
-    assert loaded(executor.output) & HEAVY == set()
+    before, started, after = executor.output.partition("activated: ")
+    assert started
+    return before, after
+
+
+def test_start_of_an_executor(traced: None, executor: Any, graph: Any) -> None:
+    before, after = log_until_active(executor, graph)
+    assert loaded(before + after) & HEAVY == set()
+    assert modules(before) & AFTER_THE_START == set()
+    assert modules(after) >= AFTER_THE_START
+    assert modules(before + after) & WITHOUT_RULES == set()
+
+
+def test_components_in_python_wait_for_no_module_once_they_run(
+    traced: None, architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8")
+    in_python = text.replace("core: executor_tests/Counter,", "core: executor_tests/PyCounter,")
+    assert in_python != text
+    architecture.write_text(in_python, encoding="utf-8")
+    before, after = log_until_active(start_executor("-p", f"architecture:={architecture}"), graph)
+    assert modules(before) >= AFTER_THE_START
+    assert modules(after) & AFTER_THE_START == set()
 
 
 @pytest.mark.parametrize(("words", "forbidden"), FORBIDDEN.items(), ids=[words[0] for words in FORBIDDEN])

@@ -36,17 +36,35 @@ void append(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::sh
 }  // namespace
 
 std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) {
-  const std::lock_guard lock(list_mutex_);
-  const auto member = std::make_shared<Member>(name, give_number(name));
-  return {member, &member->component};
+  std::shared_ptr<Component> made;
+  {
+    const std::lock_guard lock(list_mutex_);
+    const std::optional<std::uint16_t> free = find_free_number(name);
+    const auto member = std::make_shared<Member>(name, free ? *free : give_number(name));
+    made = {member, &member->component};
+    numbered_[made->task().number()] = made;
+  }
+  const std::lock_guard lock(trace_mutex_);
+  Task& task = made->task();
+  if (task.number() < finals_.size()) task.set_first_record(finals_[task.number()].written);
+  return made;
+}
+
+std::optional<std::uint16_t> Architecture::find_free_number(const std::string& name) const {
+  for (const auto& [number, component] : numbered_) {
+    if (names_[number] == name && component.expired()) return number;
+  }
+  return {};
 }
 
 std::uint16_t Architecture::give_number(const std::string& name) {
   if (names_.size() == kMostNumbers) {
     throw Error(ErrorCode::out_of_range, "the trace has no number left for another component",
                 {.component = name,
-                 .expected = "at most " + std::to_string(kMostNumbers) + " components, removed ones included",
-                 .remedy = "start the executor anew"});
+                 .expected = "at most " + std::to_string(kMostNumbers) +
+                             " names, those of removed components included",
+                 .found = "one more",
+                 .remedy = "add the component by a name that was used before, or start the executor anew"});
   }
   names_.push_back(name);
   return static_cast<std::uint16_t>(names_.size() - 1);
@@ -66,7 +84,9 @@ std::size_t Architecture::numbers() const {
 
 void Architecture::give_back_numbers(std::size_t numbers) {
   const std::lock_guard lock(list_mutex_);
-  if (numbers < names_.size()) names_.resize(numbers);
+  if (numbers >= names_.size()) return;
+  names_.resize(numbers);
+  numbered_.erase(numbered_.lower_bound(static_cast<std::uint16_t>(numbers)), numbered_.end());
 }
 
 void Architecture::change_lists(const ListChange& change) {
@@ -139,7 +159,8 @@ void Architecture::retire_trace(Task& task) {
   std::vector<TraceRecord> records;
   ring->drain(records);
   if (finals_.size() <= task.number()) finals_.resize(task.number() + std::size_t{1});
-  finals_[task.number()] = {.written = ring->offered(), .dropped = ring->dropped()};
+  finals_[task.number()].written += ring->offered();
+  finals_[task.number()].dropped += ring->dropped();
   keep_records(records);
 }
 

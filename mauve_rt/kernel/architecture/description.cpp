@@ -16,7 +16,7 @@ ComponentFacts facts_of(Component& component, time_ns_t epoch_ns) {
           .parts = component.shown(),
           .state = settled(task.state()),
           .period_ns = task.context().period_ns.load(std::memory_order_relaxed),
-          .reference_ns = task.grid().reference_ns == 0 ? 0 : task.grid().reference_ns - epoch_ns,
+          .reference_ns = task.grid().reference_ns == 0 ? 0 : later_by(task.grid().reference_ns, -epoch_ns),
           .settings = task.settings(),
           .alternatives = component.alternatives(),
           .fallback = component.fallback_implementation(),

@@ -36,9 +36,12 @@ void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry
 /// Makes a part by what its package registered, whatever that throws.
 template <typename Make>
 auto made(const std::string& what, Make&& make) -> decltype(make()) {
-  const auto failed = [&what](const std::string& reason) {
+  const auto failed = [&what](const std::string& reason, const std::string& found = "an exception") {
     return Error(ErrorCode::plugin, "the plug-in cannot be made: " + reason,
-                 {.element = what, .remedy = "mend its constructor, or what it needs"});
+                 {.element = what,
+                  .expected = "a factory that makes one",
+                  .found = found,
+                  .remedy = "correct its constructor or factory, or provide what it needs"});
   };
   try {
     if (auto part = make()) return part;
@@ -47,7 +50,7 @@ auto made(const std::string& what, Make&& make) -> decltype(make()) {
   } catch (...) {
     throw failed(caught_text());
   }
-  throw failed("its factory made nothing");
+  throw failed("its factory returned no object", "nullptr");
 }
 
 /// A parameter's value in its own type. Throws Error: type_mismatch, out_of_range.

@@ -15,6 +15,8 @@ class StateGuard final : public CommitAction {
  public:
   /// A participant and the state it was found in. [non-rt], before the commit.
   void expect(const Participant& place, ComponentState found) { found_.push_back({&place, found}); }
+  /// Expects nothing any more. [non-rt], before the commit.
+  void clear() noexcept { found_.clear(); }
 
   bool adopt() override {
     for (const Found& found : found_) {

@@ -51,6 +51,14 @@ PartsChange::PartsChange(Component& component, Parts fresh,
   }
   make_fsm_ = component_.make_fsm_;
   parts_.fsm = make_fsm_();
+  if (parts_.fsm == nullptr) {
+    throw Error(ErrorCode::prepare_failed, "the fsm's factory returned no object",
+                {.component = component_.name(),
+                 .element = component_.fsm().description(),
+                 .expected = "another instance of the fsm",
+                 .found = "nullptr",
+                 .remedy = "correct the factory that was given with the fsm"});
+  }
   parts_.fsm->set_implementation(component_.fsm().implementation());
 }
 
@@ -105,7 +113,11 @@ void PartsChange::prepare_parts() {
     binding_ = component_.require_binding(core, fsm);
     kept_core_ = &core;
   }
-  if (parts_.fsm != nullptr) component_.update_listening(*parts_.fsm);
+  if (parts_.fsm == nullptr) return;
+  for (const auto& state : parts_.fsm->states()) {
+    if (state->event != nullptr) state->event->mute();  // until the commit
+  }
+  component_.update_listening(*parts_.fsm);
 }
 
 bool PartsChange::adopt() {
@@ -133,8 +145,18 @@ void PartsChange::take() noexcept {
   std::swap(binding_, component_.binding_);
   taken_ = true;
   if (unready_) return;
+  if (parts_.fsm != nullptr) take_over_events(*parts_.fsm);
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
+}
+
+/// By the fsm that was just put in; `before` has gone out.
+void PartsChange::take_over_events(const FsmBase& before) noexcept {
+  const FsmBase& now = *component_.parts_.fsm;
+  component_.task_.leave_event_to(now.initial());
+  for (const auto& state : now.states()) {
+    if (state->event != nullptr) state->event->take_over(before.states());
+  }
 }
 
 time_ns_t PartsChange::budget_ns() const noexcept {

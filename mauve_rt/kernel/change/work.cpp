@@ -60,7 +60,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
     if (options_.dry_run) return discard();
     require_host_open();
     gather();
-    carry_out_commit();
+    commit_by_force_if_asked();
   } catch (...) {
     discard();
     throw;
@@ -96,6 +96,10 @@ void TransactionCommit::Work::require_preparable() const {
 
 TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
+  if (options_.force) {
+    throw Error(ErrorCode::invalid_argument, "a prepared transaction stops nothing by force",
+                {.element = "force", .remedy = "commit it unprepared, or stop the component by force first"});
+  }
   if (options_.dry_run || !deployed_) {
     throw Error(ErrorCode::not_configured, "a transaction is prepared for an architecture that is deployed",
                 {.remedy = "deploy it first; for a dry run ask for a commit"});
@@ -199,6 +203,8 @@ Afterwards TransactionCommit::Work::afterwards_of(const Change& change) const {
 
 void TransactionCommit::Work::gather() {
   // Wiring and properties are in before a new core takes over. adopt(), which may refuse, changes nothing.
+  guard_.clear();
+  places_.clear();
   std::vector<CommitAction*> actions{&guard_};
   for (const auto& action : actions_) actions.push_back(action.get());
   for (const Change& change : changes_) {
@@ -206,7 +212,12 @@ void TransactionCommit::Work::gather() {
   }
   for (const auto& repair : repairs_) actions.push_back(repair.get());
   commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
-  commit_->set_max_missed(options_.max_missed);
+  std::int64_t max_missed = options_.max_missed;
+  for (const Change& change : changes_) {  // no further than there are instants
+    if (const time_ns_t period_ns = change.draft->component->task().grid().period_ns; period_ns != 0)
+      max_missed = std::min(max_missed, kLongest / period_ns);
+  }
+  commit_->set_max_missed(max_missed);
   auto place = commit_->participants().begin();
   for (const Change& change : changes_) {
     place->task = &change.draft->component->task();
@@ -221,6 +232,59 @@ void TransactionCommit::Work::gather() {
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
+}
+
+void TransactionCommit::Work::commit_by_force_if_asked() {
+  try {
+    return carry_out_commit();
+  } catch (const Error& failure) {
+    if (!options_.force || failure.code() != ErrorCode::timeout || !force_hung()) throw;
+  }
+  gather();
+  carry_out_commit();
+}
+
+/// Stops by force those whose state lasted through half of the commit's timeout at least; whether there was one.
+bool TransactionCommit::Work::force_hung() {
+  bool has_forced = false;
+  for (auto change = changes_.begin(); change != changes_.end();) {
+    const Task& task = change->draft->component->task();
+    const StateAge age = task.state_age();
+    const bool is_hung =
+        !age.is_wait && age.age_ns >= options_.timeouts.commit_ns / 2 && !task.is_left_behind();
+    const bool gives_way = change->parts != nullptr || afterwards_of(*change) == Afterwards::stop;
+    if (!is_hung || !gives_way) {
+      ++change;
+      continue;
+    }
+    has_forced = true;
+    const bool is_done = stop_by_force(*change) && change->retreat == nullptr;
+    change = is_done ? changes_.erase(change) : std::next(change);
+  }
+  return has_forced;
+}
+
+/// False when its state has ended this moment, and it is stopped. Throws where more is to be done with it than to stop it.
+bool TransactionCommit::Work::stop_by_force(const Change& change) {
+  constexpr time_ns_t kOneThatEndsNow = ms_to_ns(100);
+  DraftComponent& draft = *change.draft;
+  Task& task = draft.component->task();
+  try {
+    const bool is_forced = task.stop(kOneThatEndsNow, true);
+    draft.state = task.state();
+    draft.ran = false;
+    const bool is_only_stopped = std::none_of(actions_.begin(), actions_.end(),
+                                              [&](const auto& action) { return action->task == &task; });
+    if (!is_forced || change.retreat != nullptr || (change.parts == nullptr && is_only_stopped))
+      return is_forced;
+  } catch (const Error& failure) {
+    rethrow_at(draft.first_step, failure);
+  }
+  throw Error(ErrorCode::faulted, "the component is FAULTED: " + task.fault().what,
+              {.component = draft.name(),
+               .remedy = Task::kLeftBehindRemedy,
+               .step = draft.first_step,
+               .step_name = text_of(draft.first_step)});
 }
 
 void TransactionCommit::Work::carry_out_commit() {
@@ -362,7 +426,8 @@ void TransactionCommit::Work::keep_for_report() {
 
 TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   // In virtual time the releases that follow come only when this call has returned.
-  const time_ns_t until = later_by(monotonic_now_ns(), is_simulated_ ? 0 : phase_timeout_ns);
+  const time_ns_t until =
+      later_by(monotonic_now_ns(), is_simulated_ ? 0 : std::max<time_ns_t>(0, phase_timeout_ns));
   std::map<std::string, StepReport> measured;
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));

@@ -76,6 +76,9 @@ class TransactionCommit::Work {
   void prepare_listening(const Change& change, const PortBase& port, ServiceBase& service);
   // commit
   void gather();
+  void commit_by_force_if_asked();
+  bool force_hung();
+  bool stop_by_force(const Change& change);
   void carry_out_commit();
   void require_same_structure() const;
   template <typename CarryOut>

@@ -24,41 +24,45 @@ std::uint32_t Notifier::wait(std::uint32_t seen, time_ns_t until_ns) noexcept {
 }
 
 void EventListeners::add(EventListener& listener, const std::string& resource) {
-  const std::lock_guard lock(mutex_);
-  const std::size_t count = count_.load(std::memory_order_relaxed);
+  const std::lock_guard change(change_mutex_);
+  const std::size_t count = listeners_.size();
   if (count == kCapacity) {
     throw Error(ErrorCode::out_of_range, "too many wait for events of the resource",
                 {.element = "resource " + resource,
                  .expected = "at most " + std::to_string(kCapacity) + " listeners",
-                 .found = "one more",
+                 .found = std::to_string(count + 1),
                  .remedy = "share the events among more resources, or let one component pass them on"});
   }
-  listeners_[count] = &listener;
+  std::vector<EventListener*> more;  // frees the old ones, once writers have left them
+  if (count == listeners_.capacity()) {
+    more.reserve(std::max<std::size_t>(kFirst, 2 * count));
+    more.assign(listeners_.begin(), listeners_.end());
+  }
+  const std::lock_guard lock(mutex_);
+  if (more.capacity() != 0) listeners_.swap(more);
+  listeners_.push_back(&listener);
   count_.store(count + 1, std::memory_order_relaxed);
 }
 
 void EventListeners::remove(EventListener& listener) noexcept {
+  const std::lock_guard change(change_mutex_);
   const std::lock_guard lock(mutex_);
-  const std::size_t count = count_.load(std::memory_order_relaxed);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (listeners_[i] != &listener) continue;
-    listeners_[i] = listeners_[count - 1];
-    count_.store(count - 1, std::memory_order_relaxed);
-    return;
-  }
+  const auto place = std::find(listeners_.begin(), listeners_.end(), &listener);
+  if (place == listeners_.end()) return;
+  listeners_.erase(place);
+  count_.store(listeners_.size(), std::memory_order_relaxed);
 }
 
 void EventListeners::replace(EventListener& listener, EventListener& by) noexcept {
+  const std::lock_guard change(change_mutex_);
   const std::lock_guard lock(mutex_);
-  const auto end = listeners_.begin() + static_cast<std::ptrdiff_t>(count_.load(std::memory_order_relaxed));
-  const auto place = std::find(listeners_.begin(), end, &listener);
-  if (place != end) *place = &by;
+  const auto place = std::find(listeners_.begin(), listeners_.end(), &listener);
+  if (place != listeners_.end()) *place = &by;
 }
 
 void EventListeners::call_all(time_ns_t time_ns) noexcept {
   const std::lock_guard lock(mutex_);
-  const std::size_t count = count_.load(std::memory_order_relaxed);
-  for (std::size_t i = 0; i < count; ++i) listeners_[i]->on_event(time_ns);
+  for (EventListener* const listener : listeners_) listener->on_event(time_ns);
 }
 
 void Resource::bind_input() {

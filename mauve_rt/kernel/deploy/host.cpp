@@ -37,8 +37,13 @@ void Host::start(const std::string& component, std::optional<time_ns_t> clock_ns
 }
 
 void Host::stop(const std::string& component, time_ns_t timeout_ns) {
+  stop(component, StopOptions{.timeout_ns = timeout_ns});
+}
+
+bool Host::stop(const std::string& component, const StopOptions& options) {
   require_deployed();
-  architecture_.hold_component(component)->task().stop(is_simulated() ? 0 : timeout_ns);
+  return architecture_.hold_component(component)->task().stop(is_simulated() ? 0 : options.timeout_ns,
+                                                              options.force);
 }
 
 time_ns_t Host::get_time(const std::string& component) const {

@@ -55,9 +55,12 @@ void check_stack(Component& component, std::size_t stack_bytes) {
 }  // namespace
 
 Simulation::Simulation(SimulationOptions options) : options_(options), now_ns_(options.begin_ns) {
-  if (options_.begin_ns > 0) return;
-  throw Error(ErrorCode::invalid_argument, "a simulation begins at a positive instant",
-              {.element = "begin_ns", .expected = "> 0", .found = std::to_string(options_.begin_ns)});
+  if (options_.begin_ns > 0 && options_.begin_ns <= kLongest) return;
+  throw Error(ErrorCode::invalid_argument, "a simulation cannot begin at that instant",
+              {.element = "begin_ns",
+               .expected = "1 to " + std::to_string(kLongest),
+               .found = std::to_string(options_.begin_ns),
+               .remedy = "leave it out, or begin sooner"});
 }
 
 Simulation::~Simulation() { shutdown(); }
@@ -111,7 +114,8 @@ void Simulation::run_until(time_ns_t instant_ns) {
       if (candidate.begin_ns < next.begin_ns) next = candidate;
     }
     const time_ns_t timer = timers_.empty() ? kForever : timers_.begin()->instant_ns;
-    if (std::min(timer, next.begin_ns) > instant_ns) break;
+    const time_ns_t first = std::min(timer, next.begin_ns);
+    if (first > instant_ns || first == kForever) break;
     if (timer <= next.begin_ns) {
       run_timer();
       continue;
@@ -128,8 +132,8 @@ void Simulation::run_timer() {
   Timer timer = timers_.extract(timers_.begin()).value();
   const std::shared_ptr<Callback> callback = timer.callback;
   advance_to(timer.instant_ns);
-  if (timer.period_ns != 0) {
-    timer.instant_ns += timer.period_ns;
+  timer.instant_ns = later_by(timer.instant_ns, timer.period_ns);
+  if (timer.period_ns != 0 && timer.instant_ns != kForever) {  // else it does not come again
     timer.number = timers_set_++;
     timers_.insert(std::move(timer));
   }

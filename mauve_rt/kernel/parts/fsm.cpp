@@ -13,6 +13,8 @@ namespace mauve {
 
 namespace {
 
+/// Of an event wait. Without events it is what an undeclared period is to the waits of other fsms.
+constexpr time_ns_t kShortestTimeout = us_to_ns(100);
 constexpr const char* kDeclareRemedy = "declare it in define()";
 
 bool is_endless(const State& state) noexcept {
@@ -128,6 +130,22 @@ void check_lengths(const std::vector<const State*>& reachable) {
                .remedy = "wait for kForever where only a stop is to end the wait"});
 }
 
+/// See FsmBase::initial_interarrival_ns().
+time_ns_t interarrival_before(const State& initial, const std::vector<std::unique_ptr<State>>& states) {
+  if (initial.is_wait) return 0;
+  time_ns_t leading = kForever;
+  time_ns_t any = kForever;
+  for (const auto& state : states) {
+    if (state->event == nullptr) continue;
+    any = std::min(any, state->min_interarrival_ns);
+    const auto all = successors(*state);
+    if (std::find(all.begin(), all.end(), &initial) != all.end())
+      leading = std::min(leading, state->min_interarrival_ns);
+  }
+  if (any == kForever) return 0;
+  return leading != kForever ? leading : any;
+}
+
 }  // namespace
 
 time_ns_t cycle_gcd_ns(const State& initial) {
@@ -192,6 +210,21 @@ State& FsmBase::wait_event(std::string name, PortBase& port, time_ns_t timeout_n
                  .found = "min_interarrival_ns " + std::to_string(min_interarrival_ns) + ", timeout_ns " +
                           std::to_string(timeout_ns)});
   }
+  if (timeout_ns < kShortestTimeout) {
+    throw Error(ErrorCode::bad_fsm,
+                "the timeout of an event wait is so short that the component would never rest",
+                {.element = "state " + name,
+                 .expected = "timeout_ns of at least " + std::to_string(kShortestTimeout),
+                 .found = std::to_string(timeout_ns),
+                 .remedy = "give a longer timeout, or wait for a length of time instead"});
+  }
+  if (min_interarrival_ns > kLongest) {
+    throw Error(ErrorCode::bad_fsm, "the minimal interarrival of an event wait is too long",
+                {.element = "state " + name,
+                 .expected = "min_interarrival_ns of at most " + std::to_string(kLongest),
+                 .found = std::to_string(min_interarrival_ns),
+                 .remedy = "give the least time between two releases"});
+  }
   State& state = wait(std::move(name), timeout_ns);
   state.event = std::make_unique<EventInput>(port);
   state.min_interarrival_ns = min_interarrival_ns;
@@ -241,6 +274,7 @@ bool FsmBase::configure_hook() {
   }
   sporadic_ =
       std::any_of(states_.begin(), states_.end(), [](const auto& state) { return state->event != nullptr; });
+  initial_interarrival_ns_ = interarrival_before(*initial_, states_);
   for (const auto& state : states_) {
     const time_ns_t bound = state->max_execution_ns;
     if (bound != 0 && (smallest_bound_ns_ == 0 || bound < smallest_bound_ns_)) smallest_bound_ns_ = bound;
@@ -255,7 +289,7 @@ void FsmBase::cleanup_hook() {
   methods_.clear();
   times_ = std::make_shared<StateTimes>();
   initial_ = nullptr;
-  period_ns_ = divisor_ns_ = smallest_bound_ns_ = 0;
+  period_ns_ = divisor_ns_ = smallest_bound_ns_ = initial_interarrival_ns_ = 0;
   sporadic_ = false;
 }
 

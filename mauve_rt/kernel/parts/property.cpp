@@ -37,10 +37,14 @@ std::string range_of(const PropertyOptions& options) {
   return words.empty() ? "a number" : words;  // NaN is none
 }
 
-void check_range(const std::string& name, const PropertyOptions& options, double value) {
+bool is_in_range(const PropertyOptions& options, double value) noexcept {
   const bool below = options.minimum && !(value >= *options.minimum);
   const bool above = options.maximum && !(value <= *options.maximum);
-  if (!below && !above && !std::isnan(value)) return;
+  return !below && !above;
+}
+
+void check_range(const std::string& name, const PropertyOptions& options, double value) {
+  if (is_in_range(options, value) && !std::isnan(value)) return;
   throw Error(ErrorCode::out_of_range, "the value is out of range",
               {.element = "property " + name, .expected = range_of(options), .found = rounded(value)});
 }
@@ -84,6 +88,34 @@ PropertyValue checked(const std::string& name, const PropertyValue& example, con
   if (const auto* real = std::get_if<double>(&converted)) check_range(name, options, *real);
   if (integer != nullptr && !is_float) check_range(name, options, static_cast<double>(*integer));
   return converted;
+}
+
+void check_declaration(const std::string& name, const PropertyValue& initial,
+                       const PropertyOptions& options) {
+  const auto refuse = [&name](const char* what, const std::string& expected, const std::string& found) {
+    throw Error(ErrorCode::invalid_argument, what,
+                {.element = "property " + name,
+                 .expected = expected,
+                 .found = found,
+                 .remedy = "correct its minimum and maximum"});
+  };
+  for (const std::optional<double>& limit : {options.minimum, options.maximum}) {
+    if (limit && std::isnan(*limit)) refuse("a limit of the range is no number", "numbers", "nan");
+  }
+  if (options.minimum && options.maximum && *options.minimum > *options.maximum) {
+    refuse("the minimum is above the maximum", "minimum <= maximum",
+           "minimum " + rounded(*options.minimum) + ", maximum " + rounded(*options.maximum));
+  }
+  const auto* integer = std::get_if<std::int64_t>(&initial);
+  const auto* real = std::get_if<double>(&initial);
+  if (integer == nullptr && real == nullptr) return;
+  const double value = real != nullptr ? *real : static_cast<double>(*integer);
+  if (is_in_range(options, value)) return;
+  throw Error(ErrorCode::out_of_range, "the initial value is out of the property's own range",
+              {.element = "property " + name,
+               .expected = range_of(options),
+               .found = rounded(value),
+               .remedy = "correct the initial value, or its minimum and maximum"});
 }
 
 template class Property<bool>;

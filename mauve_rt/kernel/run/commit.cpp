@@ -60,7 +60,9 @@ void Commit::note_came(Participant& place) noexcept {
 }
 
 std::int64_t Commit::may_miss(const Participant& place) const noexcept {
-  return came_.load(std::memory_order_relaxed) == expected_ ? max_missed_ - place.lost : 0;
+  if (came_.load(std::memory_order_relaxed) != expected_) return 0;
+  // A stall may have lost it more than were allowed.
+  return std::max<std::int64_t>(0, max_missed_ - place.lost);
 }
 
 time_ns_t Commit::holds_until_ns(const Participant& place) const noexcept {

@@ -33,11 +33,21 @@ void Machine::set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_
 
 time_ns_t Machine::join(time_ns_t epoch_ns) noexcept {
   const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
-  reference_ns_.store(first_ns, std::memory_order_relaxed);
+  deployment_ns_.store(first_ns, std::memory_order_relaxed);
+  count_from(std::nullopt);
   return first_ns;
 }
 
+void Machine::count_from(std::optional<time_ns_t> reference_ns) noexcept {
+  reference_ns_.store(reference_ns.value_or(deployment_ns_.load(std::memory_order_relaxed)),
+                      std::memory_order_relaxed);
+}
+
 void Machine::start(time_ns_t instant_ns) noexcept {
+  leave_event_to(fsm_->initial());
+  if (const time_ns_t least = fsm_->initial_interarrival_ns(); least != 0)
+    instant_ns = std::max(instant_ns, later_by(active_ns_, least));
+  execution_.enter();
   waiting_ = next_ = &fsm_->initial();
   is_cold_ = true;
   event_settled_ = true;
@@ -47,7 +57,20 @@ void Machine::start(time_ns_t instant_ns) noexcept {
   tell_wait();
 }
 
+void Machine::leave_event_to(const State& initial) noexcept {
+  if (waiting_ == nullptr || waiting_->event == nullptr) return;
+  if (!initial.is_wait) {
+    waiting_->event->consume();
+  } else if (event_ns_ != kNever) {
+    waiting_->event->keep(event_ns_);
+  }
+  event_ns_ = kNever;
+}
+
 void Machine::park() noexcept {
+  if (waiting_ != nullptr && event_ns_ != kNever && fsm_->initial().is_wait)
+    waiting_->event->keep(event_ns_);  // for the next start
+  event_ns_ = kNever;
   waiting_ = next_ = nullptr;
   present_.tell({.name = state_name()});
 }
@@ -60,6 +83,8 @@ time_ns_t Machine::due_ns() const noexcept {
 void Machine::release(time_ns_t actual_ns) noexcept {
   if (!event_settled_) set_clock_ns(due_ns());  // the time is up, and no event has come
   event_settled_ = true;
+  event_ns_ = kNever;
+  if (next_ == nullptr || !next_->is_wait) active_ns_ = clock_ns();
   statistics_.releases.fetch_add(1, std::memory_order_relaxed);
   statistics_.wakeup.record(actual_ns - clock_ns());
   released_ns_.store(actual_ns, std::memory_order_relaxed);
@@ -77,12 +102,12 @@ Machine::Entered Machine::enter_next() {
   return Entered::wait;
 }
 
-/// False when it was condemned before it ended.
+/// False when it was condemned before it began or ended.
 bool Machine::execute(const State& state) {
   const time_ns_t began = boundary_ns_;
+  if (state.max_execution_ns != 0 && !begin_execution(began, state.max_execution_ns)) return false;
   present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
   trace_at(began, TraceKind::state_begin, state.trace_id);
-  if (state.max_execution_ns != 0) begin_execution(began, state.max_execution_ns);
   const auto& methods = fsm_->methods();
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
   methods[state.action].run(*core_);
@@ -151,12 +176,15 @@ void Machine::tell_wait() noexcept {
   present_.tell({.since_ns = due_ns(), .name = waiting_->trace_id, .is_wait = true});
 }
 
-/// An event fixes the end of the wait: not before min_interarrival has passed since the last release.
+/// An event fixes the end of the wait: not before its min_interarrival has passed since the last release, also when that
+/// was another fsm's.
 void Machine::take_event() noexcept {
   if (event_settled_) return;
   const std::optional<time_ns_t> came = waiting_->event->consume();
   if (!came) return;
-  set_clock_ns(std::max(wait_from_ns_ + waiting_->min_interarrival_ns, *came));
+  const time_ns_t earliest = later_by(active_ns_, waiting_->min_interarrival_ns);
+  set_clock_ns(std::max({wait_from_ns_, earliest, *came}));
+  event_ns_ = *came;
   event_settled_ = true;
   tell_wait();
 }
@@ -195,9 +223,10 @@ void Machine::tell_late_response() noexcept {
       [&](TaskListener& listener) { listener.on_late_response(boundary_ns_, boundary_ns_ - clock_ns()); });
 }
 
-void Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
-  execution_.begin(began_ns, limit_ns);
+bool Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
+  if (!execution_.begin(began_ns, limit_ns)) return false;
   if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
+  return true;
 }
 
 time_ns_t Machine::earliest_excess_ns() const noexcept {
@@ -232,7 +261,8 @@ time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {
 
 void Machine::trace_deployment() noexcept {
   const Grid now = grid();
-  trace(TraceKind::deployment, 0, now.reference_ns - settings_.offset_ns, settings_.offset_ns, now.period_ns);
+  trace(TraceKind::deployment, 0, later_by(now.reference_ns, -settings_.offset_ns), settings_.offset_ns,
+        now.period_ns);
 }
 
 void Machine::warm_up() noexcept {

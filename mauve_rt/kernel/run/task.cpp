@@ -122,8 +122,8 @@ void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, st
   const std::lock_guard lock(ring_mutex_);
   if (ring_ == nullptr) return;
   ring_->drain(into);
-  written = ring_->offered();
-  dropped = ring_->dropped();
+  written += ring_->offered();
+  dropped += ring_->dropped();
 }
 
 std::unique_ptr<TraceRing> Task::release_ring() {
@@ -139,6 +139,7 @@ void Task::begin_trace(bool trace) {
   } else if (ring_ == nullptr) {
     const std::size_t wanted = settings_.trace_records;
     ring_ = std::make_unique<TraceRing>(number_, wanted != 0 ? wanted : ring_capacity(grid().period_ns));
+    ring_->set_first(first_record_);
   }
   if (ring_ != nullptr) ring_->set_clock(simulated_ ? &clock() : nullptr);
   machine_.set_ring(ring_.get());
@@ -207,7 +208,7 @@ void Task::start(std::optional<time_ns_t> clock_ns) {
   if (is_called_from_own_state()) require_startable();  // refused without the lock, as in stop()
   const std::lock_guard lock(command_mutex_);
   require_startable();
-  post_start(next_instant(clock_ns));
+  post_start(start_on(clock_ns));
   wait_started();
 }
 
@@ -238,11 +239,17 @@ void Task::require_startable() const {
   }
 }
 
-time_ns_t Task::next_instant(std::optional<time_ns_t> reference_ns) const noexcept {
+/// Takes the grid that counts from there, or the deployment's, and returns its next instant. It keeps that grid, with
+/// whatever period, until another start or a new epoch.
+time_ns_t Task::start_on(std::optional<time_ns_t> reference_ns) noexcept {
+  machine_.count_from(reference_ns);
+  return next_instant();
+}
+
+time_ns_t Task::next_instant() const noexcept {
   const Grid own = grid();
-  const Grid wanted{.reference_ns = reference_ns.value_or(own.reference_ns), .period_ns = own.period_ns};
   const time_ns_t earliest = clock().now_ns() + kStartMargin + 1;
-  return wanted.first_not_before(std::max(earliest, wanted.reference_ns));
+  return own.first_not_before(std::max(earliest, own.reference_ns));
 }
 
 void Task::wait_started() noexcept {
@@ -285,12 +292,12 @@ bool Task::is_called_from_own_state() const noexcept {
   return Waiter::of_this_thread() == this || (simulated_ && in_resume_);
 }
 
-void Task::stop(time_ns_t timeout_ns) {
+bool Task::stop(time_ns_t timeout_ns, bool force) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   order_stop();
   changes_.bump();
   if (is_called_from_own_state())
-    return;  // it takes effect when the state ends, for which nobody can wait here
+    return false;  // it takes effect when the state ends, for which nobody can wait here
   withdraw_commit();
   if (simulated_) resume();
   futex_wake_all(control_);
@@ -303,12 +310,17 @@ void Task::stop(time_ns_t timeout_ns) {
        seen = state_.load(std::memory_order_acquire)) {
     if (futex_wait_until(state_, seen, until)) continue;
     if (!is_going(state_.load(std::memory_order_acquire))) break;
-    throw_state_running("the stop stays pending", timeout_ns, "it takes effect when the state ends");
+    if (force && condemn_unless_waiting()) return true;
+    throw_state_running("the stop stays pending", timeout_ns,
+                        force
+                            ? "it takes effect when the component's thread gets to run"
+                            : "it takes effect when the state ends; a stop by force does not wait for that");
   }
   if (state() == ComponentState::faulted) {
     throw Error(ErrorCode::faulted, "the component faulted while stopping: " + fault().what,
                 {.component = name_});
   }
+  return false;
 }
 
 }  // namespace mauve

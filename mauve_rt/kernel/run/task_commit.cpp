@@ -85,7 +85,10 @@ void Task::visit(Participant& place) noexcept {
   place.holds_until_ns = commit.holds_until_ns(place);
   place.arrived.store(true, std::memory_order_relaxed);
   exchange_state(ComponentState::running, ComponentState::held);
-  machine_.begin_execution(place.parked_ns, kForever);  // who conducts the commit watches it
+  if (!machine_.begin_execution(place.parked_ns, kForever)) {  // who conducts the commit watches it
+    is_abandoned_ = true;
+    return;
+  }
   const Commit::Answer answer = commit.meet(place);
   if (answer == Commit::Answer::abandoned || !machine_.end_execution()) {
     is_abandoned_ = true;
@@ -141,8 +144,8 @@ void Task::go_on_unchanged(Participant& place) noexcept {
 }
 
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
-time_ns_t Task::restart_instant(const Participant& place) const noexcept {
-  if (place.start_clock_ns) return next_instant(place.start_clock_ns);
+time_ns_t Task::restart_instant(const Participant& place) noexcept {
+  if (place.start_clock_ns) return start_on(place.start_clock_ns);
   const time_ns_t earliest =
       machine_.is_settled() ? place.pending_ns : clock().now_ns();  // an event may come any time
   return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
@@ -194,7 +197,7 @@ void Task::finish_parked(Participant& place, bool committed) noexcept {
   const bool can_start =
       simulated_ || has_thread_;  // a shutdown may have come before the commit held the task
   if (committed && can_start && place.afterwards == Afterwards::restart) {
-    post_start(next_instant(place.start_clock_ns));
+    post_start(start_on(place.start_clock_ns));
     wait_started();
   }
 }

@@ -18,9 +18,22 @@ bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
 
 bool Task::condemn(std::string what, time_ns_t now_ns) {
   const auto execution = machine_.execution().look();
-  if (!execution) return false;
+  return execution && condemn(*execution, std::move(what), now_ns);
+}
+
+/// A stop has been ordered by then, so that the thread finds its way out when what it does ends.
+bool Task::condemn_unless_waiting() {
+  const auto execution = machine_.execution().look_at_any();
+  // After that look: one that came to a gate in between has another number, one that came to a wait is not harmed here.
+  const std::optional<PresentState::Fact> fact = machine_.present().look();
+  if (!execution || !fact || fact->is_wait || fact->since_ns == 0) return false;
+  const std::string state = TraceNames::word(fact->name);
+  return condemn(*execution, "stopped by force while state " + state + " was executing", clock().now_ns());
+}
+
+bool Task::condemn(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns) {
   auto text = std::make_shared<const std::string>(std::move(what));
-  if (!machine_.execution().condemn(*execution)) return false;
+  if (!machine_.execution().condemn(execution)) return false;
   verdict_.what = std::move(text);
   verdict_.when_ns = now_ns;
   carry_out_sentence();

@@ -65,7 +65,7 @@ void Task::start_machine(time_ns_t instant_ns) noexcept {
   parked_.store(0, std::memory_order_release);
   publish_state(ComponentState::running);
   machine_.trace_deployment();
-  machine_.trace(TraceKind::start, 0, instant_ns);
+  machine_.trace(TraceKind::start, 0, machine_.clock_ns());
 }
 
 void Task::release(time_ns_t actual_ns) noexcept {
@@ -135,13 +135,14 @@ void Task::signal_awaited() noexcept {
 }
 
 void Task::park_stopped() noexcept {
+  if (!machine_.leave()) return park_condemned();
   write_outputs(false);
   machine_.trace(TraceKind::stop, machine_.state_name(), machine_.clock_ns());
   park(ComponentState::stopped);
 }
 
 void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
-  if (!machine_.end_execution()) return park_condemned();
+  if (!machine_.leave()) return park_condemned();
   if (bound_ns != 0) tell_over_declared();
   FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
                  .bound_ns = bound_ns,
@@ -174,7 +175,7 @@ void Task::fall_back(CommitAction& fallback) noexcept {
   machine_.trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
   for (const auto& port : shell_->ports()) port->reopen();
   regain_priority();
-  start_machine(next_instant(std::nullopt));
+  start_machine(next_instant());
 }
 
 void Task::park(ComponentState state) noexcept {

@@ -119,7 +119,7 @@ class Diagnostics:
                     break
 
     def _thresholds(self, part: ComponentDescription) -> DiagnosticsModel:
-        defaults = _PYTHON_DEFAULTS if self._has_python_parts(part) else _DEFAULTS
+        defaults = _PYTHON_DEFAULTS if self._runtime.has_python_parts(part) else _DEFAULTS
         return defaults.overridden_by(self._runtime.diagnostics(part.name))
 
     def _topic(self, report: TopicReport, other_types: Sequence[str] | None) -> Any:
@@ -205,11 +205,6 @@ class Diagnostics:
         before = self._told.get((component, what), 0)
         self._told[component, what] = count
         return count - before if count >= before else count
-
-    def _has_python_parts(self, part: ComponentDescription) -> bool:
-        find = self._runtime.index.find
-        plugins = [find("shell", part.shell), find("core", part.core), find("fsm", part.fsm)]
-        return any(plugin is not None and plugin.is_python for plugin in plugins)
 
     def _process(self, error: str) -> Any:
         status = self._runtime.realtime_status()

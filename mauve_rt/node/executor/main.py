@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.lean_start import leave_out_unused
 from mauve_rt.node.shared.process import (
     BAD_INPUT,
     FAILED,
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         sys.stdout.write(help_text())
         leave_now(0)
     discovery = limit_discovery()
+    leave_out_unused()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work
     leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
@@ -75,15 +77,19 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
     from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
 
-    node = None
+    node, opens_late = None, False
     addresses = usable_addresses()
     try:
         rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
         node = ExecutorNode(runtime, namespace=namespace)
+        # Components in Python would wait for the interpreter while modules load: then these come first.
+        waits_for_python = any(map(runtime.has_python_parts, runtime.components()))
+        opens_late = settings.autostart and not waits_for_python
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"executor: {error}")
-    if node is None:
+    if node is None or not (opens_late or _open(node)):
+        node = None
         gc.collect()  # what there is of the node holds itself alone, and the DDS participant with it
         try_shutdown()
         return BAD_INPUT
@@ -94,9 +100,9 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     status = FAILED
     interfaces = NetworkInterfaces(node, node.watch, before=addresses)
     try:
-        gc.freeze()  # nor need it be looked at while Python components run and wait for the interpreter
-        gc.enable()
         status = _autostart(node, stop) if settings.autostart else 0
+        if status == 0 and opens_late and not _open(node):
+            status = BAD_INPUT
         if status == 0:
             status = _spin(node, stop)
     finally:
@@ -104,6 +110,18 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         node.close()
         try_shutdown()
     return status
+
+
+def _open(node: Any) -> bool:
+    """Let the node offer its services; on failure print why and return False."""
+    try:
+        node.open()
+    except Exception as error:  # noqa: BLE001 - as above
+        complain(f"executor: {error}")
+        return False
+    gc.freeze()  # what is loaded stays: not to be looked at while components wait for the interpreter
+    gc.enable()
+    return True
 
 
 def _autostart(node: Any, stop: threading.Event) -> int:

@@ -9,19 +9,15 @@ from typing import Any
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from mauve_rt.control.control import Control
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
-from mauve_rt.node.executor.console import NameWatch, TopicWatch, number_of
-from mauve_rt.node.executor.diagnostics import Diagnostics
-from mauve_rt.node.executor.parameter_services import ParameterServices
+from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch, number_of
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
-from mauve_rt.node.executor.services import Services
 from mauve_rt.node.executor.settings import PARAMETERS
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.shared.service_thread import refused_reply
@@ -46,7 +42,7 @@ class ExecutorNode(LifecycleNode):
     THREADS = 3
 
     def __init__(self, runtime: Runtime, *, namespace: str) -> None:
-        """Create the node; the runtime may be configured already.
+        """Create the node with all that transitions need; the runtime may be configured already. Then open().
 
         Raises:
             ParameterError: a parameter of the wrong type, or `use_sim_time`.
@@ -55,8 +51,7 @@ class ExecutorNode(LifecycleNode):
         self.watch = Watch(lambda text: self.get_logger().error(text))
         super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
         self._answer_every_transition()
-        self.control_group = control_group = MutuallyExclusiveCallbackGroup()
-        query_group = MutuallyExclusiveCallbackGroup()
+        self.control_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         # A signal may come while a transition starts or ends threads: nobody else may do that then.
         self._starting_or_ending = threading.Lock()
@@ -75,19 +70,32 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
         )
         self._state.rules = self._rules.names
-        self._diagnostics = Diagnostics(self, runtime, self._bound, self._recording, self._rules)
+
+    def open(self) -> None:
+        """Offer services and diagnostics. Once, before anything spins the node.
+
+        Loads their modules and type supports, a quarter of a start's work, and keeps the interpreter's lock
+        while it does.
+        """
+        from mauve_rt.control.control import Control  # noqa: PLC0415
+        from mauve_rt.node.executor.diagnostics import Diagnostics  # noqa: PLC0415
+        from mauve_rt.node.executor.parameter_services import ParameterServices  # noqa: PLC0415
+        from mauve_rt.node.executor.services import Services  # noqa: PLC0415
+
+        query_group = MutuallyExclusiveCallbackGroup()
+        self._diagnostics = Diagnostics(self, self._runtime, self._bound, self._recording, self._rules)
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
         control = Control(
-            runtime,
+            self._runtime,
             phase_timeout_s=self._settings["report_phase_timeout_s"],
             outside=self._bound,
-            recordings=RecordingOrders(self._recording, runtime, folder=Path(self._settings["bags"])),
+            recordings=RecordingOrders(self._recording, self._runtime, folder=Path(self._settings["bags"])),
             limits=_limits(self._settings),
         )
         services = Services(
             self,
-            runtime,
+            self._runtime,
             control=control,
             bound=self._bound,
             state=self._state,
@@ -96,7 +104,7 @@ class ExecutorNode(LifecycleNode):
             load_rules=self._load_rules,
             watch=self.watch,
             warnings=self._name_watch.warnings,
-            control_group=control_group,
+            control_group=self.control_group,
             query_group=query_group,
         )
         ParameterServices(
@@ -104,10 +112,14 @@ class ExecutorNode(LifecycleNode):
             self._properties,
             services.handle,
             refusal=self._refusal,
-            control_group=control_group,
+            control_group=self.control_group,
             query_group=query_group,
         )
         self.create_timer(1.0, self._tell_health, callback_group=query_group)
+
+    def get_logger(self) -> Console:
+        """As rclpy's, but quick."""
+        return Console(super().get_logger().name)
 
     # ---- callbacks, none of which may raise: rclpy would leave the others of its group waiting for ever
 

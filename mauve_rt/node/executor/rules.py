@@ -2,37 +2,27 @@
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import SupervisorDecision
-from mauve_rt._kernel import Reflex, RuleActions, RuleFacts, ToldDecision, monotonic_ns
+from mauve_rt._kernel import Reflex, RuleFacts, ToldDecision, monotonic_ns
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
-from mauve_rt.interfaces.told_decisions import DECISION_TYPE, DecisionMessages, rule_info
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.node.shared.watch import Watch
-from mauve_rt.supervision.engine_rules import rule_specs
-from mauve_rt.supervision.rule_actions import own_rules, rule_actions
-from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unheard
-from mauve_rt.supervision.rules import Rule, RulesFile
+
+if TYPE_CHECKING:  # an executor without rules has no use for these, a tenth of its modules
+    from mauve_rt.interfaces.told_decisions import DecisionMessages
+    from mauve_rt.node.executor.rules_file import LoadedRules
+    from mauve_rt.supervision.rules import Rule
 
 KEPT_DECISIONS = 100
 _WAIT_NS = 200_000_000  # how long the thread that tells may go on waiting when it should end
-
-
-@dataclass(frozen=True)
-class _Loaded:
-    """A rules file that the executor can run."""
-
-    path: Path
-    rules: Sequence[Rule]
-    actions: Sequence[RuleActions]
 
 
 class OwnRules:
@@ -70,7 +60,7 @@ class OwnRules:
         self._qos = QoSProfile(depth=KEPT_DECISIONS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._decisions = node.create_publisher(SupervisorDecision, "~/decisions", self._qos)
         self._lock = threading.RLock()
-        self._loaded: _Loaded | None = None
+        self._loaded: LoadedRules | None = None
         self._reflex: Reflex | None = None
         self._at_work: list[str] = []
         self._ending = threading.Event()
@@ -131,28 +121,23 @@ class OwnRules:
             self._loaded = loaded
             return len(loaded.rules)
 
-    def _load(self, path: Path) -> _Loaded:
-        file = RulesFile(path)
-        rules = own_rules(file)
-        unheard_of = [*only_outside(file)]
-        if self._reflex is None:  # else its own error tells of the first, without the place
-            topics = self._topics_of(rules)
-            found = (unheard(file, leaf, self._runtime.host, topics) for leaf in own_leaves(file))
-            unheard_of += filter(None, found)
-        if unheard_of:
-            raise ArchitectureFileError(file.path, unheard_of)
-        return _Loaded(path, rules, rule_actions(file, self._runtime))
+    def _load(self, path: Path) -> "LoadedRules":
+        from mauve_rt.node.executor.rules_file import LoadedRules  # noqa: PLC0415
 
-    def _topics_of(self, rules: Sequence[Rule]) -> dict[str, str]:
+        # Of rules at work the reflex's own error tells of the first trouble, without the place.
+        topics = self._topics_of if self._reflex is None else None
+        return LoadedRules.read(path, self._runtime, topics=topics)
+
+    def _topics_of(self, rules: Sequence["Rule"]) -> dict[str, str]:
         """The resource that is bound to each topic, named as in the rules."""
         bound = self._topics()
         said = {str(leaf.parameters.get("topic") or "") for rule in rules for leaf in rule.when.leaves()}
         full = {name: self._node.resolve_topic_name(name) for name in said if name}
         return {name: bound[topic] for name, topic in full.items() if topic in bound}
 
-    def _begin(self, loaded: _Loaded) -> None:
+    def _begin(self, loaded: "LoadedRules") -> None:
         topics = self._topics_of(loaded.rules)
-        reflex = Reflex(self._runtime.host, rule_specs(loaded.rules), loaded.actions, topics)
+        reflex = loaded.reflex(self._runtime.host, topics)
         reflex.start()
         self._reflex, self._at_work = reflex, [rule.name for rule in loaded.rules]
         self._ending.clear()
@@ -184,14 +169,15 @@ class OwnRules:
 
     def infos(self) -> list[Any]:
         """RuleInfo of each of them."""
-        return [rule_info(facts, monotonic_ns()) for facts in self.facts()]
+        loaded = self._loaded
+        return loaded.infos(self.facts()) if loaded is not None else []
 
     # ---- telling
 
-    def _teller(self, reflex: Reflex, loaded: _Loaded) -> Callable[[], None]:
+    def _teller(self, reflex: Reflex, loaded: "LoadedRules") -> Callable[[], None]:
         name = self._node.resolve_topic_name
         who = self._node.get_fully_qualified_name()
-        messages = DecisionMessages(loaded.rules, self._runtime, who=who, name=name)
+        messages = loaded.messages(self._runtime, who=who, name=name)
         tell_one = self._watch.guarded("a decision", self._tell)
 
         def tell() -> None:
@@ -200,7 +186,7 @@ class OwnRules:
 
         return tell
 
-    def _tell(self, messages: DecisionMessages, told: ToldDecision) -> None:
+    def _tell(self, messages: "DecisionMessages", told: ToldDecision) -> None:
         message, done = messages.message(told, self._stamp(told.decision.stamp_ns))
         if done is not None:
             if done.outcome.success and any(
@@ -209,11 +195,9 @@ class OwnRules:
                 self._follow()
             self._event(done.request, done.outcome)
         text = f"{message.rule}: {message.decision}: {message.reason}"
-        if message.decision == "failed":  # a call each: rclpy lets none change its severity
-            self._node.get_logger().error(text)
-        else:
-            self._node.get_logger().info(text)
-        self._publish(self._decisions, DECISION_TYPE, message, self._qos)
+        console = self._node.get_logger()
+        (console.error if message.decision == "failed" else console.info)(text)
+        self._publish(self._decisions, messages.TYPE, message, self._qos)
 
     def _stamp(self, monotonic: int) -> Any:
         """An instant of the monotonic clock, as ROS counts."""

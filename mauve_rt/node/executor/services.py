@@ -142,10 +142,7 @@ class Services:
         self._state.refresh(again=True)
         response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
         text = f"rules of {request.path or 'the same file'}: {response.message}"
-        if response.success:  # a call each: rclpy lets none change its severity
-            self._logger.info(text)
-        else:
-            self._logger.error(text)
+        (self._logger.info if response.success else self._logger.error)(text)
         return response
 
     def _handler(self, translate: Callable[[Any], Request]) -> Callable[[Any, Any], Any]:
@@ -179,7 +176,8 @@ def is_change(ros: Any) -> bool:
 
 
 def _stop(ros: Any) -> Request:
-    return Request(steps=(Step("stop", ros.component),), timeout_s=ros.timeout_s, **_common(ros))
+    step = Step("stop", ros.component)
+    return Request(steps=(step,), timeout_s=ros.timeout_s, force=ros.force, **_common(ros))
 
 
 def _start(ros: Any) -> Request:
@@ -212,7 +210,7 @@ def _stop_recording(ros: Any) -> Request:
 
 
 def _commit(ros: Any) -> dict[str, Any]:
-    return {"timeout_s": ros.commit_timeout_s, "max_missed": ros.max_missed}
+    return {"timeout_s": ros.commit_timeout_s, "max_missed": ros.max_missed, "force": ros.force}
 
 
 def _common(ros: Any) -> dict[str, Any]:

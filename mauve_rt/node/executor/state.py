@@ -66,10 +66,8 @@ class StatePublisher:
         """Tell who is hung since the last call, and who no longer is. One thread at a time."""
         turns = [*self._hangs.look(self._runtime.components())]
         for turn in turns:
-            if turn.hung:  # a call each: rclpy lets none change its severity
-                self._node.get_logger().error(turn.message)
-            else:
-                self._node.get_logger().warning(turn.message)
+            console = self._node.get_logger()
+            (console.error if turn.hung else console.warning)(turn.message)
         if turns:
             self.refresh(again=True)
 

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared.lean_start import leave_out_unused
 from mauve_rt.node.shared.process import Stop, asks_for_help, run_until_signalled
 
 
@@ -21,6 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(help_text())
         return 0
     limit_discovery()
+    leave_out_unused()
     return run_until_signalled(lambda stop: _work(words, stop))
 
 

@@ -121,9 +121,20 @@ TYPED_TEST(Prepared, IsStaleWhileAComponentIsStopped) {
 
 TYPED_TEST(Prepared, ARefusalLeavesAllAsItWas) {
   for (const std::string core : {"t/Refusing", "t/Throwing"}) {
-    auto prepared = this->prepare(Transaction().set_property("b", "gain", 3.0).replace_core("a", core));
+    const auto prepare = [&] {
+      return this->prepare(Transaction().set_property("b", "gain", 3.0).replace_core("a", core));
+    };
+    auto prepared = prepare();
     const std::string before = this->described();
-    EXPECT_EQ(PreparedOutcome::refused, prepared->commit(kTimeout));
+    PreparedOutcome outcome = prepared->commit(kTimeout);
+    // Where the machine stalls within adopt past the next release, the change is called off for that.
+    for (int stalls = 0; outcome == PreparedOutcome::timed_out && stalls < 10; ++stalls) {
+      EXPECT_EQ(before, this->described());
+      this->failure(*prepared);
+      prepared = prepare();
+      outcome = prepared->commit(kTimeout);
+    }
+    EXPECT_EQ(PreparedOutcome::refused, outcome);
     EXPECT_EQ(before, this->described());
     EXPECT_EQ(PropertyValue(1.0), this->gain_of("b"));
     const Error error = this->failure(*prepared);

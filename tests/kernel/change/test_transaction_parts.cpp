@@ -49,8 +49,10 @@ TEST_F(Rule9Parts, ACoreKeepsThePositionAndThePendingInstant) {
     const auto parked = records_of(drain, TraceKind::parked);
     const auto armed = records_of(drain, TraceKind::armed);
     ASSERT_FALSE(armed.empty());
+    ASSERT_FALSE(parked.empty());
     EXPECT_EQ(parked.back().name, armed.back().name) << "the same wait";
-    if (armed.back().time_ns > armed.back().a) continue;  // the machine stalled the commit past the instant
+    // The machine stalled the commit past the instant. armed's instant is later by a stall that lost some.
+    if (armed.back().time_ns > parked.back().a) continue;
     EXPECT_EQ(parked.back().a, armed.back().a);
     EXPECT_EQ(0, report.steps[0].missed_releases);
   }

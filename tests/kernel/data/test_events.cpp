@@ -163,12 +163,36 @@ TEST_F(EventsFixture, TooManyListenersAreRefusedByName) {
   } catch (const Error& error) {
     EXPECT_EQ(ErrorCode::out_of_range, error.code());
     EXPECT_EQ("resource bumped", error.detail().element);
+    EXPECT_EQ("at most 1024 listeners", error.detail().expected);
+    EXPECT_EQ("1025", error.detail().found);
   }
   event.unlisten(recorders.front());
   event.listen(recorders.back());
   event.raise.raise(1);
   EXPECT_EQ(0, recorders.front().calls);
   EXPECT_EQ(1, recorders.back().calls);
+}
+
+TEST_F(EventsFixture, HundredsListenAndAreCalledInTheirOrder) {
+  struct Ordered final : EventListener {
+    void on_event(time_ns_t) noexcept override { order->push_back(number); }
+    std::vector<int>* order{nullptr};
+    int number{0};
+  };
+  std::vector<int> order;
+  std::vector<Ordered> all(300);
+  for (int i = 0; i < 300; ++i) {
+    Ordered& each = all[static_cast<std::size_t>(i)];
+    each.order = &order;
+    each.number = i;
+    event.listen(each);
+  }
+  for (const std::size_t gone : {0U, 150U, 299U}) event.unlisten(all[gone]);
+  event.relisten(all[1], all[0]);
+  event.raise.raise(1);
+  ASSERT_EQ(297U, order.size());
+  EXPECT_EQ(0, order.front()) << "in the place of 1";
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
 }
 
 /// Listeners come and go, and end, while a writer hammers: none is called after its end.

@@ -29,6 +29,21 @@ TYPED_TEST(HostConformance, DeploymentReleasesAllOnTheGridOfOneEpoch) {
     EXPECT_EQ(ms_to_ns(1), (instant - epoch) % ms_to_ns(5));
 }
 
+TYPED_TEST(HostConformance, ForceHarmsNobodyWhoIsWell) {
+  this->add("c");
+  this->add("removed");
+  this->deploy();
+  this->run_for(ms_to_ns(10));
+  EXPECT_FALSE(this->host().stop("c", {.timeout_ns = s_to_ns(10), .force = true}));
+  EXPECT_EQ(ComponentState::stopped, this->state("c"));
+  this->host().start("c");
+  Transaction transaction;
+  transaction.stop("c").remove_component("removed");
+  this->commit(transaction, {.force = true});
+  EXPECT_EQ(ComponentState::stopped, this->state("c"));
+  EXPECT_EQ(0U, this->architecture.threads_left_behind());
+}
+
 TYPED_TEST(HostConformance, AnUnconfiguredArchitectureIsNotDeployed) {
   this->add("c");
   EXPECT_EQ(ErrorCode::not_configured, this->refusal([this] { this->host().deploy(); }).code());

@@ -62,6 +62,34 @@ TEST_F(Rule13Simulation, CallbacksComeBeforeTheTasksOfTheirInstant) {
   EXPECT_THAT(order, ElementsAre("every", "task", "once", "every", "task"));
 }
 
+TEST_F(Rule13Simulation, CallbacksBeyondAllInstantsDoNotComeAgain) {
+  add("c");
+  deploy();
+  int once = 0;
+  int never = 0;
+  simulation.every(simulation.epoch_ns(), kForever, [&once] { ++once; });
+  simulation.every(simulation.epoch_ns(), INT64_MAX - 1, [&once] { ++once; });
+  simulation.at(kForever, [&never] { ++never; });
+  run_to(ms_to_ns(5));
+  EXPECT_EQ(2, once);
+  host().stop("c");
+  simulation.run_until(kForever);
+  EXPECT_EQ(2, once);
+  EXPECT_EQ(0, never);
+  EXPECT_EQ(kForever, simulation.now_ns());
+}
+
+TEST(SimulationOptions, ABeginNearTheLastInstantIsRefused) {
+  for (const time_ns_t begin : {INT64_MIN, time_ns_t{0}, kLongest + 1, INT64_MAX}) {
+    try {
+      Simulation simulation({.begin_ns = begin});
+      ADD_FAILURE() << begin;
+    } catch (const Error& error) {
+      EXPECT_EQ("begin_ns", error.detail().element);
+    }
+  }
+}
+
 TEST_F(Rule13Simulation, StopAndStartKeepTheGrid) {
   Component& component = add("c", 5);
   deploy();

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Waits that last longer than there are instants.
+#include "mauve_rt/base/futex.hpp"
+
 #include "free_fsm.hpp"
 
 namespace mauve::testing {
@@ -49,6 +51,40 @@ TEST(LongWaits, TheGridKnowsNoOverflow) {
   EXPECT_EQ(kForever, grid.first_not_before(INT64_MAX));
   EXPECT_EQ(kForever, later_by(5, kForever));
   EXPECT_EQ(INT64_MIN, later_by(-5, INT64_MIN));
+}
+
+TEST(LongWaits, AnInstantBeforeTheClockBeganHasPassed) {
+  const std::atomic<std::uint32_t> word{1};
+  for (const time_ns_t until : {INT64_MIN, time_ns_t{-1}, time_ns_t{0}})
+    EXPECT_FALSE(futex_wait_until(word, 1, until)) << "it would be asked again and again";
+}
+
+using ShortPatience = Deployed;
+
+TEST_F(ShortPatience, OfLessThanNothingIsRefusedAtOnce) {
+  Component& component = add("c", 1000);
+  core(component).work = [] { std::this_thread::sleep_for(std::chrono::milliseconds(300)); };
+  deploy();
+  wait_runs(component, 1);
+  for (const time_ns_t patience : {INT64_MIN, time_ns_t{-1}, time_ns_t{0}}) {
+    try {
+      deployer.set_property("c", "gain", 2.0, {.commit_ns = patience, .phase_ns = patience});
+      ADD_FAILURE() << "it is in a state";
+    } catch (const Error& error) {
+      EXPECT_EQ(ErrorCode::timeout, error.code()) << error.what();
+    }
+  }
+}
+
+TEST_F(ShortPatience, ForTheReleaseThatFollowsIsNone) {
+  Component& component = add("c", 3'600'000);
+  deploy();
+  wait_runs(component, 1);
+  for (const time_ns_t patience : {INT64_MIN, time_ns_t{-1}})
+    EXPECT_FALSE(deployer
+                     .commit(std::move(Transaction().set_property("c", "gain", 2.0)),
+                             {.timeouts = {.commit_ns = s_to_ns(10), .phase_ns = patience}})
+                     .is_complete);
 }
 
 }  // namespace

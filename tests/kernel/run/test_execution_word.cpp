@@ -84,5 +84,69 @@ TEST(ExecutionWord, EachExecutionHasOneEndWhateverThePhases) {
   EXPECT_EQ(condemned, found_out) << "every condemnation is found by the thread, and nothing else";
 }
 
+TEST(ExecutionWord, ForceCondemnsWhateverIsBetweenEnteringAndLeaving) {
+  ExecutionWord word;
+  EXPECT_FALSE(word.look_at_any()) << "it is parked";
+  word.enter();
+  EXPECT_FALSE(word.look()) << "nothing is watched";
+  const auto first = word.look_at_any();
+  ASSERT_TRUE(first);
+  EXPECT_TRUE(word.leave());
+  EXPECT_FALSE(word.condemn(*first)) << "it has left";
+  word.enter();
+  EXPECT_FALSE(word.condemn(*first)) << "and has started anew";
+  const auto before = word.look_at_any();
+  word.begin(100, 10);
+  EXPECT_FALSE(word.condemn(*before)) << "a watched one has begun";
+  EXPECT_TRUE(word.end());
+  EXPECT_TRUE(word.condemn(*word.look_at_any()));
+  EXPECT_FALSE(word.begin(200, 10)) << "the thread finds out at the next one's begin";
+  EXPECT_FALSE(word.leave()) << "or where it leaves";
+  word.sentence();
+  EXPECT_TRUE(word.come_back());
+  EXPECT_FALSE(word.look_at_any()) << "it has left by then";
+  word.enter();
+  word.begin(300, 10);
+  EXPECT_TRUE(word.leave()) << "which ends what is under way";
+  EXPECT_FALSE(word.look());
+}
+
+/// A thread enters, now and then begins and ends, and leaves; another one condemns it by force at random phases.
+TEST(ExecutionWord, AThreadLeavesOrIsCondemnedWhateverThePhases) {
+  constexpr int kRounds = 20'000;
+  ExecutionWord word;
+  std::atomic<int> condemned{0};
+  std::atomic<bool> over{false};
+  const auto spin = [](std::uint_fast32_t spins) {
+    for (; spins > 0; --spins) std::atomic_signal_fence(std::memory_order_seq_cst);
+  };
+  std::thread forcer([&] {
+    std::minstd_rand random(3);
+    while (!over) {
+      const auto execution = word.look_at_any();
+      spin(random() % 300);
+      if (random() % 4 != 0 || !execution || !word.condemn(*execution)) continue;
+      condemned.fetch_add(1);
+      word.sentence();
+    }
+  });
+  std::minstd_rand random(4);
+  int found_out = 0;
+  for (int i = 1; i <= kRounds; ++i) {
+    word.enter();
+    spin(random() % 100);
+    bool goes_on = true;
+    if (random() % 2 == 0) goes_on = word.begin(i, 2 * i);
+    spin(random() % 100);
+    goes_on = goes_on && (random() % 2 == 0 || word.end()) && word.leave();
+    if (goes_on) continue;
+    ++found_out;
+    EXPECT_TRUE(word.come_back());
+  }
+  over = true;
+  forcer.join();
+  EXPECT_EQ(condemned, found_out) << "every condemnation is found by the thread, and nothing else";
+}
+
 }  // namespace
 }  // namespace mauve::testing

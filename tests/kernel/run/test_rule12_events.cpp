@@ -243,6 +243,12 @@ TEST_F(Rule12Events, TimesMustFitAndThePortMustRead) {
     return false;
   };
   EXPECT_FALSE(refused(ms_to_ns(4), ms_to_ns(4)));
+  EXPECT_FALSE(refused(us_to_ns(100), 1));
+  EXPECT_FALSE(refused(kForever, 1));
+  EXPECT_FALSE(refused(kForever, kLongest));
+  EXPECT_TRUE(refused(1, 1)) << "it would never rest";
+  EXPECT_TRUE(refused(kForever, kForever)) << "the sum with an instant is none";
+  EXPECT_TRUE(refused(kForever, kLongest + 1));
   EXPECT_TRUE(refused(ms_to_ns(4), 0));
   EXPECT_TRUE(refused(0, 0));
   EXPECT_TRUE(refused(ms_to_ns(3), ms_to_ns(4)));

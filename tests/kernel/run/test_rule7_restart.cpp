@@ -113,7 +113,7 @@ TEST_F(Rule7Restart, AStartOnAClockOfItsOwnIsAsFromAParkAndNeverCountsBelowZero)
   const auto report = host().commit(std::move(transaction));
   EXPECT_EQ(ms_to_ns(153), due_ns());
   EXPECT_EQ(0, report.steps.front().missed_releases) << "153 ms comes before 200 ms, which was pending";
-  EXPECT_EQ(ms_to_ns(3), report.steps.front().phase_nominal_ns);
+  EXPECT_EQ(0, report.steps.front().phase_nominal_ns) << "the grid is the one that was asked for";
 }
 
 TEST_F(Rule7Restart, AStopAndAStartInOneTransactionKeepThePendingInstant) {
@@ -172,9 +172,11 @@ TEST_F(Rule7RestartOnThreads, NoReleaseIsMissedOnAnEqualGrid) {
     const TraceDrain drain = deployer.drain_trace();
     const auto parked = records_of(drain, TraceKind::parked);
     const auto armed = records_of(drain, TraceKind::armed);
+    ASSERT_EQ(1U, parked.size());
     ASSERT_EQ(1U, armed.size());
     EXPECT_EQ(0, report.steps.front().phase_nominal_ns);
-    if (armed.back().time_ns > armed.back().a) continue;  // the machine stalled the commit past the instant
+    // The machine stalled the commit past the instant. armed's instant is later by a stall that lost some.
+    if (armed.back().time_ns > parked.back().a) continue;
     EXPECT_EQ(parked.back().a, armed.back().a);
     EXPECT_EQ(0, report.steps.front().missed_releases);
   }

@@ -11,6 +11,7 @@ import pytest
 from mauve_msgs.msg import ComponentInfo, ReconfigurationEvent, StepReport
 from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
+from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.steps import load_change
 
 
@@ -52,6 +53,22 @@ def test_a_steps_file_may_allow_releases_to_be_missed() -> None:
     words = ["reconfigure", "/e", "steps.yaml"]
     assert parser.parse_args(words).max_missed is None  # as the file says
     assert parser.parse_args([*words, "--max-missed", "3"]).max_missed == 3
+
+
+def test_force_is_asked_for_by_a_flag_or_by_the_steps_file() -> None:
+    parser = build_parser()
+    for words in (
+        ["stop", "/e", "c"],
+        ["replace-core", "/e", "c", "p/Core"],
+        ["reconfigure", "/e", "steps.yaml"],
+    ):
+        assert parser.parse_args(words).force is False
+        assert parser.parse_args([*words, "--force"]).force is True
+    steps = "steps: [{kind: remove_component, target: a}]"
+    assert load_change("steps.yaml", text=steps).force is False
+    assert load_change("steps.yaml", text=f"force: true\n{steps}").force is True
+    with pytest.raises(ArchitectureFileError, match=":1:8: force: "):
+        load_change("steps.yaml", text=f"force: 1\n{steps}")
 
 
 @pytest.mark.parametrize(

@@ -140,6 +140,20 @@ def test_what_may_be_missed_is_the_request_s(
     assert len(spy.options) == 2
 
 
+def test_force_is_the_kernel_s_to_use(
+    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spy = _Spy(runtime.host)
+    monkeypatch.setattr(runtime, "_host", spy)
+    step = Step("replace_core", "counter", "executor_tests/Backwards")
+    for force in (False, True):
+        assert control.handle(Request(steps=(step,), force=force)).success
+    assert [options["force"] for options in spy.options] == [False, True]
+    outcome = control.handle(Request(steps=(Step("stop", "counter"),), timeout_s=10.0, force=True))
+    assert (outcome.success, outcome.message) == (True, "component 'counter' is stopped"), "it was well"
+    assert _part(runtime, "counter").state == "STOPPED"
+
+
 def test_releases_that_were_missed_are_in_the_message() -> None:
     steps = (Step("replace_core", "a", "p/B"), Step("set_property", "a", "x", "1"), Step("stop", "b"))
     nothing = SimpleNamespace(component="a", missed_releases=0, from_core="p/A", to_core="p/B")

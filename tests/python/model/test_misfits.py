@@ -3,12 +3,14 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mauve_rt._kernel import PluginRegistry, Simulation
 from mauve_rt.cli.main import main
-from mauve_rt.model import build, configure, load_architecture
+from mauve_rt.model import build, checks, configure, load_architecture
+from mauve_rt.model.message_shapes import message_definition, mismatches
 
 Check = Callable[[str], tuple[int, str, list[str]]]
 
@@ -68,6 +70,33 @@ def test_a_struct_like_its_message_is_taken(check: Check) -> None:
     status, out, errors = check(ROBOT)
     assert (status, errors) == (0, [])
     assert "no error found" in out
+
+
+def test_a_message_is_looked_up_once_for_all_components(
+    check: Check, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    held: list[object] = []
+
+    def find(name: str) -> Any:
+        asked.append(name)
+        return message_definition(name)
+
+    def hold(messages: Any, **options: Any) -> Any:
+        held.append(messages)
+        return mismatches(messages, **options)
+
+    monkeypatch.setattr(checks, "message_definition", find)
+    monkeypatch.setattr(checks, "mismatches", hold)
+    assert check(ROBOT)[0] == 0
+    by_one = len(held)
+    asked.clear()
+    held.clear()
+    one = next(line for line in ROBOT.splitlines() if line.startswith("  one:"))
+    assert check(ROBOT.replace(one, f"{one}\n{one.replace('one', 'two')}"))[0] == 0
+    assert asked
+    assert len(asked) == len(set(asked))
+    assert len(held) == by_one > 0  # the shell of both is checked once
 
 
 @pytest.mark.parametrize(

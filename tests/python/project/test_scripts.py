@@ -33,7 +33,11 @@ def bash(script: str, **environment: str) -> list[str]:
         f"source {SCRIPTS}/{part}.sh; " for part in ("lib", "progress", "python_packages", "system_packages")
     )
     settings = "".join(f"{name}={value}; " for name, value in environment.items())
-    return ["bash", "-c", f"set -euo pipefail; {parts} with_lint=false jazzy=; {settings} {script}"]
+    return [
+        "bash",
+        "-c",
+        f"set -euo pipefail; {parts} with_lint=false with_tests=false jazzy=; {settings} {script}",
+    ]
 
 
 @contextlib.contextmanager
@@ -99,6 +103,14 @@ def test_a_missing_tool_is_among_the_packages_to_install(program: str, tmp_path:
     packages = {"ninja": "ninja-build"}
     assert packages.get(program, program) in bare.stdout.split()
     assert not {packages.get(other, other) for other in others} & set(bare.stdout.split())
+
+
+@pytest.mark.parametrize("with_tests", ["true", "false"])
+def test_ccache_comes_with_the_tests(with_tests: str, tmp_path: Path):
+    path = folder_of_programs(tmp_path / "path", "python3", "bash", "dirname")
+    command = bash(f"PATH={path}; missing_system_packages || true", with_tests=with_tests)
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert ("ccache" in said.split()) is (with_tests == "true")
 
 
 @pytest.fixture
@@ -254,3 +266,14 @@ def test_patching_leaves_the_installer_s_cache_as_it_was(tmp_path: Path):
     assert installed.read_text() == f"include({tmp_path}/prefix/lib)\n"
     assert cached.read_text() == "include(/opt/python/cp311-cp311/lib)\n"
     assert [path.name for path in installed.parent.iterdir()] == ["installed.cmake"]
+
+
+def test_the_slowest_cases_are_listed(tmp_path: Path):
+    cases = '<testcase classname="tests.x" name="slow" time="3.25"/><testcase name="quick" time="0.5"/>'
+    (tmp_path / "python.xml").write_text(f"<testsuites><testsuite>{cases}</testsuite></testsuites>")
+    kernel = '<testsuite><testcase classname="a.B" name="a.B" time="2"/></testsuite>'
+    (tmp_path / "kernel.xml").write_text(kernel)
+    words = [sys.executable, SCRIPTS / "count_results.py", "--slowest", "2", tmp_path]
+    said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    assert said == "    3.2 s  python  tests.x::slow\n    2.0 s  kernel  a.B\n"
+    assert "--slowest 30" in (SCRIPTS / "test").read_text("utf-8")

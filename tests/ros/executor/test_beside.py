@@ -164,6 +164,7 @@ def test_a_fallback_is_told_whatever_the_fault(
         f"core: executor_tests/{core}, fsm: executor_tests/{fsm}, fallback: executor_tests/Backwards",
         1,
     )
+    first = first.replace("period_ms: 20", "period_ms: 20, label: briefly", 1)
     architecture.write_text(text[:begin] + first, encoding="utf-8")
     start_executor("-p", f"architecture:={architecture}", "-p", "autostart:=false")
     events = graph.hear_events(NODE)

@@ -129,7 +129,8 @@ def test_nobody_is_held_for_who_still_executes(
     text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
     text = text.replace("core: executor_tests/Counter,", "core: executor_tests/Held,", 1)
     architecture.write_text(text, encoding="utf-8")
-    stage = Stage(graph, tmp_path, start_executor("-p", f"architecture:={architecture}"), counts=1)
+    stage = Stage(graph, tmp_path, start_executor("-p", f"architecture:={architecture}"), counts=0)
+    graph.spin_until(lambda: stage.part("counter").current_state == "Count", "a state that lasts")
     steps = [
         ReconfigurationStep(kind="set_property", target="counter", name="step", value="2.0"),
         ReconfigurationStep(kind="replace_core", target="sleepy", name="executor_tests/Backwards"),

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,6 +54,7 @@ struct ListChange {
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
+/// | numbered_                       | who changes it        | changes | list_mutex_                    |
 /// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
 /// | prepared_                       | who prepares          | changes | change_lock_                   |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
@@ -201,7 +204,8 @@ class Architecture final : public Configurable {
   void enlist(PreparedChange& prepared) { prepared_.push_back(&prepared); }
   void delist(const PreparedChange& prepared) noexcept { std::erase(prepared_, &prepared); }
 
-  /// A component with a number of its own, not listed yet: its changes are nobody's business. [non-rt]
+  /// A component with a number of its own, not listed yet: its changes are nobody's business. One that was removed, and
+  /// is gone, leaves its number to the next of its name, whose records follow its own. [non-rt]
   /// Throws Error (out_of_range) when all numbers are used up.
   std::shared_ptr<Component> make_unlisted(const std::string& name);
   /// How many numbers were given out; give_back() forgets those from `numbers` on. [non-rt]
@@ -220,8 +224,10 @@ class Architecture final : public Configurable {
   void retire_trace(Task& task);
 
  private:
-  /// A number that the trace knows the name by. list_mutex_ held. Throws Error (out_of_range): all are used up.
+  /// A new number that the trace knows the name by. list_mutex_ held. Throws Error (out_of_range): all are used up.
   std::uint16_t give_number(const std::string& name);
+  /// The number of a component of that name that is gone. list_mutex_ held.
+  std::optional<std::uint16_t> find_free_number(const std::string& name) const;
   /// Keeps records until the next drain; of too many the oldest are lost. trace_mutex_ held.
   void keep_records(const std::vector<TraceRecord>& records);
 
@@ -251,6 +257,8 @@ class Architecture final : public Configurable {
   std::atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable std::mutex list_mutex_;
   std::vector<std::string> names_;  // by number
+  std::map<std::uint16_t, std::weak_ptr<const Component>>
+      numbered_;  // who has a number; absent: no component ever had
   std::mutex trace_mutex_;
   std::deque<TraceRecord> retired_;
   std::vector<Final> finals_;  // by number

@@ -80,6 +80,8 @@ class TraceRing {
   explicit TraceRing(std::uint16_t component, std::size_t capacity = kDefaultCapacity);
   /// Stamps by this clock instead of the monotonic one: simulated time. [setup]
   void set_clock(const Clock* clock) noexcept { clock_ = clock; }
+  /// Numbers its records from here on: an earlier ring of the same component has written so many. [setup]
+  void set_first(std::uint64_t sequence) noexcept { first_ = sequence; }
 
   /// 96 KiB: at 1 kHz with one execution state and one wait, half a second.
   static constexpr std::size_t kDefaultCapacity = 2048;
@@ -100,7 +102,7 @@ class TraceRing {
         return;
       }
     }
-    places_[head & mask_] = {.sequence = head + dropped,
+    places_[head & mask_] = {.sequence = first_ + head + dropped,
                              .time_ns = time_ns,
                              .a = a,
                              .b = b,
@@ -120,7 +122,7 @@ class TraceRing {
 
   /// Appends all records to the vector and frees their places. [non-rt], one thread at a time.
   void drain(std::vector<TraceRecord>& into);
-  /// Records offered so far, dropped ones among them; exact while the producer rests. [non-rt]
+  /// Records offered to this ring so far, dropped ones among them; exact while the producer rests. [non-rt]
   std::uint64_t offered() const noexcept { return head_.load(std::memory_order_relaxed) + dropped(); }
   std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
@@ -133,6 +135,7 @@ class TraceRing {
   std::unique_ptr<TraceRecord[]> places_;
   std::size_t mask_;
   std::uint16_t component_;
+  std::uint64_t first_{0};
   const Clock* clock_{nullptr};  // nullptr: monotonic, without a virtual call
   alignas(64) std::atomic<std::uint64_t> head_{0};
   std::uint64_t seen_tail_{0};

@@ -152,6 +152,10 @@ struct TransactionOptions {
   bool dry_run{false};                 // check and prepare everything, then throw it away
   std::uint64_t expected_revision{0};  // of the architecture; 0: any
   std::int64_t max_missed{0};          // releases that a participant may be held past
+  // A component that the transaction removes, stops or gives new parts, and whose state does not end within the commit's
+  // timeout, is stopped by force (Task::stop): it is FAULTED then, whatever becomes of the transaction. The commit is tried
+  // once more, without the thread of one that is removed or stopped; for new parts it is refused (faulted).
+  bool force{false};
 };
 
 struct TransactionReport {

@@ -2,9 +2,9 @@
 // Resources: data plus the services to reach it.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,15 +54,17 @@ class EventListener {
   virtual void on_event(time_ns_t time_ns) MAUVE_RT = 0;
 };
 
-/// The listeners of one resource; a write without any costs one load.
+/// The listeners of one resource, in the order they came; a write without any costs one load.
 ///
-/// | member     | written by       | read by | under                                                       |
-/// | ---------- | ---------------- | ------- | ----------------------------------------------------------- |
-/// | listeners_ | ordinary threads | writers | mutex_                                                      |
-/// | count_     | ordinary threads | writers | relaxed: only says whether to look, under the lock, at all  |
+/// | member        | written by       | read by          | under                                                    |
+/// | ------------- | ---------------- | ---------------- | -------------------------------------------------------- |
+/// | listeners_    | ordinary threads | ordinary threads | change_mutex_, which writers never take                  |
+/// | the same      | the same         | writers          | mutex_; held without any allocation                      |
+/// | count_        | ordinary threads | writers          | relaxed: only says whether to look, under mutex_, at all |
 class EventListeners {
  public:
-  static constexpr std::size_t kCapacity = 8;
+  /// A write calls all of them, so this bounds what it costs.
+  static constexpr std::size_t kCapacity = 1024;
 
   /// Adds one registration; who is added twice is called twice. [non-rt]
   /// Throws Error (out_of_range) naming the resource when there are kCapacity.
@@ -75,12 +77,17 @@ class EventListeners {
   void call(time_ns_t time_ns) MAUVE_RT {
     if (count_.load(std::memory_order_relaxed) != 0) call_all(time_ns);
   }
+  /// While who calls this holds it, no listener is called: for what must not be split by a write. [rt] Short.
+  PiMutex& mutex() MAUVE_RT { return mutex_; }
 
  private:
+  static constexpr std::size_t kFirst = 8;
+
   void call_all(time_ns_t time_ns) MAUVE_RT;
 
+  std::mutex change_mutex_;
   PiMutex mutex_;
-  std::array<EventListener*, kCapacity> listeners_{};
+  std::vector<EventListener*> listeners_;
   std::atomic<std::size_t> count_{0};
 };
 
@@ -114,6 +121,8 @@ class Resource : public Configurable {
   void unlisten(EventListener& listener) noexcept { listeners_.remove(listener); }
   /// From now on the other is called in place of a listener. [non-rt]
   void relisten(EventListener& listener, EventListener& by) noexcept { listeners_.replace(listener, by); }
+  /// While it is held no listener is called. [rt] Short; nothing is written and nobody listens under it.
+  PiMutex& events_mutex() MAUVE_RT { return listeners_.mutex(); }
   /// Counts who calls write_sample(), e.g. an incoming topic, as one port of each service that writes.
   /// [setup] Throws Error (invalid_argument) when one takes no more.
   void bind_input();

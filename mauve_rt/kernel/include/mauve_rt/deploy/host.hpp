@@ -15,6 +15,11 @@
 
 namespace mauve {
 
+struct StopOptions {
+  time_ns_t timeout_ns{s_to_ns(1)};
+  bool force{false};  // a component whose state does not end by then is given up, as Task::stop() says
+};
+
 /// Runs one architecture, which has at most one host at a time. All functions [non-rt] unless told.
 ///
 /// start(), stop(), shutdown() and what only looks take no part in changes: a long preparation keeps nobody from them.
@@ -35,6 +40,8 @@ class Host : public Runner {
 
   void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
   void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
+  /// As Task::stop(); true when the component was given up: it is FAULTED then, and its thread left behind.
+  bool stop(const std::string& component, const StopOptions& options);
   time_ns_t get_time(const std::string& component) const;
 
   /// Carries out a transaction, deployed or not; one at a time. [non-rt]

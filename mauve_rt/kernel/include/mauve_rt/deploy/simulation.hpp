@@ -24,7 +24,7 @@ class SimulatedClock final : public Clock {
   bool sleep_until(time_ns_t, const std::atomic<std::uint32_t>&, std::uint32_t) const noexcept override {
     return false;
   }
-  void spend(time_ns_t declared_ns) const noexcept override { now_ns_ += declared_ns; }
+  void spend(time_ns_t declared_ns) const noexcept override { now_ns_ = later_by(now_ns_, declared_ns); }
   void due_changed(Task& task) const noexcept override {
     MAUVE_RT_TRUSTED(queue_.update(task, now_ns_));  // nobody's time passes meanwhile
   }

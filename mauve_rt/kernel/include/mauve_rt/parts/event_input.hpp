@@ -3,7 +3,9 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <optional>
+#include <span>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/waiter.hpp"
@@ -12,13 +14,21 @@
 
 namespace mauve {
 
+struct State;
+
 /// Keeps the time of the first event not consumed yet, and wakes the component.
 ///
-/// | member    | written by                        | read by | order                                          |
-/// | --------- | --------------------------------- | ------- | ---------------------------------------------- |
-/// | time_     | writers, if empty; task empties   | task    | acq_rel: what was written before is visible    |
-/// | waiter_   | ordinary threads, the same again  | writers | relaxed: listening publishes it first          |
-/// | resource_ | ordinary threads, one at a time   | -       | -                                              |
+/// An fsm that a change puts in listens from its preparation on, since listening may fail, and a commit may not. Its
+/// inputs ignore all events until the commit: those are for the fsm that still runs.
+///
+/// | member    | written by                          | read by | order                                            |
+/// | --------- | ----------------------------------- | ------- | ------------------------------------------------ |
+/// | time_     | writers, if empty; task empties; a  | task    | acq_rel: what was written before is visible      |
+/// |           | commit fills it                     |         |                                                  |
+/// | waiter_   | ordinary threads, the same again    | writers | relaxed: listening publishes it first            |
+/// | is_live_  | before it listens; a commit         | writers | relaxed: the resource's events mutex             |
+/// | resource_ | ordinary threads, one at a time,    | commits | the same, and a change of the component at a time|
+/// |           | none in a commit of the component   |         |                                                  |
 class EventInput final : public EventListener {
  public:
   explicit EventInput(PortBase& port) : port_(&port) {}
@@ -28,10 +38,18 @@ class EventInput final : public EventListener {
   /// The time of the first event since the last call. [rt], the task's thread
   std::optional<time_ns_t> consume() MAUVE_RT;
 
+  /// Keeps an event, unless one is kept: the first time of one that came, or one that consume() has returned. [rt]
+  void keep(time_ns_t time_ns) MAUVE_RT;
+
   /// [rt]
   const PortBase& port() const MAUVE_RT { return *port_; }
   /// Whom it wakes; before it listens, and nobody else later. [non-rt]
   void set_waiter(Waiter& waiter) noexcept { waiter_.store(&waiter, std::memory_order_relaxed); }
+  /// Ignores events until take_over(). [non-rt], before it listens
+  void mute() noexcept { is_live_.store(false, std::memory_order_relaxed); }
+  /// Heeds events from now on, in place of the inputs of another fsm. One that came before is taken over when it came at
+  /// the same port and resource, and no wait there has consumed it. [rt], a commit
+  void take_over(std::span<const std::unique_ptr<State>> before) MAUVE_RT;
   /// Listens to the resource that the port is connected to now, and to no other. [non-rt]
   void listen();
   /// Listens to nothing from now on. [non-rt]
@@ -42,10 +60,14 @@ class EventInput final : public EventListener {
  private:
   static constexpr time_ns_t kNone = INT64_MIN;
 
+  time_ns_t unconsumed_by_all(std::span<const std::unique_ptr<State>> before) const MAUVE_RT;
+  bool is_for_the_same(const EventInput& other) const MAUVE_RT;
+
   PortBase* port_;
   std::atomic<Waiter*> waiter_{nullptr};
   Resource* resource_{nullptr};
   std::atomic<time_ns_t> time_{kNone};
+  std::atomic<bool> is_live_{true};
 };
 
 }  // namespace mauve

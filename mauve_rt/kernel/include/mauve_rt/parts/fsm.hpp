@@ -138,6 +138,10 @@ class FsmBase : public Configurable {
   time_ns_t period_ns() const MAUVE_RT { return period_ns_; }
   /// Whether it waits for events: phase and missed releases do not apply to it then. Valid once configured. [rt]
   bool is_sporadic() const MAUVE_RT { return sporadic_; }
+  /// The least time from the release before to one that enters the initial state: the smallest min_interarrival of the
+  /// event waits that lead there, or of all where none does. 0: the initial state is a wait, or it is not sporadic. Valid
+  /// once configured. [rt]
+  time_ns_t initial_interarrival_ns() const MAUVE_RT { return initial_interarrival_ns_; }
   /// The smallest max_execution of all states; 0: none declares one. Valid once configured. [rt]
   time_ns_t smallest_bound_ns() const MAUVE_RT { return smallest_bound_ns_; }
 
@@ -179,6 +183,7 @@ class FsmBase : public Configurable {
   State* initial_{nullptr};
   time_ns_t period_ns_{0};
   bool sporadic_{false};
+  time_ns_t initial_interarrival_ns_{0};
   time_ns_t smallest_bound_ns_{0};
   time_ns_t divisor_ns_{0};  // 0: none
   std::string implementation_;

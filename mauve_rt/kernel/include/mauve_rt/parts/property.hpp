@@ -53,6 +53,9 @@ struct PropertyOptions {
 PropertyValue checked(const std::string& name, const PropertyValue& example, const PropertyOptions& options,
                       const PropertyValue& value);
 
+/// Refuses a range that no value fits, and an initial value out of it. [setup] Throws Error: invalid_argument, out_of_range.
+void check_declaration(const std::string& name, const PropertyValue& initial, const PropertyOptions& options);
+
 /// A property seen without its type.
 ///
 /// | member           | written by                                                  | read by            |
@@ -99,8 +102,11 @@ class PropertyBase {
 template <PropertyType T>
 class Property final : public PropertyBase {
  public:
+  /// [setup] Throws Error as check_declaration().
   Property(std::string name, T initial, PropertyOptions options)
-      : PropertyBase(std::move(name), std::move(options)), value_(std::move(initial)) {}
+      : PropertyBase(std::move(name), std::move(options)), value_(std::move(initial)) {
+    check_declaration(this->name(), value_, this->options());
+  }
 
   /// The value in force since the component last left a wait. [rt]
   const T& value() const MAUVE_RT { return is_previewed() ? preview_ : value_; }

@@ -90,6 +90,7 @@ class PartsChange final : public CommitAction {
 
  private:
   void prepare_parts();
+  void take_over_events(const FsmBase& before) MAUVE_RT;
 
   Component& component_;
   Parts parts_;  // the new ones; after take the old ones

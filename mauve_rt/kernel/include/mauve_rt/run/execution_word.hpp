@@ -11,17 +11,26 @@
 
 namespace mauve {
 
-/// The watched executions of one component, one after another; each has a number of its own and a bound.
+/// The executions of one component, one after another. A watched one has a number of its own and a bound.
 ///
-/// Its thread begins an execution and ends it; whoever finds it over its bound condemns exactly that one. Both change
-/// the word by compare-and-exchange: who comes first has decided, and the other one finds so. A condemned execution's
+/// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound,
+/// and what it does at a commit's gate. Whoever finds a watched execution over its bound condemns exactly that one; whoever
+/// stops the component by force condemns whatever the thread does between entering and leaving. All change the word by
+/// compare-and-exchange: who comes first has decided, and the other one finds so. The thread finds out where it ends the
+/// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who condemns
+/// one has ordered a stop before, which the thread sees when the state ends, and then it leaves. A condemned execution's
 /// thread waits, on coming back, until the condemnation is complete; who removes its component meanwhile abandons it.
+///
+/// The word is the phase, whether the thread is in its fsm (kEntered), and a number that grows with every entry and begin.
 ///
 /// | from             | to               | by                                                                      |
 /// | ---------------- | ---------------- | ----------------------------------------------------------------------- |
+/// | idle             | idle, entered, +1| the thread: it starts                                                   |
+/// | idle, entered    | idle             | the thread: it parks                                                    |
 /// | idle             | running, + 1     | the thread                                                              |
 /// | running          | idle             | the thread: it ended                                                    |
-/// | running          | condemned        | the watchdog, or the conductor of a commit                              |
+/// | running          | condemned        | the watchdog, the conductor of a commit, who stops by force             |
+/// | idle, entered    | condemned        | who stops by force                                                      |
 /// | condemned        | sentenced        | the same, when FAULTED is told, the thread demoted, the outputs written |
 /// | sentenced        | idle             | the thread: it came back                                                |
 /// | sentenced        | claimed          | who is about to remove the component                                    |
@@ -53,13 +62,26 @@ class ExecutionWord {
 
   // ---- the component's thread
 
-  /// [rt]
-  void begin(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
+  /// It is in its fsm from now on. [rt]
+  void enter() MAUVE_RT {
+    const std::uint32_t before = word_.load(std::memory_order_relaxed);
+    if ((before & kEntered) != 0) return;  // it restarts
+    // A plain store: until it has entered nobody else changes an idle word. release: who condemns sees the start.
+    word_.store((before + kNext) | kEntered, std::memory_order_release);
+  }
+  /// It has left, and ended what was under way; false when that was condemned before. [rt]
+  bool leave() MAUVE_RT {
+    std::uint32_t word = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
+    return (word & kPhase) <= kRunning &&
+           word_.compare_exchange_strong(word, word & ~(kPhase | kEntered), std::memory_order_acq_rel);
+  }
+  /// False when the thread is condemned. [rt]
+  bool begin(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
     began_ns_.store(began_ns, std::memory_order_release);
     limit_ns_.store(limit_ns, std::memory_order_release);
-    const std::uint32_t before =
-        word_.load(std::memory_order_relaxed);  // relaxed: idle, nobody else writes it
-    word_.store(((before & ~kPhase) + kNext) | kRunning, std::memory_order_seq_cst);
+    std::uint32_t before = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
+    return (before & kPhase) == kIdle &&
+           word_.compare_exchange_strong(before, (before + kNext) | kRunning, std::memory_order_seq_cst);
   }
   /// False when it was condemned before it ended; true also when none was under way. [rt]
   bool end() MAUVE_RT {
@@ -78,7 +100,8 @@ class ExecutionWord {
       if (phase == kIdle) return true;
       if (phase != kSentenced) {
         futex_wait_until(word_, word, kForever);
-      } else if (word_.compare_exchange_strong(word, (word & ~kPhase) | kIdle, std::memory_order_acq_rel)) {
+      } else if (word_.compare_exchange_strong(word, word & ~(kPhase | kEntered),
+                                               std::memory_order_acq_rel)) {
         return true;
       }
     }
@@ -86,11 +109,17 @@ class ExecutionWord {
 
   // ---- who condemns
 
-  /// The execution under way, or nothing. [rt]
+  /// The watched execution under way, or nothing. [rt]
   std::optional<Look> look() const MAUVE_RT {
     const std::uint32_t word = word_.load(std::memory_order_seq_cst);
     if ((word & kPhase) != kRunning) return std::nullopt;
     return Look{word, began_ns_.load(std::memory_order_acquire), limit_ns_.load(std::memory_order_acquire)};
+  }
+  /// The same, or whatever else the thread does in its fsm; its numbers say nothing then. [rt]
+  std::optional<Look> look_at_any() const MAUVE_RT {
+    const std::uint32_t word = word_.load(std::memory_order_acquire);
+    if ((word & kPhase) != kRunning && (word & (kPhase | kEntered)) != kEntered) return std::nullopt;
+    return Look{word, 0, kForever};
   }
   /// False when it has ended, or another one was first. [rt]
   bool condemn(const Look& execution) MAUVE_RT {
@@ -126,7 +155,8 @@ class ExecutionWord {
  private:
   static constexpr std::uint32_t kIdle = 0, kRunning = 1, kCondemned = 2, kSentenced = 3, kClaimed = 4,
                                  kAbandoned = 5, kPhase = 7;
-  static constexpr std::uint32_t kNext = 8;  // the number above the phase
+  static constexpr std::uint32_t kEntered = 8;
+  static constexpr std::uint32_t kNext = 16;  // the number above both
 
   std::uint32_t phase() const noexcept { return word_.load(std::memory_order_acquire) & kPhase; }
   void exchange_phase(std::uint32_t from, std::uint32_t to) noexcept {

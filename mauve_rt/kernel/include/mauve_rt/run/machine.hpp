@@ -46,6 +46,7 @@ struct OverBound : std::exception {
 /// | fsm_, core_             | ordinary threads, parked; commits         | who runs it| parking; the commit's gate      |
 /// | clock_, ring_, watchdog_| the same, parked                          | who runs it| parking; the thread's creation  |
 /// | reference_ns_,          | the same; commits                         | anyone     | relaxed: lone numbers           |
+/// | deployment_ns_,         |                                           |            |                                 |
 /// | period_ns_              |                                           |            |                                 |
 /// | wait_bound_ns_          | the same                                  | watchdog   | relaxed: a hint when to look    |
 /// | context_, statistics_   | who runs it                               | anyone     | relaxed: lone facts             |
@@ -60,7 +61,7 @@ class Machine {
   enum class Entered : std::uint8_t {
     execution,  // and left again: the next state is to be entered
     wait,       // until due_ns(), or an event
-    condemned,  // an execution, and it was condemned before it ended
+    condemned,  // an execution, and it was condemned before it began or ended
   };
 
   /// The settings are whoever runs it's, and may change while it is parked. [setup]
@@ -73,13 +74,19 @@ class Machine {
 
   /// [rt]
   void set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
-  void set_clock(const Clock& clock) MAUVE_RT { clock_ = &clock; }
+  /// Releases of another clock's time are no more. [rt]
+  void set_clock(const Clock& clock) MAUVE_RT {
+    clock_ = &clock;
+    active_ns_ = kNever;
+  }
   /// Where it traces; nullptr: nowhere. [rt]
   void set_ring(TraceRing* ring) MAUVE_RT { ring_ = ring; }
   /// Who is told of executions that have a bound; nullptr: nobody. [rt]
   void set_watchdog(Watchdog* watchdog) MAUVE_RT { watchdog_ = watchdog; }
   /// Counts the grid from the epoch; returns its first instant. [rt]
   time_ns_t join(time_ns_t epoch_ns) MAUVE_RT;
+  /// Counts the grid from this instant until the next join(), or from the deployment's again. [rt]
+  void count_from(std::optional<time_ns_t> reference_ns) MAUVE_RT;
   /// The grid now; a commit may change it any moment. [rt], anyone
   Grid grid() const MAUVE_RT {
     return {.reference_ns = reference_ns_.load(std::memory_order_relaxed),
@@ -88,7 +95,8 @@ class Machine {
 
   // ---- its steps, by who runs it
 
-  /// Waits for the initial state from now on, which is due at the instant. [rt]
+  /// Waits for the initial state from now on. That is due at the instant; where it is no wait, not sooner after the last
+  /// release than the fsm's waits for events allow. [rt]
   void start(time_ns_t instant_ns) MAUVE_RT;
   /// Gives up its place. [rt]
   void park() MAUVE_RT;
@@ -104,6 +112,10 @@ class Machine {
   Entered enter_next();
   /// Takes an event that has come, if the wait under way is for one and has none yet. [rt]
   void take_event() MAUVE_RT;
+  /// Before another fsm is put in, or the same starts again: settles for what becomes of the event that the wait under way
+  /// was released for, or would be. An execution state as the initial one is released in its place; else it is put back for
+  /// the waits to come. [rt]
+  void leave_event_to(const State& initial) MAUVE_RT;
   /// Whether the wait's end is fixed: it is for no event, or one has come. [rt]
   bool is_settled() const MAUVE_RT { return event_settled_; }
   /// Started, and not woken ahead of its first release yet. [rt]
@@ -113,10 +125,12 @@ class Machine {
 
   // ---- its part in a change that is made in its wait
 
-  /// What begins now is to last no longer than this. [rt]
-  void begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT;
+  /// What begins now is to last no longer than this; false when who runs it is condemned. [rt]
+  bool begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT;
   /// It has ended; false when it was condemned before. [rt]
   bool end_execution() MAUVE_RT { return execution_.end(); }
+  /// It is about to park, and nothing is under way any more; false when it was condemned before. [rt]
+  bool leave() MAUVE_RT { return execution_.leave(); }
   /// Reads the clock for what follows. [rt]
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
   /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less
@@ -167,6 +181,8 @@ class Machine {
   const ExecutionWord& execution() const MAUVE_RT { return execution_; }
 
  private:
+  static constexpr time_ns_t kNever = INT64_MIN;
+
   bool execute(const State& state);
   const State* successor(const State& state) const;
   void enter_wait(const State& state);
@@ -184,6 +200,7 @@ class Machine {
   const FsmBase* fsm_{nullptr};
   CoreBinding* core_{nullptr};
   std::atomic<time_ns_t> reference_ns_{0};
+  std::atomic<time_ns_t> deployment_ns_{0};  // the reference of the deployment's grid
   std::atomic<time_ns_t> period_ns_{0};
   std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
 
@@ -197,8 +214,10 @@ class Machine {
 
   // The state it waits in; the initial one before its first release; nullptr: parked.
   const State* waiting_{nullptr};
-  const State* next_{nullptr};  // the one to be entered; nullptr: the wait's guards tell when it has ended
-  time_ns_t wait_from_ns_{0};   // the logical clock on entering an event wait
+  const State* next_{nullptr};   // the one to be entered; nullptr: the wait's guards tell when it has ended
+  time_ns_t wait_from_ns_{0};    // the logical clock on entering an event wait
+  time_ns_t event_ns_{kNever};   // of the event that fixed the end of the wait under way
+  time_ns_t active_ns_{kNever};  // the logical clock of the last release that was no mere start into a wait
   bool event_settled_{true};
   bool is_cold_{false};
   time_ns_t boundary_ns_{0};  // when the last state, commit or wait ended, read once

@@ -104,6 +104,8 @@ class Task final : public Waiter {
 
   /// What the machine will run. Parked, or in a commit. [rt]
   void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
+  /// Before a commit puts in another fsm, with this initial state. [rt]
+  void leave_event_to(const State& initial) MAUVE_RT { machine_.leave_event_to(initial); }
   /// [setup]
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
   /// [rt]
@@ -154,14 +156,16 @@ class Task final : public Waiter {
   /// Returns once the thread has taken up a start. [non-rt]
   void wait_started() noexcept;
   /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
-  /// is still to come is the start itself; without one it is the deployment's first instant. [non-rt]
-  /// Throws Error: already_running, faulted, not_configured.
+  /// is still to come is the start itself; without one it is the deployment's first instant. Another fsm keeps that grid.
+  /// [non-rt] Throws Error: already_running, faulted, not_configured.
   void start(std::optional<time_ns_t> clock_ns = std::nullopt);
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
   /// A commit that the component takes part in is called off, unless its change is being made; waits for nobody else.
   /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
+  /// By force: a component that still executes a state, or a guard, at the time-out is condemned: it is FAULTED, its outputs
+  /// are written as on a stop, its thread is demoted and left behind until the state ends. True when that was done.
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
-  void stop(time_ns_t timeout_ns = s_to_ns(1));
+  bool stop(time_ns_t timeout_ns = s_to_ns(1), bool force = false);
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
   time_ns_t get_time() const MAUVE_RT {
     return machine_.context().instant_ns.load(std::memory_order_relaxed);
@@ -277,7 +281,9 @@ class Task final : public Waiter {
   const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
   TraceRing* ring() MAUVE_RT { return ring_.get(); }
-  /// Appends the ring's records and tells its counts; leaves all alone when nothing is traced. [non-rt]
+  /// How many records an earlier component of its number has written: its own are numbered from there. [setup]
+  void set_first_record(std::uint64_t sequence) noexcept { first_record_ = sequence; }
+  /// Appends the ring's records and adds its counts to those; leaves all alone when nothing is traced. [non-rt]
   void drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped);
   /// Gives the ring away, when the component is removed before the ring is drained; parked, no thread. [non-rt]
   std::unique_ptr<TraceRing> release_ring();
@@ -292,8 +298,9 @@ class Task final : public Waiter {
   // commands
   void post_start(time_ns_t instant_ns) noexcept;
   void order_stop();
-  time_ns_t next_instant(std::optional<time_ns_t> reference_ns) const noexcept;
-  time_ns_t restart_instant(const Participant& place) const noexcept;
+  time_ns_t start_on(std::optional<time_ns_t> reference_ns) noexcept;
+  time_ns_t next_instant() const noexcept;
+  time_ns_t restart_instant(const Participant& place) noexcept;
   void require_startable() const;
   bool is_called_from_own_state() const noexcept;
   void begin_trace(bool trace);
@@ -326,6 +333,8 @@ class Task final : public Waiter {
   void park_condemned() noexcept;
   void end_in_fault() noexcept;
   void park(ComponentState state) noexcept;
+  bool condemn(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns);
+  bool condemn_unless_waiting();
   void carry_out_sentence() MAUVE_RT;
   void take_back_outputs() noexcept;
   void regain_priority() noexcept;
@@ -335,6 +344,7 @@ class Task final : public Waiter {
 
   std::string name_;
   std::uint16_t number_;
+  std::uint64_t first_record_{0};
   ChangeSignal& changes_;
   TaskSettings settings_;
   Machine machine_{settings_};

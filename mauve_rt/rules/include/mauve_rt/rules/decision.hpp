@@ -2,15 +2,19 @@
 // Decisions: what an engine tells of each rule, whether it acted or not.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve::rules {
 
 /// The two things that a rule can want.
 enum class Act : std::uint8_t { do_, undo };
+/// The place of an act in a table of one entry per act. [rt]
+constexpr std::size_t index_of(Act act) MAUVE_RT { return static_cast<std::size_t>(act); }
 
 enum class Decided : std::uint8_t {
   armed,     // it watches

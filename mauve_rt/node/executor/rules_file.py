@@ -1,0 +1,57 @@
+"""A rules file as an executor runs it. An executor without rules does not load this module."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from mauve_rt._kernel import Host, Reflex, RuleActions, RuleFacts, monotonic_ns
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.interfaces.told_decisions import DecisionMessages, rule_info
+from mauve_rt.supervision.engine_rules import rule_specs
+from mauve_rt.supervision.rule_actions import own_rules, rule_actions
+from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unheard
+from mauve_rt.supervision.rules import Rule, RulesFile
+
+
+@dataclass(frozen=True)
+class LoadedRules:
+    """The rules of a file that the executor runs itself, checked, and their prepared actions."""
+
+    path: Path
+    rules: Sequence[Rule]
+    actions: Sequence[RuleActions]
+
+    @classmethod
+    def read(
+        cls, path: Path, runtime: Runtime, *, topics: Callable[[Sequence[Rule]], Mapping[str, str]] | None
+    ) -> Self:
+        """Read and check a file; `topics` says which resource is bound to each topic: None checks no input.
+
+        Raises:
+            ArchitectureFileError: the executor cannot run it.
+        """
+        file = RulesFile(path)
+        rules = own_rules(file)
+        unheard_of = [*only_outside(file)]
+        if topics is not None:
+            bound = topics(rules)
+            found = (unheard(file, leaf, runtime.host, bound) for leaf in own_leaves(file))
+            unheard_of += filter(None, found)
+        if unheard_of:
+            raise ArchitectureFileError(file.path, unheard_of)
+        return cls(path, rules, rule_actions(file, runtime))
+
+    def reflex(self, host: Host, topics: Mapping[str, str]) -> Reflex:
+        """What runs them, not started yet."""
+        return Reflex(host, rule_specs(self.rules), self.actions, topics)
+
+    def messages(self, runtime: Runtime, *, who: str, name: Callable[[str], str]) -> DecisionMessages:
+        """What makes messages of their decisions."""
+        return DecisionMessages(self.rules, runtime, who=who, name=name)
+
+    @staticmethod
+    def infos(facts: Sequence[RuleFacts]) -> list[Any]:
+        """RuleInfo of each."""
+        return [rule_info(each, monotonic_ns()) for each in facts]
