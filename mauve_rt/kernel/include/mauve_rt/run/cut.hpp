@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The cut of a change: one atomic word that says whether it is made, and from which instant on.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
+
+namespace mauve {
+
+/// What the cut holds at a moment: the frontier, and whether it is decided.
+///
+/// The frontier is the latest clock at which a participant began to execute with old parts.
+struct CutWord {
+  std::uint64_t bits{0};  // frontier << 2 | off << 1 | closed
+
+  static constexpr std::uint64_t kClosed = 1, kOff = 2;
+  /// Clocks are held between 0 and this: 73 years of nanoseconds.
+  static constexpr time_ns_t kLastClock = kForever >> 2;
+
+  /// An open one with this frontier. [rt]
+  static constexpr CutWord open_at(time_ns_t clock_ns) MAUVE_RT {
+    const time_ns_t held = clock_ns < 0 ? 0 : clock_ns > kLastClock ? kLastClock : clock_ns;
+    return {static_cast<std::uint64_t>(held) << 2};
+  }
+  /// [rt]
+  constexpr bool is_open() const MAUVE_RT { return (bits & (kClosed | kOff)) == 0; }
+  /// The change is made. [rt]
+  constexpr bool is_closed() const MAUVE_RT { return (bits & kClosed) != 0; }
+  /// The change was called off. [rt]
+  constexpr bool is_off() const MAUVE_RT { return (bits & kOff) != 0; }
+  /// [rt]
+  constexpr time_ns_t frontier_ns() const MAUVE_RT { return static_cast<time_ns_t>(bits >> 2); }
+  /// T: of a closed one, the first instant that belongs to the new parts. [rt]
+  constexpr time_ns_t instant_ns() const MAUVE_RT { return frontier_ns() + 1; }
+};
+
+/// A participant raises the cut to a clock before it executes at that clock with old parts. close() makes the change,
+/// call_off() ends it, and both are final. T and the decision are one word, so nothing can come between them.
+///
+/// Every exchange is acq_rel and every look acquires: a thread that sees the word decided sees all that was written before
+/// the decision. A raise that has nothing to raise writes nothing and publishes nothing: the count of the votes does that.
+class Cut {
+ public:
+  constexpr explicit Cut(CutWord word = {}) noexcept : word_(word.bits) {}
+
+  /// [rt]
+  CutWord look() const MAUVE_RT { return {word_.load(std::memory_order_acquire)}; }
+
+  /// Raises an open cut to this clock, if it is not there yet. Returns what the cut is then: open, with the clock not
+  /// beyond its frontier, so the clock belongs to the old parts; or decided. [rt]
+  CutWord raise(time_ns_t clock_ns) MAUVE_RT {
+    const CutWord raised = CutWord::open_at(clock_ns);
+    CutWord seen = look();
+    while (seen.is_open() && seen.frontier_ns() < raised.frontier_ns()) {
+      if (exchange(seen, raised)) return raised;
+    }
+    return seen;
+  }
+
+  /// By the last vote. Returns what the cut is then: closed or off. [rt]
+  CutWord close() MAUVE_RT {
+    CutWord seen = look();
+    while (seen.is_open()) {
+      const CutWord closed{seen.bits | CutWord::kClosed};
+      if (exchange(seen, closed)) return closed;
+    }
+    return seen;
+  }
+
+  /// Whether this call did it: false when the change is made, or was called off before. [rt]
+  bool call_off() MAUVE_RT {
+    CutWord seen = look();
+    while (seen.is_open()) {
+      if (exchange(seen, {seen.bits | CutWord::kOff})) return true;
+    }
+    return false;
+  }
+
+ private:
+  bool exchange(CutWord& seen, CutWord to) MAUVE_RT {
+    return word_.compare_exchange_weak(seen.bits, to.bits, std::memory_order_acq_rel,
+                                       std::memory_order_acquire);
+  }
+
+  std::atomic<std::uint64_t> word_;
+};
+
+}  // namespace mauve
