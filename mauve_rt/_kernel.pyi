@@ -146,7 +146,7 @@ class ComponentDescription:
     shell: Final[str]
     core: Final[str]
     fsm: Final[str]
-    state: Final[str]  # 'UNCONFIGURED', 'STOPPED', 'RUNNING', 'HELD', 'STOPPING', 'FAULTED'
+    state: Final[str]  # 'UNCONFIGURED', 'STOPPED', 'RUNNING', 'STOPPING', 'FAULTED'
     current_state: Final[str]  # FSM state being executed or waited in
     clock_ns: Final[int]
     period_ns: Final[int]
@@ -423,7 +423,7 @@ class ArchitectureDescription:
 
 @final
 class Transaction:
-    """A list of steps that come into force as one, or not at all; nothing happens before Host.commit.
+    """A list of steps that take effect as one, or not at all; nothing happens before Host.commit.
 
     Parts are classes or registered names. Each step returns the transaction.
     """
@@ -435,7 +435,10 @@ class Transaction:
         """A step by the name of its kind, with no object in it; the calls below are the same, typed."""
     def replace_core(self, component: str, core: str | type[Core[Any]]) -> Transaction: ...
     def replace_fsm(self, component: str, fsm: str | type[Fsm[Any, Any]]) -> Transaction:
-        """The new one starts in its initial state, on its own period, on the deployment's epoch."""
+        """The new one goes on in the wait of the same name, where the pending instant lies on its grid.
+
+        Else it starts in its initial state, on its own period, on the deployment's epoch.
+        """
     def replace_shell(self, component: str, shell: str | type[Shell]) -> Transaction:
         """Ports keep their connections by name, properties their values."""
     def set_property(self, component: str, name: str, value: PropertyValue) -> Transaction: ...
@@ -620,10 +623,14 @@ class Host:
         expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
         phase_timeout_ns: int = 1_000_000_000,
-        max_missed: int = 0,
         force: bool = False,
     ) -> TransactionReport:
-        """Carries out a transaction, deployed or not; each component may miss `max_missed` releases for it.
+        """Carries out a transaction, deployed or not.
+
+        It takes effect at one logical instant T: each component takes its change on its own thread, in its
+        wait, before its first release at or after T. No component waits for another one. A component that
+        never comes to a wait stops the change from being made: timeout, and nothing is changed. A component
+        that is late at T takes its change at the end of its overrun. Until then it runs its old parts.
 
         By force: a component that is removed, stopped or given new parts, and whose state does not end within
         the commit's time-out, is stopped by force, as stop() says. It stays FAULTED whatever becomes of the
@@ -639,7 +646,6 @@ class Host:
         dry_run: bool = False,
         expected_revision: int = 0,
         commit_timeout_ns: int = 1_000_000_000,
-        max_missed: int = 0,
         force: bool = False,
     ) -> Committed:
         """As commit(), but waits for no release that follows: ask what it returns."""
@@ -940,15 +946,13 @@ class ActionStep:
 
 @final
 class RuleActions:
-    """What a rule does and undoes; no `undo`: nothing. max_missed: as in Host.commit()."""
+    """What a rule does and undoes; no `undo`: nothing."""
 
     def __init__(
         self,
         do: Sequence[ActionStep],
         *,
-        max_missed: int = 0,
         undo: Sequence[ActionStep] = [],
-        undo_max_missed: int = 0,
     ) -> None: ...
 
 @final

@@ -24,8 +24,8 @@ struct Stall {
   mauve::time_ns_t end_ns;
 };
 
-/// The CPU time of those threads of this process that a witness cannot preempt: the conductor and the watchdog have its
-/// priority. (SCHED_DEADLINE is above them, but the system refuses it to a thread that is bound to one CPU.)
+/// The CPU time of those threads of this process that a witness cannot preempt: the watchdog has its priority.
+/// (SCHED_DEADLINE is above both, but the system refuses it to a thread that is bound to one CPU.)
 class Rivals {
  public:
   /// Of the threads that exist by now.

@@ -87,22 +87,20 @@ class PyCommitted {
 };
 
 std::unique_ptr<PyCommitted> make(PyHost& self, const PyTransaction& steps, bool dry_run,
-                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
-                                  std::int64_t max_missed, bool force) {
+                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns, bool force) {
   Transaction transaction = steps.build(self.registry());
   const py::gil_scoped_release release;
   const TransactionOptions options{.timeouts = timeouts(commit_timeout_ns, 0),
                                    .dry_run = dry_run,
                                    .expected_revision = expected_revision,
-                                   .max_missed = max_missed,
                                    .force = force};
   return std::make_unique<PyCommitted>(self.host().make(std::move(transaction), options));
 }
 
 TransactionReport commit(PyHost& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
-                         time_ns_t phase_timeout_ns, std::int64_t max_missed, bool force) {
-  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, max_missed, force);
+                         time_ns_t phase_timeout_ns, bool force) {
+  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, force);
   const py::gil_scoped_release release;
   return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
@@ -234,10 +232,10 @@ void bind_host(py::module_& module) {
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("max_missed") = 0, py::arg("force") = false)
+           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("force") = false)
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("max_missed") = 0, py::arg("force") = false, py::keep_alive<0, 1>())
+           py::arg("force") = false, py::keep_alive<0, 1>())
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(

@@ -27,7 +27,6 @@ class PythonCore final : public DynamicCore {
   bool adopt(const CoreBase& old) override;
   void take(CoreBase& old) noexcept override;
   time_ns_t budget_ns() const noexcept override;
-  time_ns_t reckoned_budget_ns() const noexcept override { return ms_to_ns(2); }
 
   /// The object of a Python core, else None. Under the interpreter's lock.
   static py::object object_of(const CoreBase& core);

@@ -48,12 +48,11 @@ class PyReflex {
   std::unique_ptr<rules::Reflex> reflex_;
 };
 
-rules::RuleActions rule_actions(rules::ActionSteps steps, std::int64_t max_missed, rules::ActionSteps undo,
-                                std::int64_t undo_max_missed) {
-  return {.do_steps = std::move(steps),
-          .do_options = {.max_missed = max_missed},
-          .undo_steps = std::move(undo),
-          .undo_options = {.max_missed = undo_max_missed}};
+rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo) {
+  rules::RuleActions actions;
+  actions.do_steps = std::move(steps);
+  actions.undo_steps = std::move(undo);
+  return actions;
 }
 
 void bind_actions(py::module_& module) {
@@ -64,8 +63,7 @@ void bind_actions(py::module_& module) {
            }),
            py::arg("kind"), py::arg("target") = "", py::arg("name") = "", py::arg("value") = std::nullopt);
   py::class_<rules::RuleActions>(module, "RuleActions")
-      .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("max_missed") = 0,
-           py::arg("undo") = rules::ActionSteps{}, py::arg("undo_max_missed") = 0);
+      .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("undo") = rules::ActionSteps{});
 }
 
 void bind_told(py::module_& module) {

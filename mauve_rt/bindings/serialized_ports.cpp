@@ -45,8 +45,9 @@ class SerializedWritePort final : public PortBase {
 
   std::string_view representation() const noexcept override { return kSerializedRepresentation; }
   OutputOptions output() const noexcept override { return output_; }
-  void write_zero() noexcept override {
-    if (service_ != nullptr) service_->write(zero_, stamp_ns());
+  using PortBase::write_zero;
+  void write_zero(time_ns_t time_ns) noexcept override {
+    if (service_ != nullptr) service_->write(zero_, time_ns);
   }
   TryWrite try_write_zero() noexcept override {
     return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;

@@ -60,6 +60,7 @@ class SerializedResource : public Resource {
     if (message.size() > max_bytes_) return false;
     {
       const std::lock_guard lock(mutex_);
+      if (!floor_.admits(time_ns)) return true;
       if (!put_in(message, time_ns)) return false;
     }
     written(time_ns);
@@ -70,7 +71,7 @@ class SerializedResource : public Resource {
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
       const std::lock_guard lock(mutex_, std::adopt_lock);
-      if (!put_in(message, time_ns)) return TryWrite::done;
+      if (!floor_.admits(time_ns) || !put_in(message, time_ns)) return TryWrite::done;
     }
     written(time_ns);
     return TryWrite::done;
@@ -102,6 +103,10 @@ class SerializedResource : public Resource {
     TryWrite try_write(std::span<const std::byte> message, time_ns_t time_ns) noexcept override {
       return owner_.try_write(message, time_ns);
     }
+    void raise_floor(time_ns_t instant_ns) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      owner_.floor_.raise(instant_ns);
+    }
 
    private:
     SerializedResource& owner_;
@@ -110,6 +115,7 @@ class SerializedResource : public Resource {
   const SerializedOptions options_;
   const std::size_t max_bytes_;  // of one message
   PiMutex mutex_;
+  WriteFloor floor_;
   Read read_{*this};
   Write write_{*this};
 };

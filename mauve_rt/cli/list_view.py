@@ -11,14 +11,8 @@ from rich.table import Table
 from mauve_rt.cli.views import console, duration
 from mauve_rt.control.state_age import in_words
 
-STATES = (
-    "UNCONFIGURED",
-    "STOPPED",
-    "RUNNING",
-    "HELD",
-    "STOPPING",
-    "FAULTED",
-)  # as mauve_msgs/msg/ComponentInfo
+# As mauve_msgs/msg/ComponentInfo.
+STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
 
@@ -50,7 +44,7 @@ def _components(reply: Any) -> Table:
     for column in ("state", "period", "priority", "cpus", "releases", "overruns"):
         table.add_column(column, no_wrap=True)
     for component in reply.components:
-        state = STATES[component.state]
+        state = STATES.get(component.state, str(component.state))
         table.add_row(
             component.name,
             f"[{_STYLES.get(state, 'default')}]{state}[/]",

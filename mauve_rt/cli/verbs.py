@@ -39,16 +39,6 @@ def _add_timeout(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_max_missed(parser: argparse.ArgumentParser, *, default: int | None = 0) -> None:
-    parser.add_argument(
-        "--max-missed",
-        type=_int64,
-        default=default,
-        metavar="N",
-        help="releases that each component may miss for it (default 0)",
-    )
-
-
 def _add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
@@ -64,7 +54,6 @@ def _add_stop(parser: argparse.ArgumentParser) -> None:
 
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
-    _add_max_missed(parser)
     _add_force(parser)
     parser.add_argument("core", help="the new core, package/Class")
 
@@ -75,7 +64,6 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="check and prepare everything, change nothing")
     _add_record(parser)
     _add_timeout(parser)
-    _add_max_missed(parser, default=None)
     _add_force(parser)
 
 
@@ -119,7 +107,6 @@ def _replace_core(args: argparse.Namespace) -> int:
         component=args.component,
         core=args.core,
         commit_timeout_s=args.timeout,
-        max_missed=args.max_missed,
         force=args.force,
     )
 
@@ -147,7 +134,6 @@ def _reconfigure(args: argparse.Namespace) -> int:
         ],
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
-        max_missed=change.max_missed if args.max_missed is None else args.max_missed,
         force=args.force or change.force,
     )
 
@@ -285,13 +271,6 @@ def _recording(args: argparse.Namespace) -> int:
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
-
-
-def _int64(text: str) -> int:
-    number = int(text)
-    if not -(2**63) <= number < 2**63:
-        raise ValueError
-    return number
 
 
 def _absolute(name: str) -> str:

@@ -6,7 +6,7 @@ from mauve_rt._kernel import ComponentDescription
 from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.steps import MAX_MISSED, Step
+from mauve_rt.model.steps import Step
 from mauve_rt.model.words import did_you_mean, shown
 
 MAX_TIMEOUT_S = 10.0
@@ -26,9 +26,6 @@ def check_form(request: Request) -> None:
     """
     if not math.isfinite(request.timeout_s) or not 0.0 <= request.timeout_s <= MAX_TIMEOUT_S:
         text = f"bad timeout: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {request.timeout_s:g}"
-        raise RefusalError(Code.INVALID, text)
-    if not 0 <= request.max_missed <= MAX_MISSED:
-        text = f"bad max_missed: expected 0 to {MAX_MISSED:,} releases, found {request.max_missed:,}"
         raise RefusalError(Code.INVALID, text)
     if request.clock_ns < 0:
         text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"
@@ -101,5 +98,5 @@ def check_state(step: Step, component: ComponentDescription) -> None:
     """
     if step.kind == "stop" and component.state in ("STOPPED", "UNCONFIGURED"):
         raise RefusalError(Code.NOT_RUNNING, f"component '{component.name}' is already stopped")
-    if step.kind == "start" and component.state in ("RUNNING", "HELD"):
+    if step.kind == "start" and component.state == "RUNNING":
         raise RefusalError(Code.ALREADY_RUNNING, f"component '{component.name}' is already running")

@@ -201,7 +201,6 @@ class Control:
                 dry_run=request.dry_run,
                 expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
-                max_missed=request.max_missed,
                 force=request.force,
             )
         except MauveError as error:

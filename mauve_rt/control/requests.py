@@ -87,7 +87,6 @@ class Request:
     cause: str = ""
     dry_run: bool = False
     timeout_s: float = 0.0  # 0: the default
-    max_missed: int = 0  # releases that each component may miss for it
     force: bool = (
         False  # a component whose state does not end in time is given up: see Host.stop() and commit()
     )

@@ -347,8 +347,8 @@ class Runtime:
 
 def _facts(part: ComponentDescription) -> tuple[object, ...]:
     """What is a change when it changes."""
-    # A component held for a commit, or on its way to a stop, is on its way to something else that counts.
-    state = "RUNNING" if part.state in ("HELD", "STOPPING") else part.state
+    # A component that stops runs until it is STOPPED: only the end of the stop is a change.
+    state = "RUNNING" if part.state == "STOPPING" else part.state
     wiring = [(port.name, port.resource, port.service) for port in part.ports]
     properties = [(item.name, item.value) for item in part.properties]
     return (part.name, state, part.shell, part.core, part.fsm, part.fault, wiring, properties)

@@ -12,7 +12,7 @@ from mauve_rt.supervision.rule import ArchitectureView, ComponentView
 UNKNOWN_S = -1.0
 STATES = {
     getattr(ComponentInfo, name): name
-    for name in ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")
+    for name in ("UNCONFIGURED", "STOPPED", "RUNNING", "STOPPING", "FAULTED")
 }
 
 

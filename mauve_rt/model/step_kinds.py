@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-PRESENT = ("RUNNING", "HELD")  # held: in the middle of a commit
-
 Target = Literal["component", "new component", "resource", "new resource", "all"]
 Name = Literal["", "core", "fsm", "shell", "property", "port"]
 Value = Literal["", "scalar", "resource.service", "section"]
@@ -52,8 +50,8 @@ STEP_KINDS: Mapping[str, StepKind] = {
     "remove_component": StepKind(removes=True, changes_parameters=True),
     "add_resource": StepKind(target="new resource", value="section", is_prepared=False),
     "remove_resource": StepKind(target="resource", removes=True),
-    "start": StepKind(leaves=PRESENT),
+    "start": StepKind(leaves=("RUNNING",)),
     "stop": StepKind(leaves=("STOPPED",)),
-    "configure": StepKind(leaves=("STOPPED", *PRESENT), is_prepared=False),
+    "configure": StepKind(leaves=("STOPPED", "RUNNING"), is_prepared=False),
     "resynchronise": StepKind(target="all", is_prepared=False),
 }

@@ -5,7 +5,6 @@
 - {kind: set_property, target: guidance, name: path_step, value: 0.5}
 - {kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}
 
-Or, where its components may miss releases for it: {max_missed: 2, steps: [...]}.
 Or, where components whose state does not end are given up for it: {force: true, steps: [...]}.
 """
 
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text, Whole
+from mauve_rt.model.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text
 from mauve_rt.model.schema import IDENTIFIER_OR_NONE
 from mauve_rt.model.schema_errors import expected
 from mauve_rt.model.section import Section, setting
@@ -83,15 +82,12 @@ class _StepPart(Kind):
         return Step(form.kind, form.target, form.name, form.value) if len(faults) == before else form
 
 
-MAX_MISSED = 1_000_000
-MISSED = Whole(0, MAX_MISSED)
 STEPS = ListOf(_StepPart(), few=1)
 
 
 class Change(Section):
-    """A transaction: its steps, how many releases each component may miss, whether hung ones are given up."""
+    """A transaction: its steps, and whether it gives up components whose state does not end."""
 
-    max_missed: int = setting(MISSED, default=0)
     force: bool = setting(Flag(), default=False)
     steps: list[Step] = setting(STEPS)
 

@@ -46,9 +46,9 @@ class Core(Configurable, Generic[ShellT]):
     """Base of cores written in Python, for a shell: `class Hover(Core[HoverShell])`."""
 
     budget_ns: ClassVar[int] = 0
-    """The time adopt and take need together: a change with less left before the next release waits. An adopt
-    that takes longer is refused, after a longer take the component is FAULTED. 0: none declared, 2 ms are
-    reckoned with."""
+    """The time that adopt and take need together. A change with less left before the next release waits for
+    the next wait. An adopt that takes longer is refused. After a longer adopt and take the component is
+    FAULTED. 0: none is declared, and no time is checked."""
 
     _shell_class: ClassVar[type[Any]] = Shell
 
@@ -65,12 +65,13 @@ class Core(Configurable, Generic[ShellT]):
     def adopt(self, old: Any) -> bool | None:
         """Look whether to take over from `old`, and copy what is small; False or raising refuses.
 
-        Called on the component's thread inside its wait. `old` is the other core object, None when that is
-        written in C++. After a refusal the old core goes on as if nothing had been asked: leave it as it is.
+        Called on the component's own thread inside its wait. `old` is the other core object, None when that
+        is written in C++. In a change of several components the old core may run on between adopt and take.
+        After a refusal the old core goes on as if nothing had been asked: leave it as it is.
         """
 
     def take(self, old: Any) -> None:
-        """Move bulk data over from `old`, after adopt().
+        """Move data over from `old`, after adopt(): bulk, and what may have changed since adopt().
 
         The change is decided by then: what is raised here is a fault of this core at its first action.
         """

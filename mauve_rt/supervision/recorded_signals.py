@@ -12,6 +12,7 @@ from mauve_rt._kernel import SignalSpec
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.supervision.message_fields import field_value
 from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.supervision.when import When
 from mauve_rt.supervision.when_spec import heard
 from mauve_rt.trace.format.records import Kind, Records
@@ -19,8 +20,12 @@ from mauve_rt.trace.reading.decisions import executors
 from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.reading.trace import Trace
 
-RUNNING = 2.0  # ComponentState
-_STATES: Mapping[int, float] = {Kind.START: RUNNING, Kind.STOP: 1.0, Kind.FAULT: 5.0}
+RUNNING = float(COMPONENT_STATES["RUNNING"])
+_STATES: Mapping[int, float] = {
+    Kind.START: RUNNING,
+    Kind.STOP: float(COMPONENT_STATES["STOPPED"]),
+    Kind.FAULT: float(COMPONENT_STATES["FAULTED"]),
+}
 _COMMITTED = 1
 _DIAGNOSTICS = "/diagnostics"
 _NEVER: Mapping[str, str] = {

@@ -203,13 +203,11 @@ class RemoteRules:
         each = self._watched[wish.rule]
         self._engine.begun(now_ns)
         cause = f"{each.rule.name}: {self._tell()}"
-        undo = each.rule.undo
         request = Request(
             request_id=next(self._ids),
             steps=tuple(each.rule.steps(wish.act)),
             expected_revision=self._revision(),
             cause=cause,
-            max_missed=each.rule.max_missed if wish.act == "do" or undo is None else undo.max_missed,
         )
         each.untouched = False
         self._flight = _Flight(each, wish.act, request, now_ns + ANSWER_TIMEOUT_NS)

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from mauve_rt.model.step_kinds import PRESENT
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.rules import Rule
 
@@ -44,7 +43,7 @@ class ArchitectureView:
         if step.kind == "replace_core":
             return component is not None and component.core == step.name
         if step.kind == "start":
-            return component is not None and component.state in PRESENT
+            return component is not None and component.state == "RUNNING"
         if step.kind == "stop":
             return component is not None and component.state == "STOPPED"
         return None
@@ -54,7 +53,7 @@ class ArchitectureView:
         texts = []
         for name in dict.fromkeys(step.target for step in steps if step.target in self.components):
             view = self.components[name]
-            state = "runs" if view.state in PRESENT else f"is {view.state} with"
+            state = "runs" if view.state == "RUNNING" else f"is {view.state} with"
             texts.append(f"{name} {state} {view.core}")
         return ", ".join(texts)
 
@@ -79,4 +78,4 @@ class WatchedRule:
 
     def absent(self, view: ArchitectureView) -> str:
         """A component that it is about and that does not run; empty: all do."""
-        return min((name for name in self.rule.targets() if view.state_of(name) not in PRESENT), default="")
+        return min((name for name in self.rule.targets() if view.state_of(name) != "RUNNING"), default="")

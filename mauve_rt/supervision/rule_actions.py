@@ -64,12 +64,7 @@ def _actions(file: RulesFile, index: int, runtime: Runtime) -> RuleActions:
     places, steps = zip(*_placed(rule, index), strict=True)
     done = _planned(file, places, rule.do, runtime)
     both = _planned(file, places, steps, runtime)  # what undoes is about what was done
-    return RuleActions(
-        done,
-        max_missed=rule.max_missed,
-        undo=both[len(done) :],
-        undo_max_missed=rule.undo.max_missed if rule.undo is not None else 0,
-    )
+    return RuleActions(done, undo=both[len(done) :])
 
 
 def _placed(rule: Rule, index: int) -> list[tuple[Location, Step]]:

@@ -4,9 +4,9 @@ In the executor: what the condition itself names as a time passes, or what happe
 thread of the rules decides and commits a transaction that was ready. A component that does not overrun
 comes to its wait before its next instant, where it goes on as the new part: it is released within one of
 its periods from then on. Where the instant comes while the commit is on its way the component goes, and
-is released anew one period later: so the time of the commit counts, and one period. Of several components
-each may go so before the others have come. That all are at their waits at once within one period of the
-slowest is assumed.
+is released anew one period later: so the time of the commit counts, and one period. Several components
+each agree in a wait of their own, so the last one agrees within one period of the slowest. Each component
+then takes its new part at its next release, within one period more.
 
 In the supervisor the request travels and the new part is built when it is asked for; both are assumed.
 """
@@ -92,8 +92,8 @@ def _release(names: list[str], periods_s: Mapping[str, float]) -> Iterator[Bound
     elif names:
         slowest = max(names, key=lambda name: periods_s[name])
         if len(names) > 1:
-            all_ = f"until {', '.join(names)} are at their waits at once: one period of {slowest}"
-            yield BoundPart(all_, periods_s[slowest], assumed=True)
+            agreed = f"until {', '.join(names)} have agreed, each in its wait: one period of {slowest}"
+            yield BoundPart(agreed, periods_s[slowest])
         yield BoundPart(f"one period of {slowest}", periods_s[slowest])
 
 

@@ -11,7 +11,6 @@
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
         undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
-        max_missed: 0               # releases that each component may miss for `do`; in undo: for that
 
 What may stand in `when`: see supervision/when.py. One file serves both: the executor runs the rules that are
 `in: executor`; its supervisor runs the others, and those too where the executor does not. Names of topics and
@@ -27,7 +26,7 @@ from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.steps import MISSED, STEPS, Step, dotted, form_error
+from mauve_rt.model.steps import STEPS, Step, dotted, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
 from mauve_rt.supervision.outside import inside_only
 from mauve_rt.supervision.when import When, WhenPart
@@ -42,7 +41,6 @@ class Undo(Section):
 
     for_s: float = setting(_SECONDS, default=0.0)
     do: list[Step] = setting(STEPS)
-    max_missed: int = setting(MISSED, default=0)
 
 
 class Rule(Section):
@@ -58,7 +56,6 @@ class Rule(Section):
     do: list[Step] = setting(STEPS)
     undo: Undo | None = setting(Part(Undo), default=None)
     cooldown_s: float = setting(_SECONDS, default=0.0)
-    max_missed: int = setting(MISSED, default=0)
 
     def steps(self, act: str) -> list[Step]:
         """The transaction of `do` or `undo`."""

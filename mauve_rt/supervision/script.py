@@ -26,6 +26,7 @@ from mauve_rt.model.steps import form_error
 from mauve_rt.model.words import did_you_mean, listed
 from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.supervision.when_spec import heard
 
 LONGEST_S = 3600.0
@@ -44,11 +45,11 @@ _SIGNALS: Mapping[str, tuple[str, ...]] = {
     "change": ("change",),
 }
 _COUNTED = ("overruns", "late", "over_declared")
-# The values of what has words for them, from 0 on.
-_WORDS: Mapping[str, tuple[str, ...]] = {
-    "state": ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED"),
-    "peer": ("unheard", "there", "another_instance", "faulted", "gone"),
-    "diagnostic": ("OK", "WARN", "ERROR", "STALE"),
+# The words for values, with their numbers.
+_WORDS: Mapping[str, Mapping[str, int]] = {
+    "state": COMPONENT_STATES,
+    "peer": {"unheard": 0, "there": 1, "another_instance": 2, "faulted": 3, "gone": 4},
+    "diagnostic": {"OK": 0, "WARN": 1, "ERROR": 2, "STALE": 3},
 }
 
 
@@ -79,7 +80,7 @@ class Heard(Section):
         if len(named) != 1:
             found = " and ".join(named) or "none of them"
             return Fault((), "form", limit=f"exactly one of {listed(_SIGNALS)}", found=found)
-        words = _WORDS.get(named[0], ())
+        words = tuple(_WORDS.get(named[0], ()))
         if words and self.word is None:
             return Fault((), "missing", limit="is")
         if words and self.word not in words:
@@ -113,7 +114,7 @@ class Heard(Section):
 
     def _value_of(self, number: int) -> float:
         if self.word is not None:
-            return float(_WORDS[self.what].index(self.word))
+            return float(_WORDS[self.what][self.word])
         if self.what in _COUNTED:
             return float(number)
         if self.what == "released":  # with it the component's period

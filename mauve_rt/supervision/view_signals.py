@@ -1,10 +1,18 @@
 """What rules outside of an executor hear of its components, from ~/state."""
 
+from collections.abc import Mapping
+
 from mauve_rt._kernel import RuleEngine, SignalSpec
 from mauve_rt.supervision.rule import ArchitectureView
 
-# In the order of the kernel's ComponentState.
-COMPONENT_STATES = ("UNCONFIGURED", "STOPPED", "RUNNING", "HELD", "STOPPING", "FAULTED")
+# Numbers of the kernel's ComponentState; mauve_msgs/msg/ComponentInfo has the same.
+COMPONENT_STATES: Mapping[str, int] = {
+    "UNCONFIGURED": 0,
+    "STOPPED": 1,
+    "RUNNING": 2,
+    "STOPPING": 4,
+    "FAULTED": 5,
+}
 
 
 class ViewSignals:
@@ -22,7 +30,7 @@ class ViewSignals:
             state = view.state_of(spec.target)
             is_news = before is None or before.state_of(spec.target) != state
             if is_news and state in COMPONENT_STATES:
-                self._engine.tell(number, now_ns, float(COMPONENT_STATES.index(state)))
+                self._engine.tell(number, now_ns, float(COMPONENT_STATES[state]))
         for number, spec in self._changes:
             if before is not None and _is_changed(spec, before, view):
                 self._engine.tell(number, now_ns)

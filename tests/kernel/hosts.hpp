@@ -23,7 +23,7 @@ class OnThreads {
     for (const auto& component : architecture_.components()) {
       const Task& task = component->task();
       const auto is_done = [&] {
-        return settled(task.state()) != ComponentState::running || clock_of(*component) > until;
+        return task.state() != ComponentState::running || clock_of(*component) > until;
       };
       wait_until(is_done, "the component's releases");
     }
@@ -114,9 +114,7 @@ class Hosted : public ::testing::Test {
     if (options.timeouts.commit_ns == CommitTimeouts{}.commit_ns) options.timeouts.commit_ns = s_to_ns(10);
     return host().commit(std::move(transaction), options);
   }
-  ComponentState state(const std::string& name) const {
-    return settled(architecture.component(name).task().state());
-  }
+  ComponentState state(const std::string& name) const { return architecture.component(name).task().state(); }
   std::uint64_t releases(const std::string& name) const {
     return architecture.component(name).task().statistics().releases.load();
   }
@@ -157,9 +155,9 @@ class AnyHost : public Way {
   void stop(const std::string& name, time_ns_t timeout_ns = s_to_ns(10)) {
     this->host().stop(name, timeout_ns);
   }
-  TransactionReport commit(Transaction transaction) {
+  TransactionReport commit(Transaction transaction, time_ns_t phase_ns = s_to_ns(30)) {
     return this->host().commit(std::move(transaction),
-                               {.timeouts = {.commit_ns = s_to_ns(30), .phase_ns = s_to_ns(30)}});
+                               {.timeouts = {.commit_ns = s_to_ns(30), .phase_ns = phase_ns}});
   }
   time_ns_t now_ns() { return this->host().now_ns(); }
 };
@@ -188,7 +186,7 @@ class OnBothHosts : public ::testing::Test {
     host.until([&] { return core(component).runs.load() >= runs; }, "the component to run");
   }
   void wait_state(Component& component, ComponentState state) {
-    host.until([&] { return settled(component.task().state()) == state; }, "the component's state");
+    host.until([&] { return component.task().state() == state; }, "the component's state");
   }
   /// The code of the error that the action throws; a failure when it throws none.
   template <typename Action>

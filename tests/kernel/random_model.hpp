@@ -70,8 +70,8 @@ struct Expected {
 
   Plan plan() const {
     const time_ns_t unit = ms_to_ns(period_ms);
-    if (fsm == "r/Syncopated") return {{unit, 2 * unit}};
-    return {{fsm == "r/Double" ? 2 * unit : unit}};
+    if (fsm == "r/Syncopated") return {{unit, 2 * unit}, {"ShortPause", "LongPause"}};
+    return {{fsm == "r/Double" ? 2 * unit : unit}, {"Pause"}};
   }
 };
 

@@ -99,6 +99,14 @@ class PyHeld(Core):
             raise ValueError("set to something unheard of")
 
 
+class PyAgreeing(PyCounter):
+    """Says by a file that its label names that it was asked whether it takes over."""
+
+    def adopt(self, _old: object) -> None:
+        """Agree."""
+        Path(self.shell.label.value).touch()
+
+
 class PyAsking(PyCounter):
     """Asks its own executor for what its label says while it is configured, as nobody should."""
 

@@ -33,21 +33,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "rosbags from which timing is proved": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
-    "A change has no component held past its next release": (
-        "ros/executor/test_stop_wins.py::test_nobody_is_held_for_who_still_executes",
+    "In a change no component waits for another one": (
+        "ros/executor/test_stop_wins.py::test_no_component_waits_for_one_that_still_executes",
     ),
-    "where each may miss some for it, `--max-missed 2` says how many": (
-        "Rule10Missed.AllowedReleasesAreSkippedAndReportedAndAreNoOverrun",
-        "python/cli/test_verbs.py::test_a_steps_file_may_allow_releases_to_be_missed",
-    ),
-    "Whoever missed one is named in the outcome": (
+    "The outcome names each component that missed a release": (
         "python/control/test_control.py::test_releases_that_were_missed_are_in_the_message",
     ),
     "A stop waits for nobody": (
         "ros/executor/test_beside.py::test_a_stop_by_reconfigure_waits_for_no_preparation",
         "ros/executor/test_beside.py::test_a_stop_waits_for_no_stop_of_another_component",
     ),
-    "a change under way that the component takes part in is called off": (
+    "a change of its component that is not decided yet is called off": (
         "ros/executor/test_stop_wins.py::test_a_stop_calls_off_a_commit_that_waits_for_another_component",
         "ros/executor/test_beside.py::test_a_stop_of_its_own_component_calls_the_change_off",
     ),
@@ -554,7 +550,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: , releases missed",
     ),
     "and nobody else is touched": ("bench: , releases missed by ",),
-    "A new fsm or shell begins in its initial state": (
+    "A new fsm goes on in the wait of the same name": (
+        "Rule7Restart.AnFsmThatHasTheWaitGoesOnInItsPlace",
+        "Rule7Restart.NoReleaseOfAnFsmWithSeveralWaitsIsLostInAnySwap",
+        "Rule7RestartOnThreads.AnFsmWithSeveralWaitsKeepsItsPlace",
+    ),
+    "A new shell brings another instance of the fsm": ("SporadicChanges.AnotherShellLosesNoEventEither",),
+    "Else it begins in its initial state": (
         "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
         "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
     ),
@@ -581,32 +583,48 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "The time between the thread's `parked` and `armed` records is the **blackout**": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
-    "that come into force together or not at all": (
+    "take effect together or not at all": (
         "Rule10Random.TransactionsDoWhatTheModelSaysOrNothing",
         "Rule10Transaction.CoresAndPropertiesOfTwoComponentsChangeAtOnce",
         "bench: : architectures other than described",
     ),
-    "then the components it touches meet, each in its wait": (
+    "then each component agrees on its own thread, in a wait of its own": (
         "Rule10Transaction.WiresAreSwappedBetweenTwoRunningComponents",
+        "Rule10Commit.WhileAnAdoptLastsTheOthersGoOn",
     ),
-    "leaves for its own instant and comes back, so it misses no release": (
+    "With the last agreement the change has one logical instant T": (
+        "Cut.InstantIsTheClockAfterTheFrontier",
+        "ChangeModel.HoldsInEveryInterleaving",
+    ),
+    "No component waits for another one, so none misses a release for it": (
         "Rule7Threads.WhoWaitsForALongExecutionOfAnotherMissesNoRelease",
+        "ros/executor/test_stop_wins.py::test_no_component_waits_for_one_that_still_executes",
     ),
-    "until all have met or the commit time-out (`--timeout`) refuses the transaction": (
+    "commit time-out (`--timeout`) refuses the transaction": (
         "Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",
-        "Rule10Gate.WhoWaitsInVainIsNeverHeldOverItsInstant",
     ),
-    "A request may allow some releases to be missed; the report tells how many were": (
-        "Rule10Missed.AllowedReleasesAreSkippedAndReportedAndAreNoOverrun",
+    "A stop, a fault or a shutdown before T is fixed calls the commit off and waits for nobody": (
+        "Rule10Commit.AStopCallsACommitOffAndWaitsForNobody",
+        "Rule10Commit.AFaultCallsTheCommitOff",
+        "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
-    "A stop, a fault or a shutdown meanwhile calls the commit off and waits for nobody": (
-        "Rule10Gate.AStopCallsACommitOffAndWaitsForNobody",
-        "Rule10Gate.AFaultCallsTheCommitOff",
-        "Rule10Gate.TheConductorCallsOffWhatIsUnderWay",
+    "A component that is late at T takes its change at the end of its overrun": (
+        "ChangeModel.HoldsInEveryInterleaving",
+        "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
     ),
-    "an adopt that takes longer refuses the change, after a longer take the component is `FAULTED`": (
-        "Rule10Gate.AnAdoptOverItsDeclaredBudgetIsRefused",
-        "Rule10Gate.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
+    "to a resource whose writer has changed are dropped": (
+        "WeakenedChangeModel.Breaks",
+        "Rule10Floor.WhatALateOneWritesToAnEndThatHasMovedIsDropped",
+    ),
+    "bring a new resource in the transaction and rewire both ends": (
+        "Rule10Transaction.AnotherChainIsAddedAndWiredInAndTheOldOneRemoved",
+    ),
+    "an adopt that takes longer refuses the change, after a longer adopt and take the component": (
+        "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
+        "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
+    ),
+    "Where no budget is declared, none is checked": (
+        "Rule10Commit.WhoIsOverItsBudgetIsNamedAndNobodyElse",
     ),
     "leaves the architecture as it was, and the error names the step": (
         "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
@@ -884,6 +902,7 @@ PROMISE_NOTHING = (
     "An fsm may also wait for an *event*",
     "**Resources** hold data and offer services that ports connect to",
     "[0]}}` says how urgently it runs",
+    "T is an instant of the components' clocks",
     "For the common ROS types architecture files name them directly",
     "Architecture files are YAML",
     "To grant the rights to a group `realtime`",

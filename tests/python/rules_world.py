@@ -22,7 +22,6 @@ def rule(
     target: str = "exploration",
     undo: bool | list[dict[str, object]] = True,
     undo_for_s: float = 3.0,
-    undo_max_missed: int = 0,
     usual: str = USUAL,
     **changes: object,
 ) -> Rule:
@@ -34,7 +33,7 @@ def rule(
     if undo:
         back = [{"kind": "replace_core", "target": target, "name": usual}]
         do = back if undo is True else undo
-        content["undo"] = {"for_s": undo_for_s, "do": do, "max_missed": undo_max_missed}
+        content["undo"] = {"for_s": undo_for_s, "do": do}
     return Rule(**content | changes)
 
 

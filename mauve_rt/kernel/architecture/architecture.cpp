@@ -53,9 +53,11 @@ Architecture::~Architecture() {
     const auto first = std::partition(components_.begin(), components_.end(), has_ended);
     std::for_each(first, components_.end(), [](const auto& component) { component->task().detach_thread(); });
     keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components_.end()));
+    keep_for_ever(std::move(open_));  // a thread that was left behind may not have taken its change
     components_.erase(first, components_.end());
     resources_.clear();
   }
+  open_.clear();
   Configurable::cleanup();
 }
 
@@ -72,15 +74,8 @@ void Architecture::cleanup() {
 std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
                                                       const TransactionOptions& options) {
   const std::lock_guard change(change_lock_);
-  Runner* host = nullptr;
   std::unique_lock<std::mutex> use;
-  {
-    const std::lock_guard lock(host_mutex_);
-    host = host_;
-    // Only its end waits for that. Tried, as nobody has it: changes are made one at a time, and a host that ends was
-    // released before. A hook may shut down the host, which takes these locks the other way round.
-    if (host != nullptr) use = host->use();
-  }
+  Runner* const host = use_host(use);
   auto work = std::make_unique<TransactionCommit>(*this, host, options);
   work->make(std::move(transaction));
   return work;
@@ -106,12 +101,45 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
   return make_one(std::move(transaction), timeouts)->report(timeouts.phase_ns).steps.front();
 }
 
-void Architecture::settle_prepared() noexcept {
-  for (PreparedChange* prepared : prepared_) prepared->settle();
+void Architecture::settle_changes() noexcept {
+  for (OpenChange* prepared : prepared_) prepared->settle();
+  std::erase_if(open_, [](const auto& change) { return change->settle(); });
+  has_open_.store(!open_.empty(), std::memory_order_relaxed);  // relaxed: a hint
+}
+
+void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
+  open_.push_back(std::move(change));
+  has_open_.store(true, std::memory_order_relaxed);  // relaxed: a hint
+}
+
+void Architecture::throw_late(time_ns_t waited_ns) const {
+  for (const auto& change : open_) {
+    if (const Task* late = change->find_late())
+      late->throw_state_running("the component has not taken an earlier change yet; nothing was changed",
+                                waited_ns, "try again when its state has ended, or stop it by force");
+  }
+  throw Error(ErrorCode::timeout, "an earlier change is not completed yet; nothing was changed",
+              {.remedy = "try again"});
+}
+
+void Architecture::settle_if_idle() noexcept {
+  if (!has_open_.load(std::memory_order_relaxed) || !change_lock_.try_lock()) return;  // relaxed: a hint
+  const std::lock_guard change(change_lock_, std::adopt_lock);
+  std::unique_lock<std::mutex> use;
+  use_host(use);
+  settle_changes();
+}
+
+Runner* Architecture::use_host(std::unique_lock<std::mutex>& use) const {
+  const std::lock_guard lock(host_mutex_);
+  // Only its end waits for that. Tried, as nobody has it: changes are made one at a time, and a host that ends was
+  // released before. A hook may shut down the host, which takes these locks the other way round.
+  if (host_ != nullptr) use = host_->use();
+  return host_;
 }
 
 void Architecture::drop_stale_prepared() noexcept {
-  for (PreparedChange* prepared : prepared_) prepared->drop_if_stale();
+  for (OpenChange* prepared : prepared_) prepared->drop_if_stale();
 }
 
 Runner* Architecture::host() const {

@@ -14,7 +14,7 @@ ComponentFacts facts_of(Component& component, time_ns_t epoch_ns) {
   Task& task = component.task();
   return {.name = component.name(),
           .parts = component.shown(),
-          .state = settled(task.state()),
+          .state = task.state(),
           .period_ns = task.context().period_ns.load(std::memory_order_relaxed),
           .reference_ns = task.grid().reference_ns == 0 ? 0 : later_by(task.grid().reference_ns, -epoch_ns),
           .settings = task.settings(),

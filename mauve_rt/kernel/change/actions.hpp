@@ -10,7 +10,7 @@
 
 namespace mauve {
 
-/// Refuses the commit when a component is no longer as the draft found it. Comes first.
+/// Refuses the commit when a component is no longer as the draft found it. A check: it has no task.
 class StateGuard final : public CommitAction {
  public:
   /// A participant and the state it was found in. [non-rt], before the commit.
@@ -28,7 +28,6 @@ class StateGuard final : public CommitAction {
     return true;
   }
   void take() noexcept override {}
-  time_ns_t budget_ns() const noexcept override { return us_to_ns(1); }
   /// The one that changed. [non-rt], after a refusal.
   const Task* changed() const noexcept { return changed_; }
 
@@ -41,22 +40,15 @@ class StateGuard final : public CommitAction {
   const Task* changed_{nullptr};
 };
 
-/// Gives the architecture a new epoch; the participants take it as they go on.
-class NewEpoch final : public CommitAction {
+/// Takes over a writer's end that another component of the same change has: what that one writes before it has taken the change
+/// too is dropped.
+class FloorChange final : public CommitAction {
  public:
-  NewEpoch(Architecture& architecture, const Clock& clock) : architecture_(architecture), clock_(clock) {}
-  void take() noexcept override {
-    epoch_ns_ = clock_.now_ns() + kDeploymentLead;
-    architecture_.set_deployment_epoch(epoch_ns_);
-  }
-  time_ns_t budget_ns() const noexcept override { return us_to_ns(1); }
-  /// Where participants find it, once it was taken.
-  const time_ns_t& epoch_ns() const noexcept { return epoch_ns_; }
+  explicit FloorChange(ServiceBase& service) : service_(service) {}
+  void take() noexcept override { service_.raise_floor(instant_ns); }
 
  private:
-  Architecture& architecture_;
-  const Clock& clock_;
-  time_ns_t epoch_ns_{0};
+  ServiceBase& service_;
 };
 
 /// Exchanges a port's connection for one made ready.
@@ -80,7 +72,7 @@ class WiringChange final : public CommitAction {
 ///
 /// | member | written by             | read by | order                                  |
 /// | ------ | ---------------------- | ------- | -------------------------------------- |
-/// | live_  | who makes the change   | writers | release: what was changed before it    |
+/// | live_  | who takes the change   | writers | release: what was changed before it    |
 /// | input_ | [setup]                | writers | listening publishes it                 |
 class ListenerChange final : public CommitAction, public EventListener {
  public:
@@ -131,7 +123,7 @@ class Retreat final : public CommitAction {
   /// Whose component it is. [non-rt], before the commit.
   void set_place(const Participant& place) noexcept { place_ = &place; }
   void take() noexcept override {
-    if (place_->in_flight) place_->task->write_outputs(false);
+    if (place_->in_flight) place_->task->write_outputs(false, instant_ns - 1);
     for (auto& [port, connection] : ports_) {
       if (place_->left_behind) {
         port->leave_behind();  // its thread still uses it
@@ -139,9 +131,6 @@ class Retreat final : public CommitAction {
         port->swap(connection);
       }
     }
-  }
-  time_ns_t budget_ns() const noexcept override {
-    return us_to_ns(5) * static_cast<time_ns_t>(ports_.size() + 1);
   }
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 

@@ -2,6 +2,7 @@
 #include "change/draft.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "parts/lookup.hpp"
 
@@ -11,7 +12,7 @@ namespace {
 
 DraftComponent present(std::shared_ptr<Component> component) {
   DraftComponent draft;
-  draft.state = settled(component->task().state());
+  draft.state = component->task().state();
   draft.ran = draft.runs = draft.state == ComponentState::running;
   for (const auto& port : component->shell().ports()) {
     if (!port->is_connected()) continue;
@@ -60,8 +61,9 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
 void Draft::claim(const std::shared_ptr<Component>& component) {
   claimed_.reserve(claimed_.size() + 1);
   const std::lock_guard gate(architecture_.commit_gate().mutex);
-  if (component->change_mark().is_unsettled()) {
-    throw Error(ErrorCode::wrong_revision, "a prepared change of the component came meanwhile",
+  // A thread that was left behind takes no change any more: what comes now removes its component.
+  if (component->change_mark().is_unsettled() && !component->task().is_left_behind()) {
+    throw Error(ErrorCode::wrong_revision, "an earlier change of the component is not completed yet",
                 {.component = component->name(), .remedy = "look at it again, then decide again"});
   }
   component->change_mark().claim();
@@ -73,6 +75,15 @@ void Draft::release(bool changed) noexcept {
   const std::lock_guard gate(architecture_.commit_gate().mutex);
   for (const auto& component : claimed_) component->change_mark().release(changed);
   claimed_.clear();
+}
+
+std::vector<std::shared_ptr<Component>> Draft::release_unsettled() noexcept {
+  const std::lock_guard gate(architecture_.commit_gate().mutex);
+  for (const auto& component : claimed_) {
+    component->change_mark().unsettle();
+    component->change_mark().release(true);
+  }
+  return std::exchange(claimed_, {});
 }
 
 bool Draft::is_structural() const noexcept {

@@ -34,7 +34,7 @@ struct DraftProperty {
 struct DraftComponent {
   std::shared_ptr<Component> component;
   bool is_added{false};
-  ComponentState state{ComponentState::unconfigured};  // as the draft found it; HELD is RUNNING
+  ComponentState state{ComponentState::unconfigured};  // as the draft found it
   bool ran{false};
   bool runs{false};      // afterwards
   bool restarts{false};  // because it was stopped and started
@@ -103,6 +103,8 @@ class Draft {
 
   /// Every component that was there before and is touched is claimed until then: no prepared commit changes it.
   void release(bool changed) noexcept;
+  /// The change is made, and a late component has not taken it yet: no change claims these until they are settled.
+  std::vector<std::shared_ptr<Component>> release_unsettled() noexcept;
   const std::vector<std::shared_ptr<Component>>& claimed() const noexcept { return claimed_; }
   /// Whether it adds or removes something, wires a port, or replaces a shell or an fsm.
   bool is_structural() const noexcept;

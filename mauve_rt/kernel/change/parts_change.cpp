@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Changes to a component: new parts, and property values.
+#include <map>
+
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/component.hpp"
 
@@ -118,6 +120,20 @@ void PartsChange::prepare_parts() {
     if (state->event != nullptr) state->event->mute();  // until the commit
   }
   component_.update_listening(*parts_.fsm);
+  find_kept_waits();
+}
+
+/// By name, of the fsm that goes out: a time wait for a time wait, an event wait for an event wait.
+void PartsChange::find_kept_waits() {
+  kept_waits_.clear();
+  const std::map<const State*, time_ns_t> ends_ns = wait_ends_ns(parts_.fsm->initial());
+  for (const auto& before : component_.parts_.fsm->states()) {
+    if (!before->is_wait) continue;
+    for (const auto& [now, end_ns] : ends_ns) {
+      if (now->name != before->name || (now->event == nullptr) != (before->event == nullptr)) continue;
+      kept_waits_.push_back({before.get(), now, period_ns_ != 0 ? end_ns % period_ns_ : 0});
+    }
+  }
 }
 
 bool PartsChange::adopt() {
@@ -145,24 +161,19 @@ void PartsChange::take() noexcept {
   std::swap(binding_, component_.binding_);
   taken_ = true;
   if (unready_) return;
-  if (parts_.fsm != nullptr) take_over_events(*parts_.fsm);
+  if (parts_.fsm != nullptr)
+    take_over_events(*parts_.fsm, component_.task_.keep_place(kept_waits_, period_ns_));
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
 }
 
 /// By the fsm that was just put in; `before` has gone out.
-void PartsChange::take_over_events(const FsmBase& before) noexcept {
+void PartsChange::take_over_events(const FsmBase& before, bool keeps_place) noexcept {
   const FsmBase& now = *component_.parts_.fsm;
-  component_.task_.leave_event_to(now.initial());
+  if (!keeps_place) component_.task_.leave_event_to(now.initial());
   for (const auto& state : now.states()) {
     if (state->event != nullptr) state->event->take_over(before.states());
   }
-}
-
-time_ns_t PartsChange::budget_ns() const noexcept {
-  if (parts_.core == nullptr) return CommitAction::budget_ns();
-  const time_ns_t declared = parts_.core->budget_ns();
-  return declared != 0 ? declared : parts_.core->reckoned_budget_ns();
 }
 
 time_ns_t PartsChange::declared_ns() const noexcept {

@@ -76,7 +76,6 @@ Action& TransactionCommit::Work::keep(const Component& component, std::unique_pt
 }
 
 void TransactionCommit::Work::prepare() {
-  if (draft_->resynchronise_step() != 0) prepare_epoch();
   for (DraftResource& resource : draft_->resources())
     at_step(resource.added_step, [&] { prepare_resource(resource); });
   for (DraftComponent& component : draft_->removed_components())
@@ -113,19 +112,14 @@ void TransactionCommit::Work::prepare_added(DraftComponent& added) {
   component.set_parts(std::move(added.fresh), added.make_fsm);
   set_all(component.shell(), added.properties);
   connect_all(component.shell(), added.wires);
+  for (const auto& [name, wire] : added.wires) prepare_floor(component, *wire.service);
   if (!architecture_.is_configured()) return;
   component.configure();
   if (!deployed_ || options_.dry_run) return;
   Task& task = component.task();
   task.join(architecture_.deployment_epoch_ns());
   host_->attach(task);
-  if (added.runs || new_epoch_ != nullptr) changes_.push_back({.draft = &added});
-}
-
-void TransactionCommit::Work::prepare_epoch() {
-  auto epoch = std::make_unique<NewEpoch>(architecture_, host_->clock());
-  new_epoch_ = epoch.get();
-  actions_.push_back(std::move(epoch));
+  if (added.runs || draft_->resynchronise_step() != 0) changes_.push_back({.draft = &added});
 }
 
 void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
@@ -179,6 +173,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   if (draft.shell_step != 0) {
     set_all(change.parts->shell(), draft.properties);
     connect_all(change.parts->shell(), draft.wires);
+    for (const auto& [name, wire] : draft.wires) prepare_floor(component, *wire.service);
     // The old ports let go in the commit, before the new ones are used.
     for (const auto& port : component.shell().ports()) {
       if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
@@ -201,9 +196,29 @@ void TransactionCommit::Work::prepare_wiring(Change& change) {
     const auto before = draft.wires_before.find(name);
     if (before != draft.wires_before.end() && before->second.service == wire.service) continue;
     PortBase& port = component.require_port(name);
+    prepare_floor(component, *wire.service);
     keep(component, std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
     prepare_listening(change, port, *wire.service);
   }
+}
+
+/// Where the component takes over the end of one that runs and loses it.
+void TransactionCommit::Work::prepare_floor(const Component& component, ServiceBase& service) {
+  if (service.kind() != PortKind::write) return;
+  const auto leads_there = [&](const std::map<std::string, Wire>& wires) {
+    return std::any_of(wires.begin(), wires.end(),
+                       [&](const auto& wire) { return wire.second.service == &service; });
+  };
+  const auto loses_it = [&](const DraftComponent& other) {
+    return other.ran && leads_there(other.wires_before) && !leads_there(other.wires);
+  };
+  const auto has_it = [&](const DraftComponent& other) {
+    return other.ran && leads_there(other.wires_before);
+  };
+  const auto& kept = draft_->components();
+  const auto& removed = draft_->removed_components();
+  if (std::any_of(kept.begin(), kept.end(), loses_it) || std::any_of(removed.begin(), removed.end(), has_it))
+    keep(component, std::make_unique<FloorChange>(service));
 }
 
 void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
@@ -249,8 +264,8 @@ void TransactionCommit::Work::leave_behind() {
     std::vector<std::unique_ptr<PartsChange>> parts;
     std::unique_ptr<Commit> commit;
   };
-  if (commit_ == nullptr || !commit_->is_abandoned()) return;
-  Task& task = *commit_->maker()->task;
+  if (commit_ == nullptr || commit_->kept_by() == nullptr) return;
+  Task& task = *commit_->kept_by();
   auto used = std::make_shared<Used>();
   for (Change& change : changes_) used->parts.push_back(std::move(change.parts));
   used->actions = std::move(actions_);

@@ -55,7 +55,7 @@ class PreparedTransaction::State {
       : architecture(its_architecture),
         host(its_host),
         deployment(its_host.deployments()),
-        work(std::make_unique<TransactionCommit::Work>(its_architecture, &its_host, options)) {}
+        work(std::make_shared<TransactionCommit::Work>(its_architecture, &its_host, options)) {}
 
   /// Once false, false for ever, but for a change under way that is refused.
   bool is_untouched() const MAUVE_RT {
@@ -68,12 +68,12 @@ class PreparedTransaction::State {
     if (is_dropped.load(std::memory_order_acquire)) return false;
     if (!host.is_deployed() || host.deployments() != deployment) return false;
     return is_untouched() && std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
-             return settled(touched.component->task().state()) == touched.state;
+             return touched.component->task().state() == touched.state;
            });
   }
   /// The gate held, all current.
   PreparedOutcome commit(time_ns_t until_ns) noexcept {
-    using Outcome = PreparedCommit::Outcome;
+    using Outcome = Commit::Outcome;
     switch (work->commit_prepared(until_ns)) {
       case Outcome::made:
         break;
@@ -94,8 +94,7 @@ class PreparedTransaction::State {
   Architecture& architecture;
   Runner& host;
   const std::uint32_t deployment;
-  std::unique_ptr<TransactionCommit::Work> work;  // nullptr: let go of
-  std::shared_ptr<Conductor> conductor{};
+  std::shared_ptr<TransactionCommit::Work> work;  // nullptr: let go of
   TransactionCommit::Work::Basis basis{};
   time_ns_t phase_ns{0};
   std::size_t memory_bytes{0};
@@ -116,7 +115,6 @@ PreparedTransaction::PreparedTransaction(Architecture& architecture, Runner& hos
   state_ = std::make_unique<State>(architecture, host, options);
   state_->phase_ns = options.timeouts.phase_ns;
   state_->basis = state_->work->prepare_for_later(std::move(transaction));
-  state_->conductor = state_->work->conductor();
   architecture.enlist(*this);
   const std::size_t after = allocated_bytes();
   state_->memory_bytes = sizeof(*this) + sizeof(State) + (after > before ? after - before : 0);
@@ -125,8 +123,14 @@ PreparedTransaction::PreparedTransaction(Architecture& architecture, Runner& hos
 PreparedTransaction::~PreparedTransaction() {
   const auto change = state_->architecture.change_lock().join();
   state_->architecture.delist(*this);
-  settle();
-  let_go();
+  if (settle()) return;
+  if (state_->phase.load(std::memory_order_acquire) == State::kCommitted) {
+    std::vector<std::shared_ptr<Component>> unsettled;
+    for (const auto& touched : state_->basis.touched) unsettled.push_back(touched.component);
+    state_->work->keep_open(std::move(unsettled));
+  } else {
+    let_go();
+  }
 }
 
 bool PreparedTransaction::is_current() const noexcept {
@@ -137,10 +141,11 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
   State& state = *state_;
   if (state.used.exchange(true, std::memory_order_acq_rel)) return PreparedOutcome::stale;
   const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
-  PiMutex& gate = state.architecture.commit_gate().mutex;
-  if (state.conductor != nullptr) state.conductor->press();
+  CommitGate& commit_gate = state.architecture.commit_gate();
+  PiMutex& gate = commit_gate.mutex;
+  commit_gate.press();
   const bool has_gate = gate.try_lock_until(until_ns);
-  if (state.conductor != nullptr) state.conductor->relax();
+  commit_gate.relax();
   PreparedOutcome outcome = PreparedOutcome::timed_out;
   if (has_gate) {
     const bool is_current = state.is_current();
@@ -158,9 +163,11 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
 }
 
 /// The change lock held.
-void PreparedTransaction::settle() noexcept {
+bool PreparedTransaction::settle() noexcept {
   State& state = *state_;
-  if (state.phase.load(std::memory_order_acquire) != State::kCommitted) return;
+  const State::Phase phase = state.phase.load(std::memory_order_acquire);
+  if (phase != State::kCommitted) return phase == State::kSettled;
+  if (!state.work->wait_passed(0)) return false;
   try {
     state.work->settle_committed();
   } catch (...) {
@@ -169,6 +176,7 @@ void PreparedTransaction::settle() noexcept {
   const std::lock_guard gate(state.architecture.commit_gate().mutex);
   for (const auto& touched : state.basis.touched) touched.component->change_mark().settle();
   state.phase.store(State::kSettled, std::memory_order_release);
+  return true;
 }
 
 /// The change lock held.
@@ -210,12 +218,14 @@ TransactionReport PreparedTransaction::complete() {
     throw Error(ErrorCode::invalid_argument, "the prepared change was not committed",
                 {.remedy = "commit it first"});
   }
+  const PreparedOutcome outcome = state.outcome.load(std::memory_order_relaxed);
+  if (outcome == PreparedOutcome::committed)
+    state.work->wait_passed(later_by(monotonic_now_ns(), state.phase_ns));
   {
     const std::lock_guard change(state.architecture.change_lock());
     settle();
     note_failure();
   }
-  const PreparedOutcome outcome = state.outcome.load(std::memory_order_relaxed);
   if (outcome == PreparedOutcome::stale) {
     throw Error(ErrorCode::wrong_revision,
                 "what the change was prepared against has changed, or is being changed; nothing was changed",
@@ -227,7 +237,7 @@ TransactionReport PreparedTransaction::complete() {
     throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
                 {.remedy = "deploy it, then prepare the change anew"});
   }
-  throw Error(ErrorCode::timeout, "another commit did not leave the gate in time; nothing was changed",
+  throw Error(ErrorCode::timeout, "another commit did not end in time; nothing was changed",
               {.remedy = "try again, or allow a longer commit timeout"});
 }
 

@@ -3,6 +3,8 @@
 #include "change/work.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "mauve_rt/architecture/runner.hpp"
 
@@ -10,7 +12,7 @@ namespace mauve {
 
 TransactionCommit::TransactionCommit(Architecture& architecture, Runner* host,
                                      const TransactionOptions& options)
-    : work_(std::make_unique<Work>(architecture, host, options)) {}
+    : work_(std::make_shared<Work>(architecture, host, options)) {}
 TransactionCommit::~TransactionCommit() = default;
 void TransactionCommit::make(Transaction transaction) { work_->make(std::move(transaction)); }
 TransactionReport TransactionCommit::report(time_ns_t phase_timeout_ns) {
@@ -25,13 +27,6 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
       options_(options) {}
 
 void TransactionCommit::Work::begin(Transaction transaction) {
-  constexpr std::int64_t kMostMissed = 1'000'000;
-  if (options_.max_missed < 0 || options_.max_missed > kMostMissed) {
-    throw Error(ErrorCode::out_of_range, "so many releases cannot be allowed to be missed",
-                {.element = "max_missed",
-                 .expected = "0 to " + std::to_string(kMostMissed),
-                 .found = std::to_string(options_.max_missed)});
-  }
   transaction_ = std::move(transaction);
   if (const std::uint64_t revision = architecture_.revision();
       options_.expected_revision != 0 && options_.expected_revision != revision) {
@@ -45,9 +40,35 @@ void TransactionCommit::Work::begin(Transaction transaction) {
     const std::lock_guard gate(architecture_.commit_gate().mutex);
     structure_ = architecture_.commit_gate().structure();
   }
-  architecture_.settle_prepared();  // all that had been committed by then
+  wait_for_earlier();
   architecture_.reap();
   numbers_before_ = architecture_.numbers();
+}
+
+/// All that had been committed by then is completed. A late component that a step names is waited for.
+void TransactionCommit::Work::wait_for_earlier() {
+  constexpr std::chrono::milliseconds kBetweenLooks{1};
+  const time_ns_t until = later_by(monotonic_now_ns(), options_.timeouts.commit_ns);
+  architecture_.settle_changes();
+  while (is_waiting_for_earlier() && !is_simulated_ && monotonic_now_ns() < until) {
+    std::this_thread::sleep_for(kBetweenLooks);
+    architecture_.settle_changes();
+  }
+  if (is_waiting_for_earlier()) architecture_.throw_late(options_.timeouts.commit_ns);
+}
+
+bool TransactionCommit::Work::is_waiting_for_earlier() const {
+  const auto is_late = [this](const auto& component) {
+    const std::lock_guard gate(architecture_.commit_gate().mutex);
+    return component->change_mark().is_unsettled() && !component->task().is_left_behind();
+  };
+  const auto& steps = transaction_.steps();
+  const auto components = architecture_.components();
+  return std::any_of(components.begin(), components.end(), [&](const auto& component) {
+    return is_late(component) && std::any_of(steps.begin(), steps.end(), [&](const auto& step) {
+             return step->is_for_all() || step->component() == component->name();
+           });
+  });
 }
 
 void TransactionCommit::Work::make(Transaction transaction) {
@@ -65,11 +86,41 @@ void TransactionCommit::Work::make(Transaction transaction) {
     discard();
     throw;
   }
-  finish();
+  set_epoch();
+  if (commit_->has_passed()) return finish();
+  keep_open(draft_->release_unsettled());
+}
+
+bool TransactionCommit::Work::wait_passed(time_ns_t until_ns) const noexcept {
+  return commit_->wait_passed(until_ns);
+}
+
+void TransactionCommit::Work::keep_open(std::vector<std::shared_ptr<Component>> unsettled) {
+  architecture_.keep_open(std::make_shared<Late>(shared_from_this(), std::move(unsettled)));
+}
+
+bool TransactionCommit::Work::Late::settle() noexcept {
+  Architecture& architecture = work_->architecture_;
+  if (!work_->commit_->has_passed()) return false;
+  work_->host_ = architecture.host();  // the one that it was made by may be gone
+  work_->deployed_ = work_->host_ != nullptr && work_->host_->is_deployed();
+  try {
+    work_->finish();
+  } catch (...) {  // what cannot be retired stays; the change is in
+  }
+  const std::lock_guard gate(architecture.commit_gate().mutex);
+  for (const auto& component : unsettled_) component->change_mark().settle();
+  return true;
+}
+
+const Task* TransactionCommit::Work::Late::find_late() const noexcept {
+  for (const Participant& place : work_->commit_->participants()) {
+    if (!place.has_passed()) return place.task;
+  }
+  return nullptr;
 }
 
 void TransactionCommit::Work::finish() {
-  tell_epoch();
   publish();
   architecture_.drop_stale_prepared();  // they refer to what goes now
   settle_with_host();
@@ -112,9 +163,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     prepare();
     in_reach_ = architecture_.resources();
     gather();
-    conductor_ = host_->conductor();
     require_host_open();
-    prepared_commit_.emplace(*commit_);
     numbers_after_ = architecture_.numbers();
     basis.is_structural = draft_->is_structural();
     basis.structure = structure_;
@@ -139,23 +188,17 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
   return basis;
 }
 
-PreparedCommit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
-  if (!prepared_commit_) return PreparedCommit::Outcome::made;  // there is nobody to commit with
-  const PreparedCommit::Outcome outcome = prepared_commit_->carry_out(until_ns, conductor_.get());
-  committed_ = outcome == PreparedCommit::Outcome::made;
-  const bool is_changed = outcome == PreparedCommit::Outcome::refused && commit_->refused_by() == &guard_;
-  return is_changed ? PreparedCommit::Outcome::changed : outcome;
+Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
+  const time_ns_t timeout_ns = std::max<time_ns_t>(0, until_ns - monotonic_now_ns());
+  const Commit::Outcome outcome = commit_->carry_out(timeout_ns, architecture_.commit_gate());
+  committed_ = outcome == Commit::Outcome::made;
+  const bool is_changed = outcome == Commit::Outcome::refused && commit_->refused_by() == &guard_;
+  return is_changed ? Commit::Outcome::changed : outcome;
 }
 
 void TransactionCommit::Work::settle_committed() { finish(); }
 
-void TransactionCommit::Work::throw_not_made() {
-  commit_or_throw([this] {
-    prepared_commit_->rethrow_refusal();
-    return false;
-  });
-  throw Error(ErrorCode::internal, "a prepared change was made, and is said not to be");
-}
+void TransactionCommit::Work::throw_not_made() { throw_refusal(); }
 
 /// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
 void TransactionCommit::Work::require_host_open() const {
@@ -212,26 +255,23 @@ void TransactionCommit::Work::gather() {
   }
   for (const auto& repair : repairs_) actions.push_back(repair.get());
   commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
-  std::int64_t max_missed = options_.max_missed;
-  for (const Change& change : changes_) {  // no further than there are instants
-    if (const time_ns_t period_ns = change.draft->component->task().grid().period_ns; period_ns != 0)
-      max_missed = std::min(max_missed, kLongest / period_ns);
-  }
-  commit_->set_max_missed(max_missed);
   auto place = commit_->participants().begin();
   for (const Change& change : changes_) {
     place->task = &change.draft->component->task();
     place->afterwards = afterwards_of(change);
     place->replaces_parts = change.parts != nullptr;
+    if (change.parts != nullptr && change.draft->restarts) change.parts->give_up_place();
     place->repairs = change.draft->is_repaired();
-    if (change.parts != nullptr) place->budget_ns = change.parts->budget_ns();
-    if (new_epoch_ != nullptr) place->epoch_ns = &new_epoch_->epoch_ns();
+    if (draft_->resynchronise_step() != 0) place->epoch_lead_ns = kDeploymentLead;
     if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
     if (change.retreat != nullptr) change.retreat->set_place(*place);
     guard_.expect(*place, change.draft->state);
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
+  touched_.clear();
+  for (const Change& change : changes_) touched_.push_back(change.draft->component);
+  commit_->assign_actions();
 }
 
 void TransactionCommit::Work::commit_by_force_if_asked() {
@@ -293,10 +333,8 @@ void TransactionCommit::Work::carry_out_commit() {
   require_same_structure();
   if (!changes_.empty()) {
     commit_->set_yields();
-    commit_or_throw([this] {
-      const auto conductor = deployed_ ? host_->conductor() : nullptr;
-      return carry_out(*commit_, options_.timeouts.commit_ns, conductor.get());
-    });
+    committed_ = commit_->carry_out(options_.timeouts.commit_ns, gate) == Commit::Outcome::made;
+    if (!committed_) throw_refusal();
   }
   if (draft_->is_structural()) gate.restructured();
 }
@@ -309,16 +347,12 @@ void TransactionCommit::Work::require_same_structure() const {
               {.remedy = "look at the architecture again, then decide again"});
 }
 
-template <typename CarryOut>
-void TransactionCommit::Work::commit_or_throw(CarryOut&& carry_out) {
+void TransactionCommit::Work::throw_refusal() {
+  const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->kept_by() == nullptr;
   try {
-    if (carry_out()) {
-      committed_ = true;
-      return;
-    }
+    commit_->rethrow_refusal();
   } catch (const Error& failure) {
     require_host_open();  // else the commit was called off by a shutdown
-    const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->off() == Commit::Off::not_yet;
     if (!is_adopts_own) rethrow_at(step_of(failure.detail().component), failure);
     throw_refused(failure.what());
   } catch (...) {
@@ -351,11 +385,13 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
 }
 
 /// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again.
-void TransactionCommit::Work::tell_epoch() {
-  if (new_epoch_ == nullptr) return;
-  if (!committed_) new_epoch_->take();  // there was nobody to commit with
+void TransactionCommit::Work::set_epoch() {
+  if (draft_->resynchronise_step() == 0) return;
+  const time_ns_t from_ns = committed_ ? commit_->instant_ns() - 1 : host_->clock().now_ns();
+  const time_ns_t epoch_ns = later_by(from_ns, kDeploymentLead);
+  architecture_.set_deployment_epoch(epoch_ns);
   for (const auto& component : architecture_.components()) {
-    if (!places_.contains(component->name())) component->task().join(new_epoch_->epoch_ns());
+    if (!places_.contains(component->name())) component->task().join(epoch_ns);
   }
 }
 
@@ -414,7 +450,6 @@ void TransactionCommit::Work::retire() {
 
 /// Whoever waits for the report keeps nothing that others may take away meanwhile.
 void TransactionCommit::Work::keep_for_report() {
-  for (const Change& change : changes_) touched_.push_back(change.draft->component);
   changes_.clear();
   listener_changes_.clear();
   actions_.clear();
@@ -428,6 +463,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   // In virtual time the releases that follow come only when this call has returned.
   const time_ns_t until =
       later_by(monotonic_now_ns(), is_simulated_ ? 0 : std::max<time_ns_t>(0, phase_timeout_ns));
+  if (committed_ && commit_->wait_passed(until)) architecture_.settle_if_idle();
   std::map<std::string, StepReport> measured;
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
@@ -437,7 +473,8 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
                            .prepare_ns = is_simulated_ ? 0 : prepare_ns_,
                            .blackout_ns = 0};
   for (const auto& [name, place] : places_) {
-    if (committed_ && !is_simulated_ && place->awaits_release()) report.is_complete = false;
+    const bool is_open = !place->has_passed() || (!is_simulated_ && place->awaits_release());
+    if (committed_ && is_open) report.is_complete = false;
   }
   const auto& steps = transaction_.steps();
   const auto for_all =
@@ -459,7 +496,8 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     step.phase_actual_ns = found->second.phase_actual_ns;
     step.released_ns = found->second.released_ns;
     step.remark = found->second.remark;
-    step.shift_ns = places_.at(step.component)->shift_ns;
+    const Participant& place = *places_.at(step.component);
+    step.shift_ns = place.has_passed() ? place.shift_ns : 0;
     report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
   }
   return report;

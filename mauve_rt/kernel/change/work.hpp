@@ -15,7 +15,7 @@
 
 namespace mauve {
 
-class TransactionCommit::Work {
+class TransactionCommit::Work : public std::enable_shared_from_this<TransactionCommit::Work> {
  public:
   Work(Architecture& architecture, Runner* host, const TransactionOptions& options);
 
@@ -38,10 +38,12 @@ class TransactionCommit::Work {
   /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
   Basis prepare_for_later(Transaction transaction);
   /// The gate of commits held, the basis checked. [rt] as far as the actions are.
-  PreparedCommit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
-  /// Who conducted commits when it was prepared; nullptr in virtual time. [non-rt]
-  const std::shared_ptr<Conductor>& conductor() const noexcept { return conductor_; }
-  /// What follows the commit. [non-rt], the change lock held.
+  Commit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
+  /// Sleeps until all components have taken the change that was committed, at most until the instant. [non-rt]
+  bool wait_passed(time_ns_t until_ns) const noexcept;
+  /// Has the architecture complete a prepared change that was committed. [non-rt], the change lock held.
+  void keep_open(std::vector<std::shared_ptr<Component>> unsettled);
+  /// What follows the commit, once all components have taken the change. [non-rt], the change lock held.
   void settle_committed();
   /// Throws why it was not made. [non-rt]
   [[noreturn]] void throw_not_made();
@@ -62,7 +64,6 @@ class TransactionCommit::Work {
   void require_preparable() const;
   // prepare
   void prepare();
-  void prepare_epoch();
   void prepare_resource(DraftResource& added);
   void prepare_added(DraftComponent& added);
   void prepare_change(DraftComponent& changed);
@@ -71,6 +72,7 @@ class TransactionCommit::Work {
   void configure_anew(DraftComponent& changed);
   void prepare_repair(const DraftComponent& changed);
   void prepare_wiring(Change& change);
+  void prepare_floor(const Component& component, ServiceBase& service);
   void prepare_properties(Change& change);
   void prefault_parts();
   void prepare_listening(const Change& change, const PortBase& port, ServiceBase& service);
@@ -80,9 +82,10 @@ class TransactionCommit::Work {
   bool force_hung();
   bool stop_by_force(const Change& change);
   void carry_out_commit();
+  void wait_for_earlier();
+  bool is_waiting_for_earlier() const;
   void require_same_structure() const;
-  template <typename CarryOut>
-  void commit_or_throw(CarryOut&& carry_out);
+  [[noreturn]] void throw_refusal();
   void finish();
   void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
@@ -90,7 +93,7 @@ class TransactionCommit::Work {
   void publish();
   void settle_with_host();
   void retire();
-  void tell_epoch();
+  void set_epoch();
   void keep_for_report();
   static void renew_fallback(Change& change);
   void leave_behind();
@@ -114,7 +117,6 @@ class TransactionCommit::Work {
   std::size_t numbers_before_{0};
   std::size_t numbers_after_{0};
   std::uint32_t structure_{0};                       // as it was when this began to look
-  std::shared_ptr<Conductor> conductor_{};           // of a prepared one
   std::vector<std::shared_ptr<Resource>> in_reach_;  // of a prepared one: outlive what refers to them
   std::unique_ptr<Draft> draft_;
 
@@ -134,12 +136,25 @@ class TransactionCommit::Work {
       actions_;                                    // in the order they are taken in; the new parts come after
   std::vector<ListenerChange*> listener_changes_;  // among the actions
   StateGuard guard_;
-  NewEpoch* new_epoch_{nullptr};                     // among the actions, when the transaction resynchronises
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
-  std::optional<PreparedCommit> prepared_commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};
+
+  class Late;
+};
+
+/// A change that a late component has not taken yet.
+class TransactionCommit::Work::Late final : public OpenChange {
+ public:
+  Late(std::shared_ptr<Work> work, std::vector<std::shared_ptr<Component>> unsettled)
+      : work_(std::move(work)), unsettled_(std::move(unsettled)) {}
+  bool settle() noexcept override;
+  const Task* find_late() const noexcept override;
+
+ private:
+  std::shared_ptr<Work> work_;
+  std::vector<std::shared_ptr<Component>> unsettled_;
 };
 
 /// Takes the time of a part of a step's preparation, and says of its errors whose they are.

@@ -61,16 +61,13 @@ void Deployer::prepare_process() {
 
 void Deployer::deploy() {
   const std::lock_guard change(architecture().change_lock());
-  architecture().settle_prepared();
+  architecture().settle_changes();
   const std::lock_guard life(life_mutex_);
   require_deployable();
   prepare_process();
   architecture().set_host(*this);
   try {
-    auto conductor = std::make_shared<Conductor>();
     create_threads();
-    const std::lock_guard lock(conductor_mutex_);
-    conductor_ = std::move(conductor);
   } catch (...) {
     architecture().release_host(*this);
     throw;
@@ -79,7 +76,8 @@ void Deployer::deploy() {
   // waiting when the barrier opens, which one wake-up does for all: none runs while the others' are being posted.
   start_all(monotonic_now_ns() + kDeploymentLead);
   barrier_->arrive();
-  for (const auto& component : architecture().components()) component->task().wait_started();
+  for (const auto& component : architecture().components()) component->task().wait_started(kForever);
+  architecture().commit_gate().open();
   set_deployed(true);
 }
 
@@ -112,18 +110,11 @@ void Deployer::shutdown() noexcept {
   const std::lock_guard life(life_mutex_);
   if (!is_deployed()) return;
   set_deployed(false);
-  std::shared_ptr<Conductor> conductor;
-  {
-    const std::lock_guard lock(conductor_mutex_);
-    conductor = std::move(conductor_);
-  }
-  conductor->withdraw();
+  architecture().commit_gate().close();
   stop_all(monotonic_now_ns() + kStopTimeout);
-  conductor->withdraw();  // a commit that had found the host open still
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : architecture().components()) component->task().end_thread(until);
-  conductor->withdraw();  // one that held a task until now is not to start it
-  watchdog_->stop();      // last: stopping is watched too
+  watchdog_->stop();  // last: stopping is watched too
   architecture().release_host(*this);
   architecture().changes().bump();
 }
@@ -133,10 +124,5 @@ void Deployer::attach(Task& task) {
 }
 
 bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
-
-std::shared_ptr<Conductor> Deployer::conductor() noexcept {
-  const std::lock_guard lock(conductor_mutex_);
-  return conductor_;
-}
 
 }  // namespace mauve

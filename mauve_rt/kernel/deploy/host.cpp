@@ -84,6 +84,11 @@ StepReport Host::set_property(const std::string& component, const std::string& n
   return architecture_.commit_one(std::move(Transaction().set_property(component, name, value)), timeouts);
 }
 
+ArchitectureDescription Host::describe() const {
+  architecture_.settle_if_idle();
+  return architecture_.describe();
+}
+
 TraceDrain Host::drain_trace() {
   TraceDrain drain = architecture_.drain_trace();
   if (is_simulated()) drain.monotonic_ns = drain.realtime_ns = now_ns();
@@ -118,7 +123,7 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
   const time_ns_t in_order_until = std::min(until_ns, monotonic_now_ns() + kInOrder);
   for (auto component = components.rbegin(); component != components.rend(); ++component) {
     Task& task = (*component)->task();
-    if (settled(task.state()) == ComponentState::running) stop(task, in_order_until);
+    if (task.state() == ComponentState::running) stop(task, in_order_until);
   }
   for (const auto& component : components) {
     if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);

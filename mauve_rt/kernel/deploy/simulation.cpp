@@ -178,9 +178,10 @@ void SimulatedHost::deploy() {
 
 void SimulatedHost::begin(time_ns_t epoch_ns) {
   const auto change = architecture().change_lock().join();
-  architecture().settle_prepared();
+  architecture().settle_changes();
   for (const auto& component : architecture().components()) attach(component->task());
   start_all(epoch_ns);
+  architecture().commit_gate().open();
   set_deployed(true);
 }
 
@@ -190,6 +191,7 @@ void SimulatedHost::shutdown() noexcept {
   if (place == running.end()) return;
   running.erase(place);
   set_deployed(false);
+  architecture().commit_gate().close();
   stop_all(0);
   for (const auto& component : architecture().components()) component->task().end_simulation();
   architecture().release_host(*this);

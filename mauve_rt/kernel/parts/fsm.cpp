@@ -73,6 +73,15 @@ class CycleLengths {
     }
     return gcd;
   }
+  /// See wait_ends_ns(); after gcd_from().
+  std::map<const State*, time_ns_t> ends_in_cycle_of(const State& initial) const {
+    std::map<const State*, time_ns_t> ends;
+    for (const auto& [state, node] : nodes_) {
+      if (state->is_wait && node.component == nodes_.at(&initial).component)
+        ends.emplace(state, node.potential_ns + length_of(*state));
+    }
+    return ends;
+  }
 
  private:
   /// An event wait has none that a period could be made of.
@@ -161,6 +170,12 @@ time_ns_t cycle_gcd_ns(const State& initial) {
   }
   check_lengths(reachable);
   return CycleLengths().gcd_from(initial);
+}
+
+std::map<const State*, time_ns_t> wait_ends_ns(const State& initial) {
+  CycleLengths cycles;
+  cycles.gcd_from(initial);
+  return cycles.ends_in_cycle_of(initial);
 }
 
 State& FsmBase::add_state(std::string name) {

@@ -28,6 +28,12 @@ void ChangeLock::lock() {
   holder_.store(std::this_thread::get_id(), std::memory_order_relaxed);
 }
 
+bool ChangeLock::try_lock() noexcept {
+  if (Task::executing_here() != nullptr || is_held_here() || !mutex_.try_lock()) return false;
+  holder_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  return true;
+}
+
 void ChangeLock::unlock() noexcept {
   holder_.store({}, std::memory_order_relaxed);
   mutex_.unlock();

@@ -1,314 +1,428 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
+// The requester's side of a commit, and what participants do with its words. A task's own steps are in task_commit.cpp.
 #include "mauve_rt/run/commit.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
-#include <tuple>
+#include <stdexcept>
 
+#include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
 
+namespace {
+
+/// How often a requester that sleeps looks whether a participant stopped, faulted or was condemned: no thread tells it.
+constexpr time_ns_t kLook = ms_to_ns(20);
+
+}  // namespace
+
 Commit::Commit(std::size_t participants, std::vector<CommitAction*> actions)
     : participants_(participants), actions_(std::move(actions)) {
   for (Participant& place : participants_) place.commit = this;
-  for (const CommitAction* action : actions_) {
-    budget_ns_ += action->budget_ns();
-    declared_ns_ += action->declared_ns();
-  }
+  // relaxed: no thread knows the commit yet
+  to_vote_.store(static_cast<std::uint32_t>(participants), std::memory_order_relaxed);
+  to_pass_.store(static_cast<std::uint32_t>(participants), std::memory_order_relaxed);
 }
 
 Commit::~Commit() {
-  if (!committed()) return;
+  if (!is_made()) return;
   for (Participant& place : participants_) {
-    if (place.in_flight && place.afterwards != Afterwards::stop) place.task->forget_release(place);
+    if (place.has_passed() && place.in_flight && place.afterwards != Afterwards::stop)
+      place.task->forget_release(place);
   }
 }
 
-void Commit::order_participants() {
+void Commit::assign_actions() {
   order_.clear();
   for (Participant& place : participants_) {
-    place.period_ns = place.task->grid().period_ns;
+    place.actions.clear();
+    for (CommitAction* action : actions_) {
+      if (action->task == place.task) place.actions.push_back(action);
+    }
     order_.push_back(&place);
   }
-  std::sort(order_.begin(), order_.end(), [](const Participant* a, const Participant* b) {
-    const auto rank = [](const Participant& place) {
-      return std::tuple(-place.budget_ns, -place.task->grid().period_ns, place.task->number());
-    };
-    return rank(*a) < rank(*b);
-  });
+  std::sort(order_.begin(), order_.end(),
+            [](const Participant* a, const Participant* b) { return a->task->number() < b->task->number(); });
 }
 
-void Commit::expect(std::uint32_t parties) noexcept {
-  expected_ = parties;
-  going_.store(parties, std::memory_order_relaxed);  // relaxed: nobody was posted yet
-}
+// ---- participants
 
-// ---- those who come to the gate
-
-Commit::Answer Commit::meet(Participant& place) noexcept {
-  note_came(place);
-  if (const std::optional<Answer> answer = arrive(place)) return *answer;
-  return make_change();
-}
-
-void Commit::note_came(Participant& place) noexcept {
-  // relaxed: counts only; who sees the last one late spends its instants a wait later
-  if (!place.came.exchange(true, std::memory_order_relaxed)) came_.fetch_add(1, std::memory_order_relaxed);
-}
-
-std::int64_t Commit::may_miss(const Participant& place) const noexcept {
-  if (came_.load(std::memory_order_relaxed) != expected_) return 0;
-  // A stall may have lost it more than were allowed.
-  return std::max<std::int64_t>(0, max_missed_ - place.lost);
-}
-
-time_ns_t Commit::holds_until_ns(const Participant& place) const noexcept {
-  if (place.pending_ns == kForever) return kForever;
-  return place.pending_ns + may_miss(place) * place.task->grid().period_ns;
-}
-
-/// Nothing: it is the last and makes the change.
-std::optional<Commit::Answer> Commit::arrive(Participant& place) noexcept {
-  std::uint32_t seen = gate_.load(std::memory_order_acquire);
-  for (;;) {
-    if ((seen & kOff) != 0) return Answer::off;
-    const time_ns_t now = place.task->clock().now_ns();
-    const bool last = (seen & kCount) + 1 == expected_ && have_time(place, now);
-    if (last) {  // nobody else can be: all but this one are there
-      began_ns_.store(now, std::memory_order_relaxed);
-      maker_.store(&place, std::memory_order_relaxed);
-    }
-    // acq_rel: the last one sees what the others wrote before they came
-    if (gate_.compare_exchange_weak(seen, last ? (seen + 1) | kAdopting : seen + 1, std::memory_order_acq_rel,
-                                    std::memory_order_acquire)) {
-      if (last) return std::nullopt;
-      return wait_others(place);
-    }
-  }
-}
-
-/// Somebody whose time is over may not have got its processor to leave: then it leaves first, and comes back.
-bool Commit::have_time(const Participant& last, time_ns_t now_ns) const noexcept {
-  return std::all_of(participants_.begin(), participants_.end(), [&](const Participant& place) {
-    return &place == &last || !place.in_flight ||
-           place.leaves_at_ns.load(std::memory_order_relaxed) >= now_ns;
-  });
-}
-
-Commit::Answer Commit::wait_others(Participant& place) noexcept {
-  for (;;) {
-    const std::uint32_t seen = gate_.load(std::memory_order_acquire);
-    if ((seen & kOff) != 0) return Answer::off;
-    if ((seen & kDone) != 0) return Answer::done;
-    if ((seen & kAbandoned) != 0) return Answer::abandoned;
-    time_ns_t until = place.leaves_at_ns.load(std::memory_order_relaxed);
-    if ((seen & kTaking) != 0) {
-      until = kForever;
-    } else if ((seen & kAdopting) != 0) {
-      const time_ns_t budget_ends = began_ns_.load(std::memory_order_relaxed) + budget_ns_;
-      place.holds_until_ns = holds_until_ns(place);  // all have been here now
-      until = declared_ns_ != 0 ? budget_ends : std::max(budget_ends, place.holds_until_ns);
-    } else if (place.task->has_event()) {
-      until = 0;
-    }
-    if (futex_wait_until(gate_, seen, until)) continue;
-    if ((seen & kTaking) != 0) continue;
-    if ((seen & kAdopting) != 0) {
-      call_off(Off::overran);  // unless taking begins this moment
-      continue;
-    }
-    // acq_rel: who comes last counts only those who are still there
-    std::uint32_t gathering = seen;
-    if (gate_.compare_exchange_strong(gathering, seen - 1, std::memory_order_acq_rel,
-                                      std::memory_order_acquire)) {
-      return Answer::left;
-    }
-  }
-}
-
-void Commit::poke() noexcept {
-  gate_.fetch_add(kPoke, std::memory_order_acq_rel);
-  futex_wake_all(gate_);
-}
-
-void Commit::gone_on(bool made_it) noexcept {
-  if (made_it) {
-    if (expected_ > 1) futex_wake_all(gate_);
-    repay_priority();
-  }
-  if (going_.fetch_sub(1, std::memory_order_acq_rel) == 1) settle();
-}
-
-// ---- who makes the change
-
-Commit::Answer Commit::make_change() noexcept {
-  borrow_priority();
-  const Clock& clock =
-      participants_.empty() ? MonotonicClock::instance() : participants_.front().task->clock();
-  if (adopt_all(clock) && begin_taking()) {
-    for (Participant& place : participants_) {
-      if (place.in_flight && place.replaces_parts) place.task->write_outputs(true);
-    }
-    take_all(clock);
-    committed_ = true;
-  }
-  const std::uint32_t before = gate_.fetch_or(kDone, std::memory_order_acq_rel);  // publishes the results
-  // Nobody is woken yet: a more urgent thread would keep this one from going on itself (gone_on).
-  if ((before & (kOff | kAbandoned)) == 0) return Answer::made_it;
-  repay_priority();
-  return (before & kAbandoned) != 0 ? Answer::abandoned : Answer::off;
-}
-
-void Commit::make_alone() noexcept {
-  make_change();
-  repay_priority();
-}
-
-bool Commit::adopt_all(const Clock& clock) noexcept {
+bool Commit::adopt(Participant& place) noexcept {
+  const Clock& clock = place.task->clock();
   time_ns_t began = clock.now_ns();
-  for (CommitAction* action : actions_) {
-    adopting_.store(action, std::memory_order_release);
-    bool agreed = false;
+  const CommitAction* slowest = nullptr;
+  for (CommitAction* action : place.actions) {
+    bool has_agreed = false;
+    std::exception_ptr why;
     try {
-      agreed = action->adopt();
+      has_agreed = action->adopt();
     } catch (...) {
-      refusal_ = std::current_exception();
+      why = std::current_exception();
     }
     const time_ns_t now = clock.now_ns();
     action->adopt_ns = now - began;
     began = now;
-    const bool is_off = (gate_.load(std::memory_order_acquire) & kOff) != 0;
-    const time_ns_t declared = action->declared_ns();
-    const bool is_late = declared != 0 && action->adopt_ns > declared;
-    if (agreed && !is_late && !is_off) continue;
-    refused_by_ = agreed && !is_late ? nullptr : action;  // called off: the actions may be gone by now
-    adopt_was_late_ = agreed && is_late;
+    if (slowest == nullptr || action->adopt_ns > slowest->adopt_ns) slowest = action;
+    const bool is_late = action->declared_ns() != 0 && action->adopt_ns > action->declared_ns();
+    if (has_agreed && !is_late) continue;
+    refuse(&place, *action, why, has_agreed);
     return false;
   }
-  return true;
+  if (slowest != nullptr && off() == Off::timed_out) refuse(&place, *slowest, nullptr, true);
+  return cut_.look().is_open();
 }
 
-const CommitAction* Commit::put_down() noexcept {
-  if (began_ns_.load(std::memory_order_relaxed) == 0 || actions_.empty()) return nullptr;
-  const CommitAction* slowest =
-      *std::max_element(actions_.begin(), actions_.end(), [](const CommitAction* a, const CommitAction* b) {
-        return a->adopt_ns - a->budget_ns() < b->adopt_ns - b->budget_ns();
-      });
-  if (slowest->task == nullptr) return nullptr;
-  return refused_by_ = slowest;
-}
-
-/// Decides against all who would call it off.
-bool Commit::begin_taking() noexcept {
-  std::uint32_t seen = gate_.load(std::memory_order_acquire);
-  while ((seen & kOff) == 0) {
-    if (gate_.compare_exchange_weak(seen, seen | kTaking, std::memory_order_acq_rel,
-                                    std::memory_order_acquire)) {
-      return true;
-    }
+void Commit::refuse(const Participant* place, const CommitAction& action, std::exception_ptr why,
+                    bool is_late) noexcept {
+  if (!is_refused_.exchange(true, std::memory_order_acq_rel)) {
+    refused_by_ = &action;
+    refusal_ = std::move(why);
+    adopt_was_late_ = is_late;
   }
-  return false;
+  call_off(Off::withdrawn, place != nullptr ? place->task : nullptr);
 }
 
-void Commit::take_all(const Clock& clock) noexcept {
+void Commit::vote(Participant& place, time_ns_t entered_ns) noexcept {
+  const CutWord seen = cut_.raise(entered_ns);
+  place.has_voted = true;
+  place.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
+  if (seen.is_off()) return;
+  if (to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+  cut_.close();
+  decided();
+}
+
+time_ns_t Commit::take(Participant& place) noexcept {
+  const Clock& clock = place.task->clock();
   time_ns_t began = clock.now_ns();
-  for (CommitAction* action : actions_) {
-    adopting_.store(action, std::memory_order_release);
+  time_ns_t overlong = 0;
+  for (CommitAction* action : place.actions) {
     const time_ns_t declared = action->declared_ns();  // of the new core; after take, that is another
+    action->instant_ns = instant_ns();
     action->take();
     const time_ns_t now = clock.now_ns();
     action->take_ns = now - began;
     began = now;
     const time_ns_t took = action->adopt_ns + action->take_ns;
-    if (declared == 0 || took <= declared) continue;
-    for (Participant& place : participants_) {
-      if (place.task == action->task) place.overlong_ns = took;
-    }
+    if (declared != 0 && took > declared) overlong = std::max(overlong, took);
   }
+  return overlong;
 }
 
-/// The highest among the participants, for as long as it works for all of them: else a thread of a priority in between
-/// would keep the most urgent of them waiting.
-void Commit::borrow_priority() noexcept {
-  if (participants_.size() < 2) return;
-  int policy = 0;
-  sched_param own{};
-  if (pthread_getschedparam(pthread_self(), &policy, &own) != 0 || policy != SCHED_FIFO) return;
-  int highest = own.sched_priority;
-  for (const Participant& place : participants_) {
-    if (place.in_flight) highest = std::max(highest, place.task->settings().priority);
-  }
-  if (highest == own.sched_priority) return;
-  own_priority_ = own.sched_priority;
-  pthread_setschedprio(pthread_self(), highest);
+void Commit::pass(Participant& place) noexcept {
+  place.passed.store(true, std::memory_order_release);
+  // The commit may be freed once this was the last one: only the word's address is used after it.
+  if (to_pass_.fetch_sub(1, std::memory_order_acq_rel) == 1) futex_wake_all(to_pass_);
 }
 
-void Commit::repay_priority() noexcept {
-  if (own_priority_ == 0) return;
-  MAUVE_RT_TRUSTED(
-      pthread_setschedprio(pthread_self(), own_priority_));  // once a change of several components
-  own_priority_ = 0;
-}
-
-// ---- who conducts it, and who wants it not to happen
-
-bool Commit::call_off(Off why, const Task* task) noexcept {
+bool Commit::call_off(Off why, const Task* by) noexcept {
   Off none = Off::not_yet;
-  // relaxed: who tells of it waits for this call's end first
+  // relaxed: the cut's exchange publishes it
   if (off_.compare_exchange_strong(none, why, std::memory_order_relaxed))
-    off_by_.store(task, std::memory_order_relaxed);
-  std::uint32_t seen = gate_.load(std::memory_order_acquire);
-  while ((seen & (kTaking | kDone | kOff)) == 0) {
-    if (!gate_.compare_exchange_weak(seen, seen | kOff, std::memory_order_acq_rel,
-                                     std::memory_order_acquire)) {
-      continue;
-    }
-    futex_wake_all(gate_);
-    settle();
-    return true;
-  }
-  return (seen & kOff) != 0;
+    off_by_.store(by, std::memory_order_relaxed);
+  if (cut_.call_off()) decided();
+  return cut_.look().is_off();
+}
+
+void Commit::decided() noexcept {
+  decided_.store(1, std::memory_order_release);
+  futex_wake_all(decided_);
 }
 
 Commit::Off Commit::off() const noexcept {
-  const bool is_off = (gate_.load(std::memory_order_acquire) & kOff) != 0;
-  return is_off ? off_.load(std::memory_order_relaxed) : Off::not_yet;
+  return cut_.look().is_off() ? off_.load(std::memory_order_relaxed) : Off::not_yet;
 }
 
-void Commit::settle() noexcept {
-  settled_.store(1, std::memory_order_release);
-  futex_wake_all(settled_);
+// ---- the requester
+
+Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexcept {
+  timeout_ns_ = timeout_ns;
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  if (!lock(until)) return Outcome::timed_out;
+  unfit_ = find_unfit();
+  if (unfit_ != nullptr) {
+    unlock();
+    return Outcome::changed;
+  }
+  begin();
+  gate.begin(*this);
+  if (cut_.look().is_open() && check()) {
+    vote_for_parked();
+    post_all(until);
+    visit_simulated();
+    await_decision(until);
+  }
+  gate.end();
+  if (is_made()) {
+    complete(until);
+  } else {
+    retract_all(until);
+  }
+  unlock();
+  if (is_made()) return Outcome::made;
+  if (is_refused_.load(std::memory_order_acquire)) return Outcome::refused;
+  return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
 }
 
-bool Commit::wait_settled(time_ns_t until_ns) noexcept {
-  while (settled_.load(std::memory_order_acquire) == 0) {
-    if (!futex_wait_until(settled_, 0, until_ns)) return settled_.load(std::memory_order_acquire) != 0;
+bool Commit::lock(time_ns_t until_ns) noexcept {
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    if (order_[i]->task->command_mutex().try_lock_until(until_ns)) continue;
+    locked_out_ = order_[i]->task;
+    while (i-- > 0) order_[i]->task->command_mutex().unlock();
+    return false;
   }
   return true;
 }
 
-void Commit::hurry() noexcept {
-  patience_ns_.store(monotonic_now_ns() + kPatience, std::memory_order_relaxed);
+void Commit::unlock() noexcept {
+  for (Participant* place : order_) place->task->command_mutex().unlock();
 }
 
-time_ns_t Commit::patience_ends_ns(time_ns_t timeout_at_ns) const noexcept {
-  const time_ns_t began = began_ns_.load(std::memory_order_relaxed);
-  return std::min(patience_ns_.load(std::memory_order_relaxed), std::max(timeout_at_ns, began + kPatience));
+const Task* Commit::find_unfit() const noexcept {
+  for (const Participant* place : order_) {
+    if (place->afterwards == Afterwards::stop || place->repairs) continue;
+    const ComponentState state = place->task->state();
+    if (state == ComponentState::stopping || state == ComponentState::faulted) return place->task;
+  }
+  return nullptr;
 }
 
-bool Commit::abandon() noexcept {
-  std::uint32_t seen = gate_.load(std::memory_order_acquire);
-  while ((seen & kAdopting) != 0 && (seen & (kDone | kAbandoned)) == 0) {
-    if (gate_.compare_exchange_weak(seen, seen | kAbandoned, std::memory_order_acq_rel,
-                                    std::memory_order_acquire)) {
-      futex_wake_all(gate_);  // who waits for its take
-      return true;
+/// The commands held: no start comes between this and the takes of the parked ones.
+void Commit::begin() noexcept {
+  bool takes_epoch = false;
+  for (Participant* place : order_) {
+    Task& task = *place->task;
+    place->period_ns = task.grid().period_ns;
+    place->left_behind = place->afterwards == Afterwards::stop && task.claim();
+    place->in_flight = !place->left_behind && !task.is_parked();
+    // New parts may hang in adopt: that costs the component's own thread, where there is one.
+    const bool has_own_thread = task.has_thread() && place->replaces_parts;
+    place->is_own = place->in_flight || (!place->left_behind && has_own_thread);
+    has_own_ |= place->is_own;
+    takes_epoch |= place->epoch_lead_ns != 0;
+  }
+  // A new epoch counts from T, and lies ahead of all that was executed by now.
+  if (takes_epoch) cut_.raise(order_.front()->task->clock().now_ns());
+}
+
+bool Commit::check() noexcept {
+  for (CommitAction* action : actions_) {
+    if (action->task != nullptr || action->adopt()) continue;
+    refuse(nullptr, *action, nullptr, false);
+    return false;
+  }
+  return true;
+}
+
+void Commit::vote_for_parked() noexcept {
+  for (Participant* place : order_) {
+    if (place->is_own) continue;
+    if (!adopt(*place)) return;
+    // A claimed one executed last at its `entered`: T comes after that.
+    vote(*place, place->task->entered_ns());
+  }
+  if (order_.empty()) cut_.close();
+}
+
+void Commit::post_all(time_ns_t until_ns) noexcept {
+  for (Participant* place : order_) {
+    if (!place->is_own) continue;
+    if (!cut_.look().is_open()) return;
+    if (place->task->post(*place, until_ns)) continue;
+    occupied_ = place->task;
+    call_off(Off::timed_out);
+    return;
+  }
+}
+
+/// In virtual time no thread comes: the requester's runs the components' steps of the change.
+void Commit::visit_simulated() noexcept {
+  for (Participant* place : order_) {
+    if (place->is_own && place->task->is_simulated()) place->task->visit_simulated();
+  }
+}
+
+void Commit::await_decision(time_ns_t until_ns) noexcept {
+  const bool is_simulated = has_own_ && order_.front()->task->is_simulated();
+  while (cut_.look().is_open()) {
+    const time_ns_t now = monotonic_now_ns();
+    if (now >= until_ns || is_simulated) {
+      call_off(Off::timed_out);
+    } else {
+      call_off_if_one_left();
+      futex_wait_until(decided_, 0, std::min(until_ns, now + kLook));
     }
   }
-  return (seen & kAbandoned) != 0;
+}
+
+/// A stop, a fault or a condemnation wins: what it does not get to do itself is done here.
+void Commit::call_off_if_one_left() noexcept {
+  for (const Participant* place : order_) {
+    if (!place->in_flight) continue;
+    const ComponentState state = place->task->state();
+    if (state != ComponentState::running) call_off(Off::withdrawn, place->task);
+  }
+}
+
+void Commit::retract_all(time_ns_t until_ns) noexcept {
+  if (off() == Off::shut_down) until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
+  for (Participant* place : order_) {
+    if (place->left_behind) place->task->give_up_claim();
+    if (!place->is_own) continue;
+    while (!place->task->retract(*place, monotonic_now_ns() + kLook)) {  // busy: its adopt
+      const bool is_late = monotonic_now_ns() >= until_ns && give_up(*place, "adopt");
+      if (!is_late && !place->task->is_left_behind()) continue;
+      kept_by_ = place->task;  // its thread may come back to the record
+      break;
+    }
+  }
+}
+
+void Commit::complete(time_ns_t until_ns) noexcept {
+  for (Participant* place : order_) {
+    if (place->is_own) {
+      place->task->notify_commit();
+    } else {
+      place->task->take_parked(*place);
+      if (place->left_behind) place->task->abandon();
+    }
+  }
+  visit_simulated();
+  until_ns = std::max(until_ns, monotonic_now_ns() + kPatience);
+  start_parked(until_ns);
+  for (Participant* place : order_) {
+    const Task& task = *place->task;
+    while (!place->has_passed() && !task.is_simulated() && !task.is_left_behind()) {
+      const time_ns_t now = monotonic_now_ns();
+      if (now >= until_ns) {
+        const bool is_taking = place->visit_ns.load(std::memory_order_relaxed) != 0;
+        if (!is_taking || give_up(*place, "take")) break;  // it is late: it takes the change by itself
+      }
+      const std::uint32_t to_pass = to_pass_.load(std::memory_order_acquire);
+      if (to_pass != 0) futex_wait_until(to_pass_, to_pass, now + kLook);
+    }
+  }
+  answered_.store(true, std::memory_order_relaxed);  // relaxed: a hint
+}
+
+/// Those whose threads the requester has started: a thread that gets no processor is not waited for beyond the instant.
+void Commit::start_parked(time_ns_t until_ns) noexcept {
+  for (Participant* place : order_) {
+    if (!place->is_own && place->afterwards == Afterwards::restart) place->task->wait_started(until_ns);
+  }
+}
+
+bool Commit::wait_passed(time_ns_t until_ns) const noexcept {
+  for (;;) {
+    const std::uint32_t to_pass = to_pass_.load(std::memory_order_acquire);
+    if (to_pass == 0) return true;
+    const time_ns_t now = monotonic_now_ns();
+    if (now >= until_ns) return false;
+    futex_wait_until(to_pass_, to_pass, std::min(until_ns, now + kLook));  // only the last one wakes it
+  }
+}
+
+/// Condemns a component whose adopt or take lasts beyond all patience; false when it has ended, or has just begun.
+bool Commit::give_up(const Participant& place, const char* call) noexcept {
+  const time_ns_t began = place.visit_ns.load(std::memory_order_relaxed);
+  Task& task = *place.task;
+  if (began == 0 || task.clock().now_ns() - began < kPatience) return false;
+  if (!task.condemn(std::string(call) + " of its new part does not end", task.clock().now_ns())) return false;
+  given_up_ = &task;
+  return true;
+}
+
+// ---- why it was not made
+
+void Commit::rethrow_refusal() const {
+  if (given_up_ != nullptr) {
+    throw Error(ErrorCode::faulted, given_up_->fault().what,
+                {.component = given_up_->name(),
+                 .found = std::string(to_string(given_up_->state())),
+                 .remedy = "remove the component, and add it anew; nothing was changed"});
+  }
+  if (locked_out_ != nullptr) {
+    throw Error(ErrorCode::timeout,
+                "a start of the component, or the end of its thread, lasted; nothing was changed",
+                {.component = locked_out_->name(), .remedy = "try again, or allow a longer commit timeout"});
+  }
+  if (unfit_ != nullptr) throw_unfit();
+  if (!is_refused_.load(std::memory_order_acquire)) throw_off();
+  if (refusal_) std::rethrow_exception(refusal_);
+  if (!adopt_was_late_) return;
+  const time_ns_t declared = refused_by_->declared_ns();
+  throw std::runtime_error("it took " + std::to_string(refused_by_->adopt_ns / us_to_ns(1)) + " us, and " +
+                           (declared != 0
+                                ? "its declared budget is " + std::to_string(declared / us_to_ns(1)) + " us"
+                                : "the commit's timeout was over"));
+}
+
+void Commit::throw_unfit() const {
+  if (unfit_->state() == ComponentState::faulted) {
+    throw Error(ErrorCode::faulted, "the component is FAULTED: " + unfit_->fault().what,
+                {.component = unfit_->name(),
+                 .remedy = unfit_->is_parked() ? Task::kRepairRemedy : Task::kLeftBehindRemedy});
+  }
+  unfit_->throw_state_running("the component is STOPPING", 0, "try again when it has stopped");
+}
+
+void Commit::throw_off() const {
+  switch (off()) {
+    case Off::shut_down:
+      throw Error(ErrorCode::wrong_revision, "the architecture is being shut down; nothing was changed",
+                  {.remedy = "deploy it again first"});
+    case Off::preempted:
+      throw Error(ErrorCode::wrong_revision, "a prepared change came before this one; nothing was changed",
+                  {.remedy = "look at the architecture again, then decide again"});
+    case Off::withdrawn: {
+      const Task* by = off_by_.load(std::memory_order_relaxed);
+      ErrorDetail detail{.element = "state", .remedy = "look at the architecture again, then decide again"};
+      if (by != nullptr) {
+        detail.component = by->name();
+        detail.found = std::string(to_string(by->state()));
+      }
+      throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
+                  detail);
+    }
+    case Off::timed_out:
+    case Off::not_yet:
+      throw_timeout();
+  }
+  throw_timeout();
+}
+
+void Commit::throw_timeout() const {
+  if (occupied_ != nullptr) {
+    occupied_->throw_state_running("the component has not taken an earlier change yet; nothing was changed",
+                                   timeout_ns_, "try again when its state has ended, or remove it by force");
+  }
+  for (const Participant* place : order_) {
+    if (!place->is_own || place->has_agreed.load(std::memory_order_relaxed)) continue;
+    if (place->unfit_waits.load(std::memory_order_relaxed) != 0) {
+      time_ns_t declared = 0;
+      for (const CommitAction* action : place->actions) declared += action->declared_ns();
+      throw Error(ErrorCode::timeout,
+                  "the declared budget fits in no wait of the component; nothing was changed",
+                  {.component = place->task->name(),
+                   .element = "budget_ns",
+                   .expected = "less than what is left of a wait",
+                   .found = std::to_string(declared / us_to_ns(1)) + " us for adopt and take",
+                   .remedy = "declare a shorter budget"});
+    }
+    if (place->in_flight) {
+      place->task->throw_state_running("the component did not reach a wait in time; nothing was changed",
+                                       timeout_ns_, "try again, or allow a longer commit timeout");
+    }
+    throw Error(ErrorCode::timeout, "the component's thread did not get to run in time; nothing was changed",
+                {.component = place->task->name(),
+                 .element = "priority " + std::to_string(place->task->settings().priority),
+                 .remedy = "look for a component of equal or higher priority that does not wait"});
+  }
+  throw Error(ErrorCode::timeout, "the change was not decided in time; nothing was changed",
+              {.remedy = "try again, or allow a longer commit timeout"});
 }
 
 }  // namespace mauve

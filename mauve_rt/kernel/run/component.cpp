@@ -2,6 +2,8 @@
 #include "mauve_rt/run/component.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/error.hpp"
@@ -16,6 +18,9 @@ namespace mauve {
 namespace {
 
 constexpr time_ns_t kShortestUndeclaredPeriod = us_to_ns(100);
+/// How long a command waits for a component that is late to take an earlier change.
+constexpr time_ns_t kEarlierChange = s_to_ns(1);
+constexpr std::chrono::milliseconds kBetweenLooks{1};
 
 }  // namespace
 
@@ -34,16 +39,22 @@ void Component::set_architecture(Architecture* architecture) noexcept {
 
 class Component::JoinedChange {
  public:
-  JoinedChange(Architecture* architecture, ChangeMark& mark) {
+  JoinedChange(Architecture* architecture, const Task& component, ChangeMark& mark) {
     if (architecture == nullptr) return;
     lock_ = architecture->change_lock().join();
     if (!lock_.owns_lock()) return;  // a part of a change, which has claimed what it touches
+    const time_ns_t until = later_by(monotonic_now_ns(), kEarlierChange);
     std::unique_lock gate(architecture->commit_gate().mutex, std::defer_lock);
-    do {
-      if (gate.owns_lock()) gate.unlock();
-      architecture->settle_prepared();
+    for (;;) {
+      architecture->settle_changes();
       gate.lock();
-    } while (mark.is_unsettled());
+      if (!mark.is_unsettled()) break;
+      gate.unlock();
+      if (monotonic_now_ns() >= until)
+        component.throw_state_running("the component has not taken an earlier change yet", kEarlierChange,
+                                      "try again when its state has ended");
+      std::this_thread::sleep_for(kBetweenLooks);
+    }
     mark.claim();
     gate_ = &architecture->commit_gate();
     mark_ = &mark;
@@ -63,7 +74,7 @@ class Component::JoinedChange {
 };
 
 Component::JoinedChange Component::join_change() {
-  return {architecture_.load(std::memory_order_acquire), change_mark_};
+  return {architecture_.load(std::memory_order_acquire), task_, change_mark_};
 }
 
 Architecture& Component::require_listed() const {
@@ -267,7 +278,8 @@ std::string why_missed(const Participant& place) {
   const auto in_us = [](time_ns_t duration_ns) { return std::to_string(duration_ns / us_to_ns(1)) + " us"; };
   if (place.start_clock_ns) return "it starts on the clock that was asked for";
   const bool was_to_go_on = place.grid.first_not_before(place.pending_ns) == place.pending_ns;
-  if (place.afterwards != Afterwards::restart || was_to_go_on) return "it was held past its pending instant";
+  if (place.afterwards != Afterwards::restart || was_to_go_on)
+    return "adopt and take lasted beyond its pending instant";
   return "the pending instant, of a period of " + in_us(place.period_ns) +
          ", is none of the new one's: it starts at the first of " + in_us(place.grid.period_ns) + " after it";
 }
@@ -277,7 +289,11 @@ std::string why_missed(const Participant& place) {
 StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
   report.component = place.task->name();
-  report.blackout_ns = place.armed_ns - place.parked_ns;
+  if (!place.has_passed()) {
+    report.remark = "it is late, and takes the change before its next release";
+    return report;
+  }
+  if (place.in_flight) report.blackout_ns = place.armed_ns - place.parked_ns;
   if (!place.is_followed_by_release()) return report;
   const bool released = place.task->wait_release(place, later_by(monotonic_now_ns(), phase_timeout_ns));
   const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;

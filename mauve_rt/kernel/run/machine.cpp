@@ -67,6 +67,19 @@ void Machine::leave_event_to(const State& initial) noexcept {
   event_ns_ = kNever;
 }
 
+bool Machine::keep_place(std::span<const KeptWait> waits, time_ns_t period_ns) noexcept {
+  if (waiting_ == nullptr || next_ != nullptr) return false;  // parked, or before its first release
+  const auto kept = std::find_if(waits.begin(), waits.end(),
+                                 [this](const KeptWait& wait) { return wait.before == waiting_; });
+  if (kept == waits.end()) return false;
+  const Grid grid{.reference_ns = reference_ns_.load(std::memory_order_relaxed), .period_ns = period_ns};
+  if (event_settled_ && period_ns != 0 && grid.phase_error(clock_ns() - kept->place_ns) != 0) return false;
+  waiting_ = kept->now;
+  grid_place_ns_ = kept->place_ns;
+  current_.store(waiting_->trace_id, std::memory_order_relaxed);
+  return true;
+}
+
 void Machine::park() noexcept {
   if (waiting_ != nullptr && event_ns_ != kNever && fsm_->initial().is_wait)
     waiting_->event->keep(event_ns_);  // for the next start
@@ -77,13 +90,15 @@ void Machine::park() noexcept {
 
 time_ns_t Machine::due_ns() const noexcept {
   if (waiting_ == nullptr) return kForever;
-  return event_settled_ ? clock_ns() : later_by(wait_from_ns_, waiting_->duration_ns);
+  return event_settled_ ? clock_ns() : std::max(later_by(wait_from_ns_, waiting_->duration_ns), earliest_ns_);
 }
 
 void Machine::release(time_ns_t actual_ns) noexcept {
   if (!event_settled_) set_clock_ns(due_ns());  // the time is up, and no event has come
   event_settled_ = true;
   event_ns_ = kNever;
+  entered_ns_.store(std::max(entered_ns(), clock_ns()),
+                    std::memory_order_relaxed);  // relaxed: read when it has parked
   if (next_ == nullptr || !next_->is_wait) active_ns_ = clock_ns();
   statistics_.releases.fetch_add(1, std::memory_order_relaxed);
   statistics_.wakeup.record(actual_ns - clock_ns());
@@ -161,6 +176,7 @@ void Machine::enter_wait(const State& state) {
     return tell_wait();
   }
   wait_from_ns_ = clock_ns();
+  earliest_ns_ = 0;
   event_settled_ = false;
   trace_at(boundary_ns_, TraceKind::wait, state.trace_id, due_ns());
   take_event();  // one may have come meanwhile
@@ -183,7 +199,7 @@ void Machine::take_event() noexcept {
   const std::optional<time_ns_t> came = waiting_->event->consume();
   if (!came) return;
   const time_ns_t earliest = later_by(active_ns_, waiting_->min_interarrival_ns);
-  set_clock_ns(std::max({wait_from_ns_, earliest, *came}));
+  set_clock_ns(std::max({wait_from_ns_, earliest, earliest_ns_, *came}));
   event_ns_ = *came;
   event_settled_ = true;
   tell_wait();
@@ -238,14 +254,21 @@ time_ns_t Machine::earliest_excess_ns() const noexcept {
   return ExecutionWord::end_ns(fact->since_ns, bound);
 }
 
-std::int64_t Machine::skip_lost(time_ns_t held_since_ns, bool may_miss, time_ns_t now_ns) noexcept {
+std::int64_t Machine::skip_lost(time_ns_t since_ns, time_ns_t now_ns) noexcept {
   const time_ns_t period = grid().period_ns;
   const time_ns_t late = now_ns - clock_ns();
-  if (!event_settled_ || period == 0 || late <= 0 || held_since_ns > clock_ns()) return 0;
-  if (late < period && !may_miss) return 0;
+  if (!event_settled_ || period == 0 || late < period || since_ns > clock_ns()) return 0;
   const std::int64_t lost = (late + period - 1) / period;
   set_clock_ns(clock_ns() + lost * period);
   return lost;
+}
+
+void Machine::change_at(time_ns_t instant_ns) noexcept {
+  entered_ns_.store(std::max(entered_ns(), instant_ns - 1),
+                    std::memory_order_relaxed);  // relaxed: as in release()
+  if (waiting_ == nullptr || event_settled_) return;
+  earliest_ns_ = instant_ns;
+  set_clock_ns(std::max(clock_ns(), instant_ns));  // what it writes on a stop belongs to the new parts
 }
 
 time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {

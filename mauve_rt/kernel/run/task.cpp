@@ -46,8 +46,6 @@ std::string_view to_string(ComponentState state) noexcept {
       return "STOPPED";
     case ComponentState::running:
       return "RUNNING";
-    case ComponentState::held:
-      return "HELD";
     case ComponentState::stopping:
       return "STOPPING";
     case ComponentState::faulted:
@@ -153,6 +151,7 @@ void Task::simulate(const Clock& clock, bool trace) {
 
 void Task::end_simulation() noexcept {
   if (!simulated_) return;
+  settle_slot(true);
   clock().leave(*this);
   simulated_ = false;
   machine_.set_clock(MonotonicClock::instance());
@@ -204,12 +203,23 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
   futex_wake_all(control_);
 }
 
-void Task::start(std::optional<time_ns_t> clock_ns) {
+void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   if (is_called_from_own_state()) require_startable();  // refused without the lock, as in stop()
-  const std::lock_guard lock(command_mutex_);
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  const auto throw_late = [&](const char* what, const char* remedy) {
+    throw Error(ErrorCode::timeout, what,
+                {.component = name_,
+                 .expected = "a start within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
+                 .remedy = remedy});
+  };
+  if (!command_mutex_.try_lock_until(until))
+    throw_late("a commit or another command of the component lasts; it was not started", "try again");
+  const std::lock_guard lock(command_mutex_, std::adopt_lock);
   require_startable();
   post_start(start_on(clock_ns));
-  wait_started();
+  if (wait_started(until)) return;
+  throw_late("the component's thread does not get to run; the start stays pending",
+             "look for a component of equal or higher priority that does not wait");
 }
 
 void Task::require_startable() const {
@@ -252,10 +262,13 @@ time_ns_t Task::next_instant() const noexcept {
   return own.first_not_before(std::max(earliest, own.reference_ns));
 }
 
-void Task::wait_started() noexcept {
+bool Task::wait_started(time_ns_t until_ns) noexcept {
   // The thread itself says RUNNING; until then another command would find STOPPED. By a word of its own: a stop may
   // have come since, and the state be STOPPED again.
-  while (started_.load(std::memory_order_acquire) == 0) futex_wait_until(started_, 0, kForever);
+  while (started_.load(std::memory_order_acquire) == 0) {
+    if (!futex_wait_until(started_, 0, until_ns)) return started_.load(std::memory_order_acquire) != 0;
+  }
+  return true;
 }
 
 void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
@@ -272,7 +285,7 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
 void Task::order_stop() {
   const std::lock_guard lock(order_mutex_);
   auto seen = state_.load(std::memory_order_acquire);
-  while (settled(static_cast<ComponentState>(seen)) == ComponentState::running) {
+  while (static_cast<ComponentState>(seen) == ComponentState::running) {
     // acq_rel: a fault in between wins
     if (state_.compare_exchange_weak(seen, static_cast<std::uint32_t>(ComponentState::stopping),
                                      std::memory_order_acq_rel)) {
@@ -285,20 +298,30 @@ void Task::order_stop() {
                  .expected = "RUNNING",
                  .found = std::string(to_string(static_cast<ComponentState>(seen)))});
   }
-  control_.fetch_or(kStop, std::memory_order_seq_cst);  // seq_cst: before the look for a commit
+  control_.fetch_or(kStop, std::memory_order_acq_rel);
 }
 
 bool Task::is_called_from_own_state() const noexcept {
   return Waiter::of_this_thread() == this || (simulated_ && in_resume_);
 }
 
+/// A start that the thread has not taken up yet; false when there is none.
+bool Task::withdraw_start() noexcept {
+  const std::lock_guard lock(order_mutex_);
+  if (state() != ComponentState::stopped) return false;
+  if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return false;
+  started_.store(1, std::memory_order_release);  // who waits for it waits in vain
+  futex_wake_all(started_);
+  return true;
+}
+
 bool Task::stop(time_ns_t timeout_ns, bool force) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  if (withdraw_start()) return false;
   order_stop();
   changes_.bump();
   if (is_called_from_own_state())
     return false;  // it takes effect when the state ends, for which nobody can wait here
-  withdraw_commit();
   if (simulated_) resume();
   futex_wake_all(control_);
   // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.

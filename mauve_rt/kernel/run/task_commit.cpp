@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// A task's part in commits (commit.hpp).
-#include <pthread.h>
-
+// A task's part in commits (commit.hpp): its slot, its votes, its takes.
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -13,211 +11,333 @@ namespace mauve {
 
 namespace {
 
-constexpr int kTries = 3;
-constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without a change, the others missing
+constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without the change
 
 }  // namespace
 
-void Task::post(Participant& place) noexcept {
-  place_.lend(place);
-  control_.fetch_or(kCommit, std::memory_order_seq_cst);
+// ---- the slot: the requester's side
+
+bool Task::post(Participant& place, time_ns_t until_ns) noexcept {
+  std::uint32_t seen = slot_.load(std::memory_order_acquire);
+  while ((seen & kSlot) != kEmpty) {
+    if (simulated_) return false;
+    if (slot_.compare_exchange_weak(seen, seen | kWaited, std::memory_order_acq_rel) &&
+        !futex_wait_until(slot_, seen | kWaited, until_ns))
+      return false;
+    seen = slot_.load(std::memory_order_acquire);
+  }
+  place_ = &place;
+  // seq_cst: the thread, on its way into a park or its end, sees this, or this thread sees that it has parked or ended
+  slot_.store(kPosted, std::memory_order_seq_cst);
+  notify_commit();
+  if (!simulated_ && ended_.load(std::memory_order_seq_cst) != 0)
+    place.commit->call_off(Commit::Off::withdrawn, this);
+  return true;
+}
+
+void Task::notify_commit() noexcept {
+  control_.fetch_or(kCommit, std::memory_order_acq_rel);
   futex_wake_all(control_);
-  if (ended_.load(std::memory_order_seq_cst) != 0) withdraw_commit();  // nobody is left to refuse it
 }
 
-bool Task::retract(time_ns_t until_ns) noexcept {
-  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-  return place_.recall(until_ns);
+bool Task::retract(const Participant& place, time_ns_t until_ns) noexcept {
+  std::uint32_t seen = slot_.load(std::memory_order_acquire);
+  for (;;) {
+    if ((seen & kSlot) == kEmpty || place_ != &place) return true;
+    if ((seen & kSlot) == kPosted) {
+      if (!slot_.compare_exchange_weak(seen, kEmpty, std::memory_order_acq_rel)) continue;
+      control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+      return true;
+    }
+    if (simulated_) return true;
+    if (slot_.compare_exchange_weak(seen, seen | kWaited, std::memory_order_acq_rel) &&
+        !futex_wait_until(slot_, seen | kWaited, until_ns))
+      return false;
+    seen = slot_.load(std::memory_order_acquire);
+  }
 }
 
-void Task::withdraw_commit() noexcept {
-  place_.use([this](Participant& place) { place.commit->call_off(Commit::Off::withdrawn, this); });
+// ---- the slot: the machine's side
+
+bool Task::enter_slot() noexcept {
+  std::uint32_t seen = slot_.load(std::memory_order_seq_cst);
+  while ((seen & kSlot) == kPosted) {
+    if (slot_.compare_exchange_weak(seen, (seen & kWaited) | kBusy, std::memory_order_acq_rel)) return true;
+  }
+  return false;
 }
 
-/// With less time left than the change may take it is better made after the release that is due. A budget that is only
-/// reckoned puts it off some times, not for ever.
-time_ns_t Task::leaves_gate_at(const Participant& place) const noexcept {
-  const time_ns_t due = due_ns();
-  if (due == kForever) return kForever;
-  const Commit& commit = *place.commit;
-  const time_ns_t needed = deferrals_ < kTries ? commit.budget_ns() : commit.declared_ns();
-  return due + commit.may_miss(place) * grid().period_ns - needed;
+void Task::leave_slot(std::uint32_t to) noexcept {
+  if ((slot_.exchange(to, std::memory_order_acq_rel) & kWaited) != 0) futex_wake_all(slot_);
 }
 
-bool Task::may_commit_now() noexcept {
-  if (left_gate_) return false;
-  const time_ns_t now = clock().now_ns();
-  bool may = false;
-  place_.use([&](Participant& place) { may = now < std::min(due_ns(), leaves_gate_at(place)); });
-  return may;
-}
-
-/// A release while a commit is posted, in whose wait the budget did not fit.
-void Task::pass_commit() noexcept {
-  ++deferrals_;
-  place_.use([this](Participant& place) {
-    place.passed.store(static_cast<std::uint32_t>(deferrals_), std::memory_order_relaxed);
-    place.commit->note_came(place);
-  });
-}
-
+/// Votes, and takes a change that is made. False when the component has parked.
 /// Throws when adopt and take of the new core took longer than it declared: the change is in, and its first fault.
-void Task::come_to_commit() {
-  place_.use([this](Participant& place) { visit(place); });
-  const time_ns_t took = std::exchange(overlong_ns_, 0);
-  if (took == 0 || !machine_.is_started()) return;
-  throw std::runtime_error("adopt and take took " + std::to_string(took / 1000) +
-                           " us, longer than the new core declares (budget_ns)");
-}
-
-/// Not by a plain store: a watchdog's FAULTED, or a STOPPING, of this moment has to stay.
-void Task::exchange_state(ComponentState from, ComponentState to) noexcept {
-  auto expected = static_cast<std::uint32_t>(from);
-  state_.compare_exchange_strong(expected, static_cast<std::uint32_t>(to), std::memory_order_acq_rel);
-}
-
-void Task::visit(Participant& place) noexcept {
-  Commit& commit = *place.commit;
-  const time_ns_t due = due_ns();
-  place.parked_ns = clock().now_ns();
-  place.pending_ns = due;
-  place.leaves_at_ns.store(leaves_gate_at(place), std::memory_order_relaxed);
-  place.holds_until_ns = commit.holds_until_ns(place);
-  place.arrived.store(true, std::memory_order_relaxed);
-  exchange_state(ComponentState::running, ComponentState::held);
-  if (!machine_.begin_execution(place.parked_ns, kForever)) {  // who conducts the commit watches it
-    is_abandoned_ = true;
-    return;
-  }
-  const Commit::Answer answer = commit.meet(place);
-  if (answer == Commit::Answer::abandoned || !machine_.end_execution()) {
-    is_abandoned_ = true;
-    return;
-  }
-  exchange_state(ComponentState::held, ComponentState::running);
-  if (answer == Commit::Answer::left) {
-    left_gate_ = true;
-    place.arrived.store(false, std::memory_order_relaxed);
-    return go_on_unchanged(place);
-  }
-  deferrals_ = 0;
-  left_gate_ = false;
-  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-  if (answer == Commit::Answer::off) return go_on_unchanged(place);
-  overlong_ns_ = place.overlong_ns;
-  continue_after(place);
-  commit.gone_on(answer == Commit::Answer::made_it);
-}
-
-/// Makes a change of which all participants are parked, when this one is to.
-bool Task::make_parked() noexcept {
-  bool is_mine = false;
-  place_.use([&](Participant& place) {
-    if (!place.makes_parked) return;
-    is_mine = true;
-    place.leaves_at_ns.store(kForever, std::memory_order_relaxed);
-    parked_.store(0, std::memory_order_release);
-    machine_.begin_execution(clock().now_ns(), kForever);  // who conducts the commit watches it
-    const Commit::Answer answer = place.commit->meet(place);
-    is_abandoned_ = !machine_.end_execution();
-    if (is_abandoned_) return;
-    parked_.store(1, std::memory_order_release);
+bool Task::visit_posted() {
+  if (slot_.load(std::memory_order_acquire) == kEmpty) {
     control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-    place.commit->gone_on(answer == Commit::Answer::made_it);
-  });
-  return is_mine;
+    return true;
+  }
+  return settle_visit(visit_slot());
 }
 
-/// Skips the instants that passed at the gate, or in adopt and take; returns how many.
-std::int64_t Task::skip_lost(const Participant& place, time_ns_t now_ns) noexcept {
-  return machine_.skip_lost(place.parked_ns, place.holds_until_ns != place.pending_ns, now_ns);
+bool Task::settle_visit(Visit visit) {
+  if (visit == Visit::condemned) park_condemned();
+  if (visit != Visit::goes_on) return false;
+  const time_ns_t took = std::exchange(overlong_ns_, 0);
+  if (!machine_.is_started()) return true;
+  if (took != 0)
+    throw std::runtime_error("adopt and take took " + std::to_string(took / us_to_ns(1)) +
+                             " us, longer than the new core declares (budget_ns)");
+  machine_.tell_wait();
+  return true;
 }
 
-void Task::go_on_unchanged(Participant& place) noexcept {
+Task::Visit Task::visit_slot() noexcept {
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // before the look: a later notice is not lost
+  if (!enter_slot()) return Visit::goes_on;
+  Participant& place = *place_;
+  if (place.in_flight && !machine_.is_started()) {  // posted just before the park
+    end_slot(place);
+    return Visit::goes_on;
+  }
+  const time_ns_t began = clock().now_ns();
+  if (!place.has_voted) {
+    if (!fits_in_wait(place)) {
+      leave_slot(kPosted);
+      return Visit::goes_on;
+    }
+    if (!vote(place, began)) return Visit::condemned;
+  }
+  return look_at_cut(place, began);
+}
+
+/// In a wait, after its vote.
+Task::Visit Task::look_at_cut(Participant& place, time_ns_t began_ns) noexcept {
+  const CutWord seen = place.commit->look();
+  const bool belongs_to_new = due_ns() == kForever || !machine_.is_settled() || due_ns() >= seen.instant_ns();
+  if (seen.is_closed() && belongs_to_new) return take(place, began_ns);
+  if (!place.has_voted) {
+    trace_refusal(place, began_ns);
+  } else {
+    skip_lost(place, began_ns);
+  }
+  leave_slot(seen.is_off() ? kEmpty : kPosted);
+  return Visit::goes_on;
+}
+
+/// Its own adopt has refused, or the commit was called off while that lasted.
+void Task::trace_refusal(Participant& place, time_ns_t began_ns) noexcept {
+  if (!machine_.is_started()) return;
+  const time_ns_t pending = due_ns();
+  machine_.trace_at(began_ns, TraceKind::parked, machine_.state_name(), pending);
+  for (const CommitAction* action : place.actions) {
+    if (action->trace_id() != 0 && action->adopt_ns != 0)
+      machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
+  }
   const time_ns_t now = machine_.look_at_clock();
-  const std::int64_t lost = skip_lost(place, now);
-  if (lost == 0) return;
+  const std::int64_t lost = machine_.skip_lost(began_ns, now);
   place.lost += lost;
+  machine_.trace_at(now, TraceKind::armed, machine_.state_name(), due_ns(), 0, lost);
+}
+
+/// Before the release that is due: the cut says in one step whether its clock belongs to the old parts.
+bool Task::visit_before_release() {
+  if (!enter_slot()) return true;
+  Participant& place = *place_;
+  if (!place.has_voted) {
+    leave_slot(kPosted);
+    return true;
+  }
+  const CutWord seen = place.commit->raise(due_ns());
+  if (seen.is_closed() && due_ns() >= seen.instant_ns())
+    return settle_visit(take(place, clock().now_ns())) && machine_.is_started();
+  leave_slot(seen.is_off() ? kEmpty : kPosted);
+  return true;
+}
+
+/// With less time left than adopt and take declare, the change is made after the release that is due.
+bool Task::fits_in_wait(Participant& place) const noexcept {
+  const time_ns_t due = due_ns();
+  if (simulated_ || due == kForever) return true;
+  time_ns_t declared = 0;
+  for (const CommitAction* action : place.actions) declared += action->declared_ns();
+  if (declared == 0 || clock().now_ns() + declared <= due) return true;
+  place.unfit_waits.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+/// False when the thread was condemned meanwhile; the slot is left then.
+bool Task::vote(Participant& place, time_ns_t began_ns) noexcept {
+  Commit& commit = *place.commit;
+  if (!machine_.begin_execution(began_ns, kForever)) {  // the requester watches it
+    leave_slot(kPosted);
+    return false;
+  }
+  place.visit_ns.store(began_ns, std::memory_order_relaxed);
+  const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
+  const bool has_agreed = commit.adopt(place);
+  place.visit_ns.store(0, std::memory_order_relaxed);
+  if (!machine_.end_execution()) {
+    commit.call_off(Commit::Off::withdrawn, this);
+    leave_slot(kEmpty);
+    return false;
+  }
+  if (was_parked) parked_.store(1, std::memory_order_seq_cst);
+  if (has_agreed) commit.vote(place, machine_.entered_ns());
+  return true;
+}
+
+Task::Visit Task::take(Participant& place, time_ns_t began_ns) noexcept {
+  Commit& commit = *place.commit;
+  if (!machine_.begin_execution(clock().now_ns(), kForever)) {
+    leave_slot(kPosted);
+    return Visit::condemned;
+  }
+  const bool was_started = machine_.is_started();
+  const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
   const std::uint32_t wait_name = machine_.state_name();
-  machine_.trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
-  machine_.trace_at(now, TraceKind::armed, wait_name, due_ns(), kInVain, lost);
+  place.visit_ns.store(clock().now_ns(), std::memory_order_relaxed);
+  place.parked_ns = began_ns;
+  place.pending_ns = was_started ? due_ns() : 0;
+  // Of the time before T: where an end of these moves, what its new owner has written since stays.
+  if (was_started && place.replaces_parts) write_outputs(true, commit.instant_ns() - 1);
+  place_kept_ = false;
+  overlong_ns_ = commit.take(place);
+  machine_.change_at(commit.instant_ns());
+  place.visit_ns.store(0, std::memory_order_relaxed);
+  const bool is_condemned = !machine_.end_execution();
+  const bool stops = was_started && place.afterwards == Afterwards::stop;
+  if (was_parked && !is_condemned) parked_.store(1, std::memory_order_seq_cst);
+  if (was_started) trace_take(place);
+  if (is_condemned) {
+    place.released.store(Participant::kSuperseded, std::memory_order_release);
+  } else if (!stops) {
+    go_on_with(place, was_started);
+  }
+  place.armed_ns = machine_.look_at_clock();
+  const bool goes_on = !is_condemned && !stops && machine_.is_started();
+  // In adopt and take: they are no overrun of the component. Counted by what lies between the pending instant and the release.
+  const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, place.armed_ns) : 0;
+  place.resumes_ns = due_ns();
+  if (was_started) machine_.trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
+  if (stops && !is_condemned) park_stopped();
+  pass(place);
+  if (is_condemned) return Visit::condemned;
+  return stops ? Visit::parks : Visit::goes_on;
+}
+
+void Task::pass(Participant& place) noexcept {
+  const bool is_late = place.commit->is_answered();
+  place.commit->pass(place);
+  leave_slot(kEmpty);
+  if (is_late) signal_change();  // it can be completed
+}
+
+void Task::go_on_with(Participant& place, bool was_started) noexcept {
+  const time_ns_t epoch_ns =
+      place.epoch_lead_ns != 0 ? later_by(place.commit->instant_ns() - 1, place.epoch_lead_ns) : 0;
+  const bool restarts = place.afterwards == Afterwards::restart && !place_kept_;
+  if (!was_started) {
+    if (epoch_ns != 0) join(epoch_ns);
+    if (!restarts) return;
+    if (!simulated_) counters_.mark();
+    regain_priority();
+    return start_machine(start_on(place.start_clock_ns));
+  }
+  if (epoch_ns != 0) {
+    place.shift_ns = machine_.resynchronise(epoch_ns);
+  }
+  if (!restarts && (epoch_ns != 0 || place_kept_)) machine_.trace_deployment();
+  if (restarts) start_machine(restart_instant(place));
+  place.grid = grid();
+  place.grid_place_ns = machine_.grid_place_ns();
+  if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
+    earlier->released.store(Participant::kSuperseded, std::memory_order_release);
+    futex_wake_all(earlier->released);
+  }
 }
 
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
 time_ns_t Task::restart_instant(const Participant& place) noexcept {
   if (place.start_clock_ns) return start_on(place.start_clock_ns);
+  const bool is_pending =
+      machine_.is_settled() && place.pending_ns != kForever;  // else an event may come any time
   const time_ns_t earliest =
-      machine_.is_settled() ? place.pending_ns : clock().now_ns();  // an event may come any time
+      std::max(place.commit->instant_ns(), is_pending ? place.pending_ns : clock().now_ns());
   return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
 }
 
-void Task::continue_after(Participant& place) noexcept {
-  const Commit& commit = *place.commit;
-  const std::uint32_t wait_name = machine_.state_name();
-  machine_.trace_at(place.parked_ns, TraceKind::parked, wait_name, place.pending_ns);
-  for (const CommitAction* action : commit.actions()) {
-    if (action->task != this || action->trace_id() == 0) continue;  // another component's, or a mere check
+void Task::trace_take(const Participant& place) noexcept {
+  machine_.trace_at(place.parked_ns, TraceKind::parked, machine_.state_name(), place.pending_ns);
+  for (const CommitAction* action : place.actions) {
+    if (action->trace_id() == 0) continue;  // a mere check
     machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
-    if (commit.committed())
-      machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
+    machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
   }
-  const bool committed = commit.committed();
-  if (committed && place.epoch_ns != nullptr) {
-    place.shift_ns = machine_.resynchronise(*place.epoch_ns);
-    if (place.afterwards == Afterwards::go_on) machine_.trace_deployment();
-  }
-  if (committed && place.afterwards != Afterwards::stop) {
-    if (place.afterwards == Afterwards::restart) start_machine(restart_instant(place));
-    place.grid = grid();
-    place.grid_place_ns = machine_.grid_place_ns();
-    if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
-      earlier->released.store(Participant::kSuperseded, std::memory_order_release);
-      futex_wake_all(earlier->released);
-    }
-  }
-  place.armed_ns = machine_.look_at_clock();
-  const bool ends = committed && place.afterwards == Afterwards::stop;
-  const std::int64_t lost = ends ? 0 : skip_lost(place, place.armed_ns);
-  place.resumes_ns = due_ns();
-  machine_.trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), committed ? 1 : 0, lost);
-  if (ends) park_stopped();
 }
 
-void Task::hold_parked(Participant& place) const noexcept {
-  place.parked_ns = place.armed_ns = clock().now_ns();
-  if (place.in_flight) place.pending_ns = due_ns();
+/// Skips the instants that passed in an adopt without a take: they are no overrun of the component.
+void Task::skip_lost(Participant& place, time_ns_t began_ns) noexcept {
+  if (!machine_.is_started()) return;
+  const time_ns_t now = machine_.look_at_clock();
+  const time_ns_t pending = due_ns();
+  const std::int64_t lost = machine_.skip_lost(began_ns, now);
+  if (lost == 0) return;
+  place.lost += lost;
+  machine_.trace_at(began_ns, TraceKind::parked, machine_.state_name(), pending);
+  machine_.trace_at(now, TraceKind::armed, machine_.state_name(), due_ns(), kInVain, lost);
 }
 
-void Task::finish_parked(Participant& place, bool committed) noexcept {
-  if (place.in_flight) {
-    continue_after(place);
-    return clock().due_changed(*this);
+/// On the way into a park, and to the thread's end: calls off a commit that is open, takes one that is made. One that was
+/// posted for a parked component stays, unless the thread ends. Whether it has taken one.
+bool Task::settle_slot(bool ends) noexcept {
+  if (!enter_slot()) return false;
+  Participant& place = *place_;
+  if (place.in_flight || ends) return end_slot(place);
+  leave_slot(kPosted);
+  return false;
+}
+
+bool Task::end_slot(Participant& place) noexcept {
+  Commit& commit = *place.commit;
+  if (commit.call_off(Commit::Off::withdrawn, this)) {
+    leave_slot(kEmpty);
+    return false;
   }
-  if (committed && place.epoch_ns != nullptr) join(*place.epoch_ns);
-  const bool can_start =
-      simulated_ || has_thread_;  // a shutdown may have come before the commit held the task
-  if (committed && can_start && place.afterwards == Afterwards::restart) {
+  const bool was_started = machine_.is_started();
+  place.parked_ns = clock().now_ns();
+  place.pending_ns = was_started ? due_ns() : 0;
+  commit.take(place);
+  machine_.change_at(commit.instant_ns());
+  place.armed_ns = place.resumes_ns = machine_.look_at_clock();
+  place.released.store(Participant::kSuperseded, std::memory_order_release);  // it parks, so none follows
+  if (was_started) {
+    trace_take(place);
+    machine_.trace_at(place.armed_ns, TraceKind::armed, machine_.state_name(), place.pending_ns, 1);
+  }
+  pass(place);
+  return true;
+}
+
+void Task::take_parked(Participant& place) noexcept {
+  Commit& commit = *place.commit;
+  place.parked_ns = clock().now_ns();
+  commit.take(place);
+  machine_.change_at(commit.instant_ns());
+  if (place.epoch_lead_ns != 0) join(later_by(commit.instant_ns() - 1, place.epoch_lead_ns));
+  // A shutdown may have come before the commit held the task.
+  const bool can_start = simulated_ || has_thread();
+  if (can_start && place.afterwards == Afterwards::restart) {
     post_start(start_on(place.start_clock_ns));
-    wait_started();
+  } else {
+    started_.store(1, std::memory_order_relaxed);  // relaxed: nobody but its requester waits for it
   }
+  place.armed_ns = clock().now_ns();
+  commit.pass(place);
 }
 
-void Task::fault_parked(const std::string& what) {
-  FaultNote note{.what = std::make_shared<const std::string>(what), .when_ns = clock().now_ns()};
-  swap_fault(note);
-  publish_state(ComponentState::faulted);
-}
-
-/// But for one that was posted after the park, and which this thread is to make, if it has not ended.
-void Task::refuse_commit() noexcept {
-  if ((control_.load(std::memory_order_seq_cst) & kCommit) == 0) return;
-  const bool makes = ended_.load(std::memory_order_relaxed) == 0;  // written by this thread
-  place_.use([&](Participant& place) {
-    if (place.makes_parked && makes) return;
-    control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // in here: after it the next one may be posted
-    place.commit->call_off(Commit::Off::withdrawn, this);
-  });
-}
+// ---- after a commit
 
 void Task::leave_behind(std::shared_ptr<void> used) {
   const std::lock_guard lock(fault_mutex_);
@@ -238,10 +358,10 @@ void Task::forget_release(Participant& place) noexcept {
   wait_release(place, kForever);
 }
 
-void Task::write_outputs(bool commit) noexcept {
+void Task::write_outputs(bool commit, time_ns_t time_ns) noexcept {
   for (const auto& port : shell_->ports()) {
     const OutputOptions output = port->output();
-    if ((commit ? output.on_commit : output.on_stop) == OutputPolicy::set_zero) port->write_zero();
+    if ((commit ? output.on_commit : output.on_stop) == OutputPolicy::set_zero) port->write_zero(time_ns);
   }
 }
 

@@ -24,7 +24,7 @@ bool Task::condemn(std::string what, time_ns_t now_ns) {
 /// A stop has been ordered by then, so that the thread finds its way out when what it does ends.
 bool Task::condemn_unless_waiting() {
   const auto execution = machine_.execution().look_at_any();
-  // After that look: one that came to a gate in between has another number, one that came to a wait is not harmed here.
+  // After that look: one that began an adopt in between has another number, one that came to a wait is not harmed here.
   const std::optional<PresentState::Fact> fact = machine_.present().look();
   if (!execution || !fact || fact->is_wait || fact->since_ns == 0) return false;
   const std::string state = TraceNames::word(fact->name);
@@ -46,7 +46,6 @@ void Task::carry_out_sentence() noexcept {
   if (verdict_.bound_ns != 0) tell_over_declared();
   swap_fault(verdict_);  // the fault before this one stays there: a watchdog frees nothing
   publish_state(ComponentState::faulted);
-  withdraw_commit();  // it cannot come to the gate any more
   if (has_thread_.load(std::memory_order_acquire)) {
     const sched_param ordinary{};
     MAUVE_RT_TRUSTED(pthread_setschedparam(thread_.handle(), SCHED_OTHER, &ordinary));  // what a fault costs

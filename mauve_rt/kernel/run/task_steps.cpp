@@ -10,13 +10,15 @@
 
 namespace mauve {
 
-void Task::resume() noexcept {
+/// Steps of the component's own, whatever they throw.
+template <typename Steps>
+void Task::run_guarded(Steps&& steps) noexcept {
   if (in_resume_) return;  // in virtual time a state may stop its own component, or raise an event for it
   in_resume_ = true;
   const auto held_before = PiMutex::held_by_this_thread();
   PiMutex::was_misused_by_this_thread();  // what others did on a simulation's thread is not this component's
   try {
-    step();
+    steps();
   } catch (const OverBound& failure) {
     park_faulted(nullptr, failure.bound_ns);
   } catch (const std::exception& failure) {
@@ -30,29 +32,33 @@ void Task::resume() noexcept {
   if (simulated_) clock().due_changed(*this);
 }
 
+void Task::resume() noexcept {
+  run_guarded([this] { step(); });
+}
+
+void Task::visit_simulated() noexcept {
+  run_guarded([this] { visit_posted(); });
+}
+
 void Task::step() {
   if (!machine_.is_started()) return take_up_start();
   const std::uint32_t control = control_.load(std::memory_order_acquire);
   if ((control & kStop) != 0) return park_stopped();
-  if ((control & kCommit) != 0 && may_commit_now()) {
-    come_to_commit();
-    if (std::exchange(is_abandoned_, false)) return park_condemned();
-    if (!machine_.is_started()) return;
-    machine_.tell_wait();
-  }
+  if ((control & kCommit) != 0 && !visit_posted()) return;
   if ((control & kEvent) != 0) settle_event();
   const time_ns_t now = clock().now_ns();
   if (now < due_ns()) return;
+  // relaxed: what this thread has voted for it finds; for what it has not its later vote raises the cut
+  if (slot_.load(std::memory_order_relaxed) != kEmpty) {
+    if (!visit_before_release() || clock().now_ns() < due_ns()) return;
+  }
   release(now);
   run_to_next_wait();
 }
 
-void Task::take_up_start() noexcept {
-  const std::uint32_t control = control_.load(std::memory_order_acquire);
-  if ((control & kCommit) != 0 && !make_parked()) refuse_commit();  // posted just before the park
-  if (std::exchange(is_abandoned_, false)) return park_condemned();
-  if ((control & kStart) == 0) return;
-  control_.fetch_and(~kStart, std::memory_order_acq_rel);
+void Task::take_up_start() {
+  if (!visit_posted() || machine_.is_started()) return;  // the change has started it
+  if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return;
   if (!simulated_) counters_.mark();
   regain_priority();
   start_machine(start_at_ns_);
@@ -70,8 +76,6 @@ void Task::start_machine(time_ns_t instant_ns) noexcept {
 
 void Task::release(time_ns_t actual_ns) noexcept {
   machine_.release(actual_ns);
-  if ((control_.load(std::memory_order_relaxed) & kCommit) != 0 && !left_gate_) pass_commit();
-  left_gate_ = false;
   if (awaiting_release_.load(std::memory_order_relaxed) == nullptr) return;
   if (Participant* place = awaiting_release_.exchange(nullptr, std::memory_order_acq_rel)) {
     place->release_nominal_ns = machine_.clock_ns();
@@ -90,6 +94,9 @@ void Task::run_to_next_wait() {
         continue;
       case Machine::Entered::wait:
         if ((control_.load(std::memory_order_relaxed) & kEvent) != 0) settle_event();
+        // relaxed: who posts this moment sets the bit itself
+        if (slot_.load(std::memory_order_relaxed) != kEmpty)
+          control_.fetch_or(kCommit, std::memory_order_acq_rel);
         return;
       case Machine::Entered::condemned:
         return park_condemned();
@@ -112,7 +119,6 @@ void Task::signal_event() noexcept {
     clock().due_changed(*this);
   } else if ((before & kEvent) == 0) {
     futex_wake_all(control_);
-    if (place_.is_lent()) place_.use([](Participant& place) { place.commit->poke(); });
   }
 }
 
@@ -135,6 +141,7 @@ void Task::signal_awaited() noexcept {
 }
 
 void Task::park_stopped() noexcept {
+  settle_slot();
   if (!machine_.leave()) return park_condemned();
   write_outputs(false);
   machine_.trace(TraceKind::stop, machine_.state_name(), machine_.clock_ns());
@@ -158,15 +165,16 @@ void Task::tell_over_declared() noexcept {
 }
 
 void Task::end_in_fault() noexcept {
+  const bool has_new_parts = settle_slot();
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   write_outputs(false);
-  const bool stays =
-      !machine_.is_started() || (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  const bool stays = has_new_parts || !machine_.is_started() ||
+                     (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
   if (fallback == nullptr) return park(ComponentState::faulted);
   // Not parked in between: nobody may take parts away that are put in this moment.
   publish_state(ComponentState::faulted);
-  refuse_commit();
+  settle_slot();
   fall_back(*fallback);
 }
 
@@ -180,13 +188,11 @@ void Task::fall_back(CommitAction& fallback) noexcept {
 
 void Task::park(ComponentState state) noexcept {
   machine_.park();
-  deferrals_ = 0;
-  left_gate_ = false;
   overlong_ns_ = 0;
   control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);
-  parked_.store(1, std::memory_order_release);
+  parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
-  refuse_commit();  // last: who is refused finds the state that tells why
+  settle_slot();  // last: who is refused finds the state that tells why
 }
 
 void Task::publish_state(ComponentState state) noexcept {

@@ -107,7 +107,7 @@ void Task::thread_main() noexcept {
   counters_.detach();
   // seq_cst: a commit posted this moment is found here, or post() finds that the thread has ended
   ended_.store(1, std::memory_order_seq_cst);
-  refuse_commit();
+  settle_slot(true);
   futex_wake_all(ended_);
 }
 
@@ -115,7 +115,7 @@ bool Task::must_act(std::uint32_t control) noexcept {
   if (!machine_.is_started()) return (control & (kStart | kCommit)) != 0;
   if ((control & kStop) != 0) return true;
   if ((control & kEvent) != 0 && !machine_.is_settled()) return true;
-  return (control & kCommit) != 0 && may_commit_now();
+  return (control & kCommit) != 0;
 }
 
 }  // namespace mauve

@@ -210,7 +210,7 @@ def _stop_recording(ros: Any) -> Request:
 
 
 def _commit(ros: Any) -> dict[str, Any]:
-    return {"timeout_s": ros.commit_timeout_s, "max_missed": ros.max_missed, "force": ros.force}
+    return {"timeout_s": ros.commit_timeout_s, "force": ros.force}
 
 
 def _common(ros: Any) -> dict[str, Any]:

@@ -143,7 +143,6 @@ class Supervisor:
                 for step in request.steps
             ],
             dry_run=request.dry_run,
-            max_missed=request.max_missed,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
         self._call(client, message).add_done_callback(lambda future: on_reply(request.request_id, future))

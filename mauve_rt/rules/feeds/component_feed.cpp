@@ -106,7 +106,7 @@ void ComponentFeed::begin(const Task& task) {
   const time_ns_t released_ns = task.released_ns();
   tell(Befalls::release, released_ns != 0 ? released_ns : now_ns, period_s_.load(std::memory_order_relaxed));
   on_overrun(now_ns, task.statistics().overruns.load(std::memory_order_relaxed));
-  on_state(now_ns, settled(task.state()));
+  on_state(now_ns, task.state());
 }
 
 void ComponentFeed::listen(std::shared_ptr<Component> component) {
@@ -114,13 +114,13 @@ void ComponentFeed::listen(std::shared_ptr<Component> component) {
   seen_change_ = task.changes().word.load(std::memory_order_acquire);
   const time_ns_t late_ns = hears(Befalls::release) ? INT64_MIN : earliest(Befalls::late_wakeup);
   for (;;) {
-    const ComponentState state = settled(task.state());
+    const ComponentState state = task.state();
     begin(task);  // before anybody else tells
     if (!task.listening().listen(*this, late_ns, earliest(Befalls::late_response))) {
       throw Error(ErrorCode::out_of_range, "other rules listen to the component already",
                   {.component = name_, .remedy = "have one set of rules for an architecture"});
     }
-    if (settled(task.state()) == state) break;
+    if (task.state() == state) break;
     task.listening().unlisten();  // it changed just before: nobody may have told
   }
   component_ = std::move(component);

@@ -37,7 +37,7 @@ class ReconfigurationPhase(IntEnum):
 
 
 IN_VAIN = 2
-"""Value of `b` in records of kind ARMED: instants passed while others were missing; nothing was changed."""
+"""Value of `b` in records of kind ARMED: the change was called off; nothing was changed."""
 
 
 RECORD = np.dtype(

@@ -51,7 +51,7 @@ class Reconfiguration:
 def reconfigurations(trace: Trace) -> list[Reconfiguration]:
     """All reconfigurations in a trace by time.
 
-    A park that the bag ends in is none (yet), nor is one that ended without a change as others were missing.
+    A park that the bag ends in is none (yet), nor is one whose change was called off.
     """
     found = [one for component in trace.components for one in _of_component(trace, component)]
     return sorted(found, key=lambda one: one.parked_ns)

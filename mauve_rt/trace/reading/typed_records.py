@@ -117,7 +117,7 @@ class Armed(NamedTuple):
     wait: str
     pending_ns: int
     committed: bool
-    """False: refused by adopt, or others were missing; everything is as before."""
+    """False: refused by adopt, or called off; everything is as before."""
     lost: int = 0
     """Instants that passed since it was parked: the change's own, not overruns."""
 

@@ -151,7 +151,7 @@ TEST_F(Hygiene, AComponentNeedsNoArenaOfTheAllocator) {
   deploy();
   for (const auto& component : architecture.components()) wait_runs(*component, 3);
   deployer.shutdown();
-  EXPECT_GE(before + 1, arenas()) << "one may be the conductor's";
+  EXPECT_GE(before + 1, arenas()) << "one may be the watchdog's";
 }
 
 TEST_F(Hygiene, AllocationsOfAComponentAreCountedOneByOne) {

@@ -50,9 +50,7 @@ class Rule11Force : public Deployed {
             .core = std::make_unique<TestCore>(),
             .fsm = std::make_unique<TestFsm>()};
   }
-  ComponentState state(const std::string& name) const {
-    return settled(architecture.component(name).task().state());
-  }
+  ComponentState state(const std::string& name) const { return architecture.component(name).task().state(); }
   static void wait_parked(const Component& component) {
     wait_until([&] { return component.task().is_parked(); }, "the park");
   }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Rule 7: a new fsm starts at the pending instant where that lies on its own grid, else at the first of its grid after
-// it; the report says what that cost.
+// Rule 7: a new fsm goes on in the wait of the same name; else it starts at the pending instant where that lies on its own
+// grid, else at the first of its grid after it; the report says what that cost.
+#include <algorithm>
+#include <random>
+
 #include "simulated.hpp"
 
 namespace mauve::testing {
@@ -45,13 +48,18 @@ struct LeadInFsm : Fsm<TestShell, TestCore> {
 };
 
 struct EventFsm : Fsm<TestShell, TestCore> {
+  explicit EventFsm(std::string name = "Event") : name_(std::move(name)) {}
+
   void define() override {
     State& run = execution("Run", "act", &TestCore::act);
-    State& pause = wait_event("Event", shell().input, s_to_ns(10), us_to_ns(1));
+    State& pause = wait_event(name_, shell().input, s_to_ns(10), us_to_ns(1));
     set_initial(run);
     next(run, pause);
     next(pause, run);
   }
+
+ private:
+  std::string name_;
 };
 
 std::unique_ptr<ChainFsm> chain_ms(const std::vector<std::int64_t>& waits_ms) {
@@ -130,7 +138,7 @@ TEST_F(Rule7Restart, WithoutAGridItStartsAtThePendingInstantAndFromAnEventNow) {
   EXPECT_EQ(ms_to_ns(3), due_ns());
   run_to(us_to_ns(3'500));
   EXPECT_EQ(ms_to_ns(3) + s_to_ns(10), due_ns()) << "it waits for an event";
-  EXPECT_EQ(0, replace(us_to_ns(4'500), std::make_unique<EventFsm>()).missed_releases);
+  EXPECT_EQ(0, replace(us_to_ns(4'500), std::make_unique<EventFsm>("Other")).missed_releases);
   EXPECT_EQ(us_to_ns(4'500), due_ns());
   run_to(us_to_ns(4'600));
   EXPECT_EQ(0, replace(us_to_ns(4'700), chain_ms({2})).missed_releases);
@@ -159,7 +167,84 @@ TEST_F(Rule7Restart, ThePhaseIsThatOfTheStateWhateverWaitItLeaves) {
   EXPECT_EQ(ms_to_ns(3), releases[1].c) << "after 13 ms, on a grid of 10";
 }
 
+TEST_F(Rule7Restart, AnFsmThatHasTheWaitGoesOnInItsPlace) {
+  replace(us_to_ns(500), chain_ms({4, 6, 5}));
+  std::vector<std::string> entered;
+  auto& core = component().core_as<TestCore>();
+  core.work = [&] { entered.push_back(component().task().current_state()); };
+  const StepReport first =
+      replace(ms_to_ns(17), chain_ms({4, 6, 5}));  // 15, and pending: 19, the end of Wait0
+  EXPECT_EQ(ms_to_ns(19), due_ns());
+  EXPECT_EQ(0, first.missed_releases);
+  EXPECT_EQ(0, first.phase_nominal_ns);
+  EXPECT_TRUE(records_of(host().drain_trace(), TraceKind::start).empty());
+  replace(ms_to_ns(20),
+          chain_ms({1, 9, 20}));  // pending: 25, which is 10 after 15, and 15 + 15 on a grid of 30
+  EXPECT_EQ(ms_to_ns(30), due_ns()) << "15 is not on the grid of 30: it restarts at the first after 25";
+  run_to(ms_to_ns(61));
+  EXPECT_EQ((std::vector<std::string>{"Run0", "Run1", "Run0", "Run1", "Run2", "Run0", "Run1"}), entered);
+}
+
+TEST_F(Rule7Restart, AnEventWaitOfTheSameNameGoesOnToo) {
+  replace(us_to_ns(2'500), std::make_unique<EventFsm>());
+  run_to(us_to_ns(3'500));
+  const int runs = component().core_as<TestCore>().runs;
+  replace(us_to_ns(4'500), std::make_unique<EventFsm>());
+  EXPECT_EQ(ms_to_ns(3) + s_to_ns(10), due_ns()) << "it still waits";
+  run_to(us_to_ns(9'500));
+  EXPECT_EQ(runs, component().core_as<TestCore>().runs);
+}
+
+TEST_F(Rule7Restart, NoReleaseOfAnFsmWithSeveralWaitsIsLostInAnySwap) {
+  replace(us_to_ns(500), chain_ms({4, 6, 5}));
+  auto& core = component().core_as<TestCore>();
+  core.instants.clear();
+  core.instants.reserve(1000);
+  std::minstd_rand random(7);
+  time_ns_t at = ms_to_ns(16);
+  for (int swap = 0; swap < 300; ++swap) {
+    at += static_cast<time_ns_t>(random() % static_cast<unsigned>(ms_to_ns(7)));
+    EXPECT_EQ(0, replace(at, chain_ms({4, 6, 5})).missed_releases);
+  }
+  ASSERT_GT(core.instants.size(), 100U);
+  for (std::size_t i = 1; i < core.instants.size(); ++i) {
+    const time_ns_t place = (core.instants[i] - simulation.epoch_ns()) % ms_to_ns(15);
+    EXPECT_EQ(place == 0             ? ms_to_ns(5)
+              : place == ms_to_ns(4) ? ms_to_ns(4)
+                                     : ms_to_ns(6),
+              core.instants[i] - core.instants[i - 1]);
+  }
+}
+
 using Rule7RestartOnThreads = Deployed;
+
+TEST_F(Rule7RestartOnThreads, AnFsmWithSeveralWaitsKeepsItsPlace) {
+  add("c", 1, {.trace_records = std::size_t{1} << 15U});
+  deploy();
+  const auto commit = [this](std::unique_ptr<FsmBase> fsm) {
+    Transaction transaction;
+    transaction.replace_fsm("c", std::move(fsm));
+    return deployer.commit(std::move(transaction), {.timeouts = {.phase_ns = s_to_ns(10)}}).steps.front();
+  };
+  commit(chain_ms({4, 6, 5}));
+  deployer.drain_trace();
+  for (int change = 0; change < 30; ++change) {
+    std::this_thread::sleep_for(std::chrono::microseconds(700 * (change % 17)));
+    const StepReport report = commit(chain_ms({4, 6, 5}));
+    EXPECT_EQ(0, report.phase_nominal_ns);
+  }
+  const TraceDrain drain = deployer.drain_trace();
+  EXPECT_TRUE(records_of(drain, TraceKind::start).empty()) << "none began anew";
+  const auto releases = records_of(drain, TraceKind::release);
+  const auto lost = records_of(drain, TraceKind::overrun).size();
+  const auto armed = records_of(drain, TraceKind::armed);
+  const bool has_stalled = lost != 0 || std::any_of(armed.begin(), armed.end(),
+                                                    [](const TraceRecord& record) { return record.c != 0; });
+  for (std::size_t i = 1; i < releases.size() && !has_stalled; ++i) {
+    const time_ns_t wait = releases[i].a - releases[i - 1].a;
+    EXPECT_TRUE(wait == ms_to_ns(4) || wait == ms_to_ns(6) || wait == ms_to_ns(5)) << wait;
+  }
+}
 
 TEST_F(Rule7RestartOnThreads, NoReleaseIsMissedOnAnEqualGrid) {
   add("c", 1, {.trace_records = std::size_t{1} << 15U});

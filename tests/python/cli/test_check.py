@@ -92,8 +92,8 @@ def test_a_steps_file_by_itself(check: Check) -> None:
     assert [line.partition(" ")[0] for line in errors] == ["steps:3:10:"]
 
 
-def test_steps_beside_what_may_be_missed_are_a_steps_file_too(check: Check) -> None:
-    whole = "max_missed: 1\nsteps:\n" + STEPS
+def test_steps_in_a_file_with_settings_are_a_steps_file_too(check: Check) -> None:
+    whole = "force: true\nsteps:\n" + STEPS
     good = "steps: 3 steps, tried on robot: no error found"
     status, out, errors = check(robot=ROBOT, steps=whole)
     assert (status, out[1:], errors) == (0, [good], [])

@@ -8,6 +8,7 @@ from rich.console import Console
 from mauve_msgs.msg import ComponentInfo, PortInfo, ResourceInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.list_view import STATES, print_components
+from mauve_rt.supervision.view_signals import COMPONENT_STATES
 
 
 def _printed(reply: ListComponents.Response, *, width: int = 80) -> list[str]:
@@ -104,8 +105,10 @@ def test_forty_components_of_long_names_lose_no_word_on_a_narrow_terminal(width:
 
 
 def test_states_are_those_of_the_message() -> None:
-    for number, name in enumerate(STATES):
+    for number, name in STATES.items():
         assert getattr(ComponentInfo, name) == number
+        assert COMPONENT_STATES[name] == number
+    assert len(COMPONENT_STATES) == len(STATES)
 
 
 def test_a_state_that_lasts_is_told_against_period_and_bound() -> None:

@@ -82,10 +82,10 @@ def test_what_passes_before_it_is_noticed(tmp_path: Path, when: str, seconds: fl
     assert reaction_s(one, PERIODS_S) == pytest.approx(WOKEN_S + PERIODS_S["one"])
 
 
-def test_several_components_have_to_meet_first(tmp_path: Path) -> None:
+def test_several_components_have_to_agree_first(tmp_path: Path) -> None:
     bound = bound_of(loaded(tmp_path, QUIET, f"{SWAP}, {SLOW}"), PERIODS_S)
     assert [(part.what, part.seconds, part.assumed) for part in bound.parts[-2:]] == [
-        ("until one, slow are at their waits at once: one period of slow", 0.100, True),
+        ("until one, slow have agreed, each in its wait: one period of slow", 0.100, False),
         ("one period of slow", 0.100, False),
     ]
 

@@ -123,23 +123,6 @@ class _Spy:
         return self._deployer.make(transaction, **options)
 
 
-def test_what_may_be_missed_is_the_request_s(
-    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    spy = _Spy(runtime.host)
-    monkeypatch.setattr(runtime, "_host", spy)
-    step = Step("replace_core", "counter", "executor_tests/Backwards")
-    for max_missed in (0, 3):
-        outcome = control.handle(Request(steps=(step,), max_missed=max_missed))
-        assert outcome.success, outcome.message
-    assert [options["max_missed"] for options in spy.options] == [0, 3]
-    for max_missed in (-1, -(2**63), 2**62):
-        refused = control.handle(Request(steps=(step,), max_missed=max_missed))
-        assert refused.code is Code.INVALID
-        assert refused.message.startswith("bad max_missed: expected 0 to 1,000,000 releases, found ")
-    assert len(spy.options) == 2
-
-
 def test_force_is_the_kernel_s_to_use(
     runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,13 +140,15 @@ def test_force_is_the_kernel_s_to_use(
 def test_releases_that_were_missed_are_in_the_message() -> None:
     steps = (Step("replace_core", "a", "p/B"), Step("set_property", "a", "x", "1"), Step("stop", "b"))
     nothing = SimpleNamespace(component="a", missed_releases=0, from_core="p/A", to_core="p/B")
-    two = SimpleNamespace(component="a", missed_releases=2, remark="it was held")
+    two = SimpleNamespace(component="a", missed_releases=2, remark="its new grid began later")
     unknown = SimpleNamespace(component="b", missed_releases=NOT_MEASURED)
     measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0)
     assert message_of(steps[:1], measured) == "component 'a' runs p/B, before p/A"
     measured.steps = [two, two, unknown]
     done = "3 steps are in force; prepared in 0 ms"
-    assert message_of(steps, measured) == f"{done}; component 'a' missed 2 releases (it was held)"
+    assert (
+        message_of(steps, measured) == f"{done}; component 'a' missed 2 releases (its new grid began later)"
+    )
 
 
 def test_a_transaction_adds_wires_and_starts_and_another_one_removes(

@@ -187,9 +187,7 @@ def change(architecture: Architecture, host: Host) -> TransactionReport:
     )
     host.commit(transaction, dry_run=True)
     assert_type(str(architecture.describe()), str)
-    return host.commit(
-        transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50), max_missed=1
-    )
+    return host.commit(transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50))
 
 
 def simulate(architecture: Architecture) -> TraceDrain:

@@ -45,7 +45,8 @@ def _tests_of(file: Path) -> frozenset[str]:
 def _kernel_cases() -> frozenset[str]:
     pattern = re.compile(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)", re.MULTILINE)
     tests = ROOT / "tests"
-    sources = [*(tests / "kernel").glob("*/test_*.cpp"), *(tests / "rules").glob("test_*.cpp")]
+    alone = [file for folder in ("rules", "models") for file in (tests / folder).glob("test_*.cpp")]
+    sources = [*(tests / "kernel").glob("*/test_*.cpp"), *alone]
     return frozenset(
         ".".join(found) for file in sources for found in pattern.findall(file.read_text("utf-8"))
     )

@@ -52,18 +52,6 @@ def test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough():
     assert world.said() == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
 
 
-def test_what_components_may_miss_for_it_is_asked_with_each_action():
-    world = started(rule(max_missed=2, undo_max_missed=1))
-    world.talking = False
-    world.run(2.0)
-    world.talking = True
-    world.run(4.0)
-    assert [(request.steps[0].name, request.max_missed) for request in world.requests] == [
-        (LOCAL, 2),
-        (USUAL, 1),
-    ]
-
-
 def test_a_dwell_lets_a_short_silence_pass():
     world = started(rule(for_s=2.0))
     world.talking = False
@@ -251,9 +239,8 @@ def test_one_action_at_a_time():
     assert [request.steps[0].target for request in world.requests] == ["exploration", "mapping"]
 
 
-def test_a_target_that_stops_disarms_and_a_held_one_does_not():
+def test_a_target_that_faults_disarms():
     world = started()
-    world.tell({"exploration": ComponentView("HELD", USUAL)})
     assert world.said() == ["armed"]
     world.tell({"exploration": ComponentView("FAULTED", USUAL)})
     assert world.said() == ["armed", "suppressed"]

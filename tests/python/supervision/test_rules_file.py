@@ -30,7 +30,7 @@ def test_a_rule_with_its_defaults(tmp_path: Path):
     assert rules.executor == "executor"
     assert (rule.when.kind, rule.when.parameters["longer_than_s"]) == ("silence", 1.0)
     assert (rule.where, rule.priority) == ("executor", 0)
-    assert (rule.for_s, rule.cooldown_s, rule.max_missed) == (0.0, 0.0, 0)
+    assert (rule.for_s, rule.cooldown_s) == (0.0, 0.0)
     assert rule.undo is not None
     assert rule.undo.for_s == 3.0
     assert rule.targets() == {"exploration"}
@@ -90,8 +90,7 @@ def test_a_scalar_value_becomes_yaml_text(tmp_path: Path):
         ("    undo:", "    cooldown: 1\n    undo:", "7:5", "cooldown"),
         ("- name: link_lost", "- name: link lost", "4:11", "link lost"),
         ("mauve: 1", "mauve: 1\nmauve: 1", "2:1", "twice"),
-        ("    undo:", "    max_missed: -1\n    undo:", "7:17", "greater than or equal to 0"),
-        ("for_s: 3.0", "max_missed: 1.5", "8:19", "max_missed"),
+        ("    undo:", "    max_missed: 1\n    undo:", "7:5", "max_missed is no known key"),
         ("undo:", "undo: [", "", "not YAML"),
     ],
 )

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "mauve_rt/architecture/description.hpp"
-#include "mauve_rt/architecture/prepared_change.hpp"
+#include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -56,7 +56,8 @@ struct ListChange {
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
 /// | numbered_                       | who changes it        | changes | list_mutex_                    |
 /// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
-/// | prepared_                       | who prepares          | changes | change_lock_                   |
+/// | prepared_, open_                | changes               | changes | change_lock_                   |
+/// | has_open_                       | changes               | anyone  | relaxed: a hint                |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
 /// | retired_, finals_               | who removes, drains, records | same | trace_mutex_             |
 /// | deployment_epoch_ns_            | who deploys           | anyone  | relaxed: a lone fact           |
@@ -135,7 +136,8 @@ class Architecture final : public Configurable {
   std::vector<std::shared_ptr<Component>> components() const;
   std::vector<std::shared_ptr<Resource>> resources() const;
 
-  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. [non-rt]
+  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. A change that a late
+  /// component has not taken yet is not in it. [non-rt]
   ArchitectureDescription describe() const;
 
   /// A new, unconfigured core of a registered implementation. Throws Error: unknown_core.
@@ -195,14 +197,22 @@ class Architecture final : public Configurable {
 
   // ---- for transactions
 
-  /// Completes what prepared transactions have committed. [non-rt], the change lock held; not from inside of a change that
-  /// has begun to look at components.
-  void settle_prepared() noexcept;
+  /// Completes the changes that were committed and that all their components have taken. [non-rt], the change lock held; not
+  /// from inside of a change that has begun to look at components.
+  void settle_changes() noexcept;
+  /// The same where no change is being made. [non-rt]
+  void settle_if_idle() noexcept;
+  /// Keeps a change that a late component has not taken yet. [non-rt], the change lock held.
+  void keep_open(std::shared_ptr<OpenChange> change);
+  /// Throws Error (timeout) that names a component which has not taken an earlier change. [non-rt], change lock held.
+  [[noreturn]] void throw_late(time_ns_t waited_ns) const;
+  /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
+  Runner* use_host(std::unique_lock<std::mutex>& use) const;
   /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
   void drop_stale_prepared() noexcept;
   /// [non-rt], the change lock held.
-  void enlist(PreparedChange& prepared) { prepared_.push_back(&prepared); }
-  void delist(const PreparedChange& prepared) noexcept { std::erase(prepared_, &prepared); }
+  void enlist(OpenChange& prepared) { prepared_.push_back(&prepared); }
+  void delist(const OpenChange& prepared) noexcept { std::erase(prepared_, &prepared); }
 
   /// A component with a number of its own, not listed yet: its changes are nobody's business. One that was removed, and
   /// is gone, leaves its number to the next of its name, whose records follow its own. [non-rt]
@@ -249,7 +259,9 @@ class Architecture final : public Configurable {
   PluginRegistry* registry_;
   ChangeLock change_lock_;
   CommitGate commit_gate_;
-  std::vector<PreparedChange*> prepared_;
+  std::vector<OpenChange*> prepared_;
+  std::vector<std::shared_ptr<OpenChange>> open_;
+  std::atomic<bool> has_open_{false};
   mutable std::mutex host_mutex_;
   Runner* host_{nullptr};
   ChangeSignal changes_;

@@ -11,10 +11,10 @@ namespace mauve {
 
 struct ComponentFacts {
   std::string name;
-  ShownParts parts;                                    // implementations, wiring, properties
-  ComponentState state{ComponentState::unconfigured};  // HELD counts as RUNNING: it is for a moment only
-  time_ns_t period_ns{0};                              // in force
-  time_ns_t reference_ns{0};                           // of the grid, from the deployment's epoch
+  ShownParts parts;  // implementations, wiring, properties
+  ComponentState state{ComponentState::unconfigured};
+  time_ns_t period_ns{0};     // in force
+  time_ns_t reference_ns{0};  // of the grid, from the deployment's epoch
   TaskSettings settings;
   std::vector<std::string> alternatives;
   std::string fallback;

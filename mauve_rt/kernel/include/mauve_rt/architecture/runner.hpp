@@ -3,7 +3,6 @@
 #pragma once
 
 #include <atomic>
-#include <memory>
 #include <mutex>
 
 #include "mauve_rt/base/rt.hpp"
@@ -11,7 +10,6 @@
 
 namespace mauve {
 
-class Conductor;
 class Task;
 
 /// A host, as architectures and changes see it. All functions [non-rt].
@@ -41,8 +39,6 @@ class Runner {
   virtual void attach(Task& task) = 0;
   /// The reverse; false when its thread would not end in time. [non-rt]
   virtual bool detach(Task& task) noexcept = 0;
-  /// Who conducts commits of running components; nullptr: nobody, or nobody any more. [non-rt]
-  virtual std::shared_ptr<Conductor> conductor() noexcept = 0;
   /// Held while a change uses the runner. [non-rt], the architecture's change lock held.
   std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "mauve_rt/architecture/prepared_change.hpp"
+#include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/change/transaction.hpp"
@@ -20,7 +20,7 @@ enum class PreparedOutcome : std::uint8_t {
   committed,  // it is in force
   stale,      // what it was prepared against has changed, or it was committed already
   refused,    // by the adopt of a new core
-  timed_out,  // its components were not together in their waits in time, or what commit() waits for lasted
+  timed_out,  // a component did not come to a wait in time, or what commit() waits for lasted
   withdrawn,  // a component was stopped or faulted meanwhile, or the host was shut down
 };
 /// [rt]
@@ -35,16 +35,15 @@ const char* to_string(PreparedOutcome outcome) MAUVE_RT;
 /// well: what hooks read then is not to be exchanged beneath them. It is current again when that one was refused.
 ///
 /// commit() waits for nobody's preparation. It waits, until its time-out, for no more than: an ordinary commit under way,
-/// which it calls off, to leave its gate (an adopt or take that has begun ends first); another prepared commit; a start()
-/// of a component that it touches, or the end of such a one's thread; its own components to come to their waits. Beyond the
-/// time-out it waits for its own adopt and take, where these run on a component's thread no longer than Commit::kPatience,
-/// and for the threads of components that it starts to take up the start. It allocates only where it gives up a component
-/// whose adopt or take does not end.
+/// which it calls off, to end (an adopt or take that has begun ends first); another prepared commit; a start() of a component
+/// that it touches, or the end of such a one's thread; its own components to come to their waits, and to take the change.
+/// Beyond the time-out it waits for its own adopt and take, and for the threads of components that it starts, no longer than
+/// Commit::kPatience. It allocates only where it gives up a component whose adopt or take does not end.
 ///
 /// After the commit, lists, described wiring and properties are those of before until complete(), or until the next change of the
 /// architecture, which completes it first; until then a component with a new shell or fsm has no fallback, and one that was
 /// added is not stopped by a shutdown.
-class PreparedTransaction final : private PreparedChange {
+class PreparedTransaction final : private OpenChange {
  public:
   /// By Host::prepare(). [non-rt] Throws as Architecture::make().
   PreparedTransaction(Architecture& architecture, Runner& host, Transaction transaction,
@@ -67,7 +66,7 @@ class PreparedTransaction final : private PreparedChange {
  private:
   class State;
 
-  void settle() noexcept override;
+  bool settle() noexcept override;
   void drop_if_stale() noexcept override;
   void note_failure() noexcept;
   void let_go() noexcept;

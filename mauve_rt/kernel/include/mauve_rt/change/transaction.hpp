@@ -94,7 +94,8 @@ class Transaction {
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core);
   /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
   Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
-  /// The new fsm starts in its initial state, on its own period, on the deployment's epoch.
+  /// The new fsm goes on in the wait of the same name, where it has one in a cycle with its initial state and the pending
+  /// instant lies on its grid. Else it starts in its initial state, on its own period, on the deployment's epoch.
   Transaction& replace_fsm(const std::string& component, const std::string& implementation);
   Transaction& replace_fsm(const std::string& component, std::unique_ptr<FsmBase> fsm);
   /// Ports keep their connections by name, properties their values.
@@ -151,7 +152,6 @@ struct TransactionOptions {
   CommitTimeouts timeouts{};
   bool dry_run{false};                 // check and prepare everything, then throw it away
   std::uint64_t expected_revision{0};  // of the architecture; 0: any
-  std::int64_t max_missed{0};          // releases that a participant may be held past
   // A component that the transaction removes, stops or gives new parts, and whose state does not end within the commit's
   // timeout, is stopped by force (Task::stop): it is FAULTED then, whatever becomes of the transaction. The commit is tried
   // once more, without the thread of one that is removed or stopped; for new parts it is refused (faulted).

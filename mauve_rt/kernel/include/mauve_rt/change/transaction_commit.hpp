@@ -21,7 +21,8 @@ class TransactionCommit {
   TransactionCommit(const TransactionCommit&) = delete;
   TransactionCommit& operator=(const TransactionCommit&) = delete;
 
-  /// Drafts, prepares, commits, retires; a dry run stops after preparing. [non-rt]
+  /// Drafts, prepares, commits, retires; a dry run stops after preparing. Where a component is late beyond the commit's
+  /// timeout the next change retires, or report(). [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); the architecture is then as it was.
   void make(Transaction transaction);
   /// What it cost, step by step; waits up to so long for the releases that follow. May be called again. [non-rt]
@@ -30,7 +31,8 @@ class TransactionCommit {
  private:
   friend class PreparedTransaction;
   class Work;
-  std::unique_ptr<Work> work_;
+  std::shared_ptr<Work>
+      work_;  // shared with the architecture while a late component has not taken the change
 };
 
 }  // namespace mauve

@@ -27,6 +27,7 @@ inline constexpr std::uint32_t kLeftBehind = 2;
 /// |-------------|-----------------------------------------|---------------------------------------------------|
 /// | register_   | readers, each with a ReaderState        | wait-free                                         |
 /// | register_   | the writer; the watchdog for its zeros  | write_mutex_, free but for a writer that hangs    |
+/// | floor_      | the writer; who takes its end over      | write_mutex_                                      |
 /// | register_   | the serialized face, and one number for rules, as one more reader | serial_mutex_           |
 template <Described T>
 class LatestValue final : public NewestResource {
@@ -90,6 +91,7 @@ class LatestValue final : public NewestResource {
     bool write(const T& value, time_ns_t time_ns) noexcept override {
       {
         const std::lock_guard lock(owner_.write_mutex_);
+        if (!owner_.floor_.admits(time_ns)) return true;
         if (!owner_.register_.write(value, time_ns)) return false;
       }
       owner_.written(time_ns);
@@ -99,10 +101,14 @@ class LatestValue final : public NewestResource {
       {
         if (!owner_.write_mutex_.try_lock()) return TryWrite::busy;
         const std::lock_guard lock(owner_.write_mutex_, std::adopt_lock);
-        if (!owner_.register_.write(value, time_ns)) return TryWrite::done;
+        if (!owner_.floor_.admits(time_ns) || !owner_.register_.write(value, time_ns)) return TryWrite::done;
       }
       owner_.written(time_ns);
       return TryWrite::done;
+    }
+    void raise_floor(time_ns_t instant_ns) noexcept override {
+      const std::lock_guard lock(owner_.write_mutex_);
+      owner_.floor_.raise(instant_ns);
     }
 
    private:
@@ -134,6 +140,7 @@ class LatestValue final : public NewestResource {
   LatestRegister<T>
       register_;  // more readers: the serialized face, a port that is previewed, those left behind
   PiMutex write_mutex_;
+  WriteFloor floor_;
   PiMutex serial_mutex_;
 
  public:

@@ -143,8 +143,9 @@ class WritePort final : public PortBase {
     if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
     return taken;
   }
-  void write_zero() noexcept override {
-    if (service_ != nullptr) service_->write(zero_, stamp_ns());
+  using PortBase::write_zero;
+  void write_zero(time_ns_t time_ns) noexcept override {
+    if (service_ != nullptr) service_->write(zero_, time_ns);
   }
   TryWrite try_write_zero() noexcept override {
     return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;

@@ -106,8 +106,9 @@ class PortBase {
   void preview(const PortConnection& connection);
   void end_preview() noexcept;
 
-  /// Writes the type's default value; a port that is no write port does nothing. [rt]
-  virtual void write_zero() MAUVE_RT {}
+  /// Writes the type's default value, as of now or as of that time; a port that is no write port does nothing. [rt]
+  void write_zero() MAUVE_RT { write_zero(stamp_ns()); }
+  virtual void write_zero(time_ns_t /*time_ns*/) MAUVE_RT {}
   /// The same without waiting for a lock. [rt]
   virtual TryWrite try_write_zero() MAUVE_RT { return TryWrite::done; }
   virtual OutputOptions output() const MAUVE_RT { return {OutputPolicy::hold, OutputPolicy::hold}; }

@@ -92,6 +92,10 @@ class RingBuffer final : public Resource {
     TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
       return owner_.try_push(value, time_ns);
     }
+    void raise_floor(time_ns_t instant_ns) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      owner_.floor_.raise(instant_ns);
+    }
 
    private:
     RingBuffer& owner_;
@@ -115,6 +119,7 @@ class RingBuffer final : public Resource {
   bool push(const T& value, time_ns_t time_ns) noexcept {
     {
       const std::lock_guard lock(mutex_);
+      if (!floor_.admits(time_ns)) return true;
       if (!put(value, time_ns)) return false;
     }
     written(time_ns);
@@ -124,7 +129,7 @@ class RingBuffer final : public Resource {
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
       const std::lock_guard lock(mutex_, std::adopt_lock);
-      if (!put(value, time_ns)) return TryWrite::done;
+      if (!floor_.admits(time_ns) || !put(value, time_ns)) return TryWrite::done;
     }
     written(time_ns);
     return TryWrite::done;
@@ -145,6 +150,7 @@ class RingBuffer final : public Resource {
   }
 
   PiMutex mutex_;
+  WriteFloor floor_;
   std::vector<Place> places_;
   std::size_t first_{0};
   std::size_t size_{0};

@@ -67,6 +67,20 @@ struct ReaderState {
   }
 };
 
+/// The instant before which a resource takes no writes any more: what a component that is late writes to an end that a change
+/// has moved does not replace what the new owner writes. Used under the resource's lock.
+class WriteFloor {
+ public:
+  /// [rt]
+  bool admits(time_ns_t time_ns) const MAUVE_RT { return time_ns >= instant_ns_; }
+  void raise(time_ns_t instant_ns) MAUVE_RT {
+    if (instant_ns > instant_ns_) instant_ns_ = instant_ns;
+  }
+
+ private:
+  time_ns_t instant_ns_{0};
+};
+
 class Resource;
 template <typename T>
 class LatestRegister;
@@ -100,6 +114,9 @@ class ServiceBase {
   virtual bool is_call_serializable() const MAUVE_RT { return false; }
   /// A call by serialized messages; the reply is written when it was answered. [non-rt]
   virtual CallOutcome call_serialized(std::span<const std::byte> request, std::vector<std::byte>& reply);
+
+  /// A write of an earlier time is dropped from now on. [rt] Does nothing where the service takes no values.
+  virtual void raise_floor(time_ns_t /*instant_ns*/) MAUVE_RT {}
 
   /// How many ports may be connected at once; 0: any number. [rt]
   virtual std::uint32_t max_ports() const MAUVE_RT { return 0; }

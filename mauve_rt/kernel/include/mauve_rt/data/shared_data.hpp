@@ -17,6 +17,7 @@ namespace mauve {
 /// | member                      | written by     | under  | hot |
 /// |-----------------------------|----------------|--------|-----|
 /// | value_, time_ns_, sequence_ | write service  | mutex_ | yes |
+/// | floor_                      | who takes an end over | mutex_ | yes |
 template <Described T>
 class SharedData final : public NewestResource {
  public:
@@ -69,7 +70,7 @@ class SharedData final : public NewestResource {
     bool write(const T& value, time_ns_t time_ns) noexcept override {
       {
         const std::lock_guard lock(owner_.mutex_);
-        owner_.put(value, time_ns);
+        if (!owner_.put(value, time_ns)) return true;
       }
       owner_.written(time_ns);
       return true;
@@ -78,10 +79,14 @@ class SharedData final : public NewestResource {
       {
         if (!owner_.mutex_.try_lock()) return TryWrite::busy;
         const std::lock_guard lock(owner_.mutex_, std::adopt_lock);
-        owner_.put(value, time_ns);
+        if (!owner_.put(value, time_ns)) return TryWrite::done;
       }
       owner_.written(time_ns);
       return TryWrite::done;
+    }
+    void raise_floor(time_ns_t instant_ns) noexcept override {
+      const std::lock_guard lock(owner_.mutex_);
+      owner_.floor_.raise(instant_ns);
     }
 
    private:
@@ -97,13 +102,16 @@ class SharedData final : public NewestResource {
     return status;
   }
 
-  void put(const T& value, time_ns_t time_ns) noexcept {
+  bool put(const T& value, time_ns_t time_ns) noexcept {
+    if (!floor_.admits(time_ns)) return false;
     value_ = value;
     time_ns_ = time_ns;
     ++sequence_;
+    return true;
   }
 
   PiMutex mutex_;
+  WriteFloor floor_;
   T value_{};
   time_ns_t time_ns_{0};
   std::uint64_t sequence_{0};

@@ -17,10 +17,7 @@ struct DeployerOptions {
 
 /// The host of threads: one for each component. Ordinary threads.
 ///
-/// | member     | written by           | read by                | under            |
-/// | ---------- | -------------------- | ---------------------- | ---------------- |
-/// | conductor_ | deploy(), shutdown() | changes, at the commit | conductor_mutex_ |
-/// | the rest   | deploy(), shutdown() | the same               | life_mutex_      |
+/// All members are written and read by deploy() and shutdown(), under life_mutex_.
 class Deployer final : public Host {
  public:
   explicit Deployer(Architecture& architecture, DeployerOptions options = {});
@@ -41,7 +38,6 @@ class Deployer final : public Host {
 
   void attach(Task& task) override;
   bool detach(Task& task) noexcept override;
-  std::shared_ptr<Conductor> conductor() noexcept override;
   /// What watches the components' executions while it is deployed; nullptr otherwise. [setup]
   const Watchdog* watchdog() const noexcept { return watchdog_.get(); }
 
@@ -53,8 +49,6 @@ class Deployer final : public Host {
   DeployerOptions options_;
   RealtimeProcess process_;
   std::mutex life_mutex_;
-  std::mutex conductor_mutex_;
-  std::shared_ptr<Conductor> conductor_;
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
 };

@@ -64,7 +64,8 @@ class Host : public Runner {
   /// Now, as the components see it.
   time_ns_t now_ns() const noexcept { return clock().now_ns(); }
   virtual const RealtimeStatus& realtime_status() const noexcept = 0;
-  ArchitectureDescription describe() const { return architecture_.describe(); }
+  /// As Architecture::describe(); completes a change that a late component has taken since, first. [non-rt]
+  ArchitectureDescription describe() const;
 
   /// Empties every ring. [non-rt], one thread at a time.
   TraceDrain drain_trace();

@@ -68,7 +68,6 @@ class SimulatedHost final : public Host {
 
   void attach(Task& task) override;
   bool detach(Task& task) noexcept override;
-  std::shared_ptr<Conductor> conductor() noexcept override { return nullptr; }
 
  private:
   friend class Simulation;

@@ -21,17 +21,16 @@ class CoreBase : public Configurable {
   virtual bool accepts(const Shell& /*shell*/) const noexcept { return false; }
 
   /// Checks that the old core's state can be carried over; nothing is changed yet. [rt] as far as the core is.
-  /// Runs on the component's thread, inside its wait; while that is stopped on the requester's, who waits for its end
-  /// however long it lasts, and so does a start of this component; nobody else does. Returning false or throwing refuses the replacement.
+  /// Runs on the component's own thread, inside a wait, or while the component is stopped; on the requester's where the
+  /// component has no thread. It may be some releases older than take, as other components of the same change vote after it.
+  /// Returning false or throwing refuses the change.
   virtual bool adopt(const CoreBase& /*old*/) { return true; }
-  /// Moves the old core's state over; cannot fail. [rt] as far as the core is.
+  /// Moves the old core's newest state over; cannot fail. [rt] as far as the core is. On the same thread, between the last
+  /// execution of the old core and the first one of this core.
   virtual void take(CoreBase& /*old*/) noexcept {}
   /// The time adopt and take need together, held against them. [rt] An adopt that takes longer refuses the change, after a
-  /// longer take the component is FAULTED. A commit with less left before a release waits for the one after.
-  /// 0: none declared.
+  /// longer take the component is FAULTED. With less left before a release, adopt waits for the one after. 0: none declared.
   virtual time_ns_t budget_ns() const MAUVE_RT { return 0; }
-  /// What is reckoned with where none is declared. [rt]
-  virtual time_ns_t reckoned_budget_ns() const MAUVE_RT { return us_to_ns(200); }
 
   /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <deque>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -238,5 +239,8 @@ class Fsm : public FsmBase {
 /// edge inside a component then contributes |potential(u) + length(u) - potential(v)|. Throws Error:
 /// loop_without_wait naming the loop.
 time_ns_t cycle_gcd_ns(const State& initial);
+/// For each wait that lies in a cycle with the initial state: the waits from that state's entry to its own end, which differ by
+/// multiples of the period from path to path. [non-rt]
+std::map<const State*, time_ns_t> wait_ends_ns(const State& initial);
 
 }  // namespace mauve

@@ -18,6 +18,8 @@ class ChangeLock {
   /// Waits for the change under way. [non-rt]
   /// Throws Error (would_deadlock) from inside that change, by a hook of a part, and as check_caller().
   void lock();
+  /// Only where no change is under way, this thread's included; not on a component's own thread. [non-rt]
+  bool try_lock() noexcept;
   void unlock() noexcept;
   /// Whether the calling thread holds it: it is inside a change. [non-rt]
   bool is_held_here() const noexcept {

@@ -10,6 +10,8 @@
 
 namespace mauve {
 
+class Commit;
+
 /// Held while a commit is carried out, not while one is prepared, and for a moment by who begins to look at what a prepared
 /// commit may change.
 ///
@@ -17,6 +19,7 @@ namespace mauve {
 /// | ---------- | ------------------------- | ------- | --------------------------------------------------- |
 /// | mutex      | commits                   | -       | -                                                   |
 /// | structure_ | commits, under mutex      | anyone  | release/acquire: a hint; whoever relies on it holds mutex |
+/// | under_way_, is_open_, pressing_ | commits, prepared commits, hosts | same | under_way_mutex_            |
 class CommitGate {
  public:
   PiMutex mutex;
@@ -26,8 +29,26 @@ class CommitGate {
   /// Under the mutex. [rt]
   void restructured() MAUVE_RT { structure_.fetch_add(1, std::memory_order_release); }
 
+  /// A commit that is carried out, under the mutex: from begin() to end() others may call it off. [rt]
+  void begin(Commit& commit) MAUVE_RT;
+  void end() MAUVE_RT;
+  /// Calls off the commit under way, where that gives way, and each such that comes before relax(). [rt]
+  void press() MAUVE_RT;
+  void relax() MAUVE_RT;
+  /// Threads run, and take part in commits. [non-rt], hosts
+  void open() noexcept;
+  /// Calls off the commit under way, and each that comes before open(); waits for no commit. Commits of parked components
+  /// alone go on. [non-rt], hosts
+  void close() noexcept;
+
  private:
+  void call_off_if_unwanted() MAUVE_RT;
+
   std::atomic<std::uint32_t> structure_{0};
+  PiMutex under_way_mutex_;
+  Commit* under_way_{nullptr};
+  bool is_open_{false};
+  int pressing_{0};
 };
 
 /// What a component has been through. A change that is made in several steps claims it for as long as it looks at its parts.
@@ -58,6 +79,8 @@ class ChangeMark {
     unsettled_ = true;
     count_.fetch_add(2, std::memory_order_release);
   }
+  /// By a change that has claimed it, is made, and was not taken by all yet. [non-rt]
+  void unsettle() noexcept { unsettled_ = true; }
   /// [non-rt]
   void settle() noexcept { unsettled_ = false; }
   /// [non-rt]

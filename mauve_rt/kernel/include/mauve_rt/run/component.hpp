@@ -65,7 +65,8 @@ class PartsChange final : public CommitAction {
   const FsmBase& fsm() const noexcept;
   /// Binds and configures the new parts. [non-rt] Throws Error; nothing but the new parts is touched.
   void prepare();
-  /// Whether the component starts anew in its initial state: a new shell or fsm. [rt]
+  /// Whether the component gets another fsm, for a new shell another instance of the same. It goes on in the wait of the same
+  /// name, where the fsm has one and the pending instant lies on its grid; else it starts anew in the initial state. [rt]
   bool restarts() const MAUVE_RT { return restarts_; }
   /// Cleans up what is out: the old parts once they were taken, else the new ones. [non-rt]
   void retire() noexcept;
@@ -73,6 +74,8 @@ class PartsChange final : public CommitAction {
   void start_afresh() noexcept { afresh_ = true; }
   /// The new core is put in as it is, neither bound nor configured: Listing 3 of the paper. [setup]
   void leave_unready() noexcept { unready_ = true; }
+  /// The component starts anew in the initial state, whatever the wait that it is in. [setup]
+  void give_up_place() noexcept { kept_waits_.clear(); }
   /// And it is the fallback. [setup]
   void be_fallback() noexcept { afresh_ = is_fallback_ = true; }
 
@@ -84,19 +87,20 @@ class PartsChange final : public CommitAction {
 
   bool adopt() override;
   void take() noexcept override;
-  time_ns_t budget_ns() const noexcept override;
   time_ns_t declared_ns() const noexcept override;
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 
  private:
   void prepare_parts();
-  void take_over_events(const FsmBase& before) MAUVE_RT;
+  void find_kept_waits();
+  void take_over_events(const FsmBase& before, bool keeps_place) MAUVE_RT;
 
   Component& component_;
   Parts parts_;  // the new ones; after take the old ones
   std::function<std::unique_ptr<FsmBase>()> make_fsm_;
   CoreBinding binding_;
   time_ns_t period_ns_{0};
+  std::vector<KeptWait> kept_waits_{};
   bool restarts_;
   const CoreBase* kept_core_{nullptr};  // the one that the binding was made for, when it stays
   std::uint32_t core_name_{0};

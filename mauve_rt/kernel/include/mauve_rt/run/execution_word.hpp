@@ -14,7 +14,7 @@ namespace mauve {
 /// The executions of one component, one after another. A watched one has a number of its own and a bound.
 ///
 /// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound,
-/// and what it does at a commit's gate. Whoever finds a watched execution over its bound condemns exactly that one; whoever
+/// and an adopt or take of a commit. Whoever finds a watched execution over its bound condemns exactly that one; whoever
 /// stops the component by force condemns whatever the thread does between entering and leaving. All change the word by
 /// compare-and-exchange: who comes first has decided, and the other one finds so. The thread finds out where it ends the
 /// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who condemns
@@ -29,7 +29,7 @@ namespace mauve {
 /// | idle, entered    | idle             | the thread: it parks                                                    |
 /// | idle             | running, + 1     | the thread                                                              |
 /// | running          | idle             | the thread: it ended                                                    |
-/// | running          | condemned        | the watchdog, the conductor of a commit, who stops by force             |
+/// | running          | condemned        | the watchdog, who requests a commit, who stops by force                 |
 /// | idle, entered    | condemned        | who stops by force                                                      |
 /// | condemned        | sentenced        | the same, when FAULTED is told, the thread demoted, the outputs written |
 /// | sentenced        | idle             | the thread: it came back                                                |

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <exception>
 #include <optional>
+#include <span>
 
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/present_state.hpp"
@@ -26,6 +27,13 @@ struct OverBound : std::exception {
   time_ns_t bound_ns;
 };
 
+/// A wait of a new fsm that goes on for the wait of the same name of the fsm before.
+struct KeptWait {
+  const State* before;
+  const State* now;
+  time_ns_t place_ns;  // of its end within a period of the new fsm
+};
+
 /// One component's fsm and where it is in it: the logical clock, the grid, what it counts, what it traces.
 ///
 /// Whoever runs it - a task's thread, a simulation, a test - starts it, and when the wait under way is over releases it and
@@ -43,14 +51,15 @@ struct OverBound : std::exception {
 ///
 /// | member                  | written by                                | read by    | order                           |
 /// | ----------------------- | ----------------------------------------- | ---------- | ------------------------------- |
-/// | fsm_, core_             | ordinary threads, parked; commits         | who runs it| parking; the commit's gate      |
+/// | fsm_, core_             | ordinary threads, parked; commits         | who runs it| parking; it takes commits itself|
 /// | clock_, ring_, watchdog_| the same, parked                          | who runs it| parking; the thread's creation  |
 /// | reference_ns_,          | the same; commits                         | anyone     | relaxed: lone numbers           |
 /// | deployment_ns_,         |                                           |            |                                 |
 /// | period_ns_              |                                           |            |                                 |
 /// | wait_bound_ns_          | the same                                  | watchdog   | relaxed: a hint when to look    |
 /// | context_, statistics_   | who runs it                               | anyone     | relaxed: lone facts             |
-/// | current_, released_ns_  | who runs it                               | anyone     | relaxed: lone facts             |
+/// | current_, released_ns_, | who runs it                               | anyone     | relaxed: lone facts             |
+/// | entered_ns_             |                                           |            |                                 |
 /// | listening_              | ordinary threads                          | who runs it| its own: task_listener.hpp      |
 /// | present_                | who runs it                               | anyone     | its own: present_state.hpp      |
 /// | execution_              | who runs it, who condemns, who removes    | all of them| its own: execution_word.hpp     |
@@ -78,6 +87,7 @@ class Machine {
   void set_clock(const Clock& clock) MAUVE_RT {
     clock_ = &clock;
     active_ns_ = kNever;
+    entered_ns_.store(0, std::memory_order_relaxed);
   }
   /// Where it traces; nullptr: nowhere. [rt]
   void set_ring(TraceRing* ring) MAUVE_RT { ring_ = ring; }
@@ -116,6 +126,9 @@ class Machine {
   /// was released for, or would be. An execution state as the initial one is released in its place; else it is put back for
   /// the waits to come. [rt]
   void leave_event_to(const State& initial) MAUVE_RT;
+  /// Before another fsm with this period is put in: goes on in its wait of the same name, where it has one and the pending
+  /// instant lies on its grid; else false, and nothing is changed. [rt]
+  bool keep_place(std::span<const KeptWait> waits, time_ns_t period_ns) MAUVE_RT;
   /// Whether the wait's end is fixed: it is for no event, or one has come. [rt]
   bool is_settled() const MAUVE_RT { return event_settled_; }
   /// Started, and not woken ahead of its first release yet. [rt]
@@ -134,8 +147,13 @@ class Machine {
   /// Reads the clock for what follows. [rt]
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
   /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less
-  /// than a period is released late, as after any wait, unless it may be missed. [rt]
-  std::int64_t skip_lost(time_ns_t held_since_ns, bool may_miss, time_ns_t now_ns) MAUVE_RT;
+  /// than a period is released late, as after any wait. [rt]
+  std::int64_t skip_lost(time_ns_t since_ns, time_ns_t now_ns) MAUVE_RT;
+  /// Executes at no clock before this one any more: T of a change that it has taken. [rt]
+  void change_at(time_ns_t instant_ns) MAUVE_RT;
+  /// The last clock at which it began to execute, or T - 1 of its last change if that is later. [rt]; other threads once it
+  /// is parked or condemned.
+  time_ns_t entered_ns() const MAUVE_RT { return entered_ns_.load(std::memory_order_relaxed); }
   /// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
   /// instants come closer together. Returns by how much: less than a period. [rt]
   time_ns_t resynchronise(time_ns_t epoch_ns) MAUVE_RT;
@@ -209,6 +227,7 @@ class Machine {
   TaskListening listening_;
   std::atomic<std::uint32_t> current_{0};
   std::atomic<time_ns_t> released_ns_{0};
+  std::atomic<time_ns_t> entered_ns_{0};
   ExecutionWord execution_;
   PresentState present_;
 
@@ -216,6 +235,7 @@ class Machine {
   const State* waiting_{nullptr};
   const State* next_{nullptr};   // the one to be entered; nullptr: the wait's guards tell when it has ended
   time_ns_t wait_from_ns_{0};    // the logical clock on entering an event wait
+  time_ns_t earliest_ns_{0};     // before which that wait does not end: T of a change that was taken in it
   time_ns_t event_ns_{kNever};   // of the event that fixed the end of the wait under way
   time_ns_t active_ns_{kNever};  // the logical clock of the last release that was no mere start into a wait
   bool event_settled_{true};

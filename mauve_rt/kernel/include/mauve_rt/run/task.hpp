@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,15 +26,11 @@
 
 namespace mauve {
 
-enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, held, stopping, faulted };
+/// Numbered as mauve_msgs/msg/ComponentInfo, whose 3 is no longer used.
+enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, stopping = 4, faulted };
 
 /// "UNCONFIGURED", "STOPPED", ... [rt]
 std::string_view to_string(ComponentState state) MAUVE_RT;
-/// HELD is RUNNING to who looks at an architecture: it is for a moment only. [rt]
-constexpr ComponentState settled(ComponentState state) MAUVE_RT {
-  return state == ComponentState::held ? ComponentState::running : state;
-}
-
 struct Fault {
   std::string what;
   std::string where;  // state
@@ -65,7 +62,7 @@ struct ChangeSignal {
 /// Runs one component.
 ///
 /// The machine goes from wait to wait; the task is what lies around it: the thread, which sleeps in between, the commands,
-/// the gate of commits, the condemnation of what lasts too long. resume() takes up commands and steps the machine; in
+/// its votes and takes in commits, the condemnation of what lasts too long. resume() takes up commands and steps the machine; in
 /// simulated time whoever simulates calls it.
 ///
 /// "machine" is here whoever runs it: the component's thread, or a simulation.
@@ -74,15 +71,16 @@ struct ChangeSignal {
 /// | ---------------------- | ------------------------------------- | ------------ | ---------------------------------- |
 /// | control_ (futex)       | commanders set bits, machine clears   | machine      | acq_rel: a bit hands over its data |
 /// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
-/// | place_                 | who conducts a commit                 | machine,     | its own: lent.hpp; who retracts    |
-/// |                        |                                       | stop, events | waits for all who use it           |
+/// | slot_ (futex)          | requester: empty -> posted -> empty;  | both         | acq_rel: hands over the participant; seq_cst with  |
+/// |                        | machine: posted -> busy -> any        |              | parked_, ended_: one sees the other |
+/// | place_                 | requester, slot empty                 | machine      | slot_                              |
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
 /// | demoted_, verdict_     | who condemns, machine                 | machine      | execution_                         |
-/// | shell_, core_          | commanders, machine parked; commits   | machine      | parking; the commit's gate         |
+/// | shell_, core_          | commanders, machine parked; its takes | machine      | parking                            |
 /// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | condemns     |                                    |
@@ -90,7 +88,7 @@ struct ChangeSignal {
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
 /// | machine_               | machine                               | machine      | its own: machine.hpp               |
-/// | deferrals_ ...         | machine                               | machine      | its own                            |
+/// | queue_place_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
 /// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
@@ -106,6 +104,10 @@ class Task final : public Waiter {
   void set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
   /// Before a commit puts in another fsm, with this initial state. [rt]
   void leave_event_to(const State& initial) MAUVE_RT { machine_.leave_event_to(initial); }
+  /// Machine::keep_place(), before a commit puts in another fsm. [rt]
+  bool keep_place(std::span<const KeptWait> waits, time_ns_t period_ns) MAUVE_RT {
+    return place_kept_ = machine_.keep_place(waits, period_ns);
+  }
   /// [setup]
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
   /// [rt]
@@ -153,14 +155,16 @@ class Task final : public Waiter {
 
   /// Enters the initial state at exactly this instant; for deployment. Does not wait for the thread. [non-rt]
   void start_at(time_ns_t instant_ns);
-  /// Returns once the thread has taken up a start. [non-rt]
-  void wait_started() noexcept;
+  /// Whether the thread has taken up the start that was posted last, at the instant at the latest. [non-rt]
+  bool wait_started(time_ns_t until_ns) noexcept;
   /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
   /// is still to come is the start itself; without one it is the deployment's first instant. Another fsm keeps that grid.
-  /// [non-rt] Throws Error: already_running, faulted, not_configured.
-  void start(std::optional<time_ns_t> clock_ns = std::nullopt);
+  /// [non-rt] Throws Error: already_running, faulted, not_configured; timeout while a commit or another command of the
+  /// component lasts, or when its thread does not get to run: the start stays pending then.
+  void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = s_to_ns(2));
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
-  /// A commit that the component takes part in is called off, unless its change is being made; waits for nobody else.
+  /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other
+  /// component.
   /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
   /// By force: a component that still executes a state, or a guard, at the time-out is condemned: it is FAULTED, its outputs
   /// are written as on a stop, its thread is demoted and left behind until the state ends. True when that was done.
@@ -173,27 +177,25 @@ class Task final : public Waiter {
 
   // ---- the task's side of a commit (commit.hpp)
 
-  /// Asks the machine to come to the commit's gate in its next wait. [rt]
-  void post(Participant& place) MAUVE_RT;
-  /// After this nobody refers to the participant any more, but the machine for its next release; false when somebody
-  /// did still at the instant. [rt]
-  bool retract(time_ns_t until_ns) MAUVE_RT;
-  /// Calls off the commit that the component takes part in, if any, unless its change is being made; any thread. [rt]
-  void withdraw_commit() MAUVE_RT;
-  /// Whether an event came that the wait under way waits for. [rt], the machine's thread
-  bool has_event() const MAUVE_RT {
-    return !machine_.is_settled() && (control_.load(std::memory_order_acquire) & kEvent) != 0;
-  }
+  /// Posts a commit: the component votes in its next wait. Waits for an earlier change that it has not taken yet; false when
+  /// it has not at the instant. [rt], command mutex held.
+  bool post(Participant& place, time_ns_t until_ns) MAUVE_RT;
+  /// Lets it look at its slot: the commit is decided. [rt]
+  void notify_commit() MAUVE_RT;
+  /// Takes back a commit that was called off; false while the component is in its adopt, at the instant. [rt]
+  bool retract(const Participant& place, time_ns_t until_ns) MAUVE_RT;
+  /// Its steps of a commit, in virtual time. [non-rt]
+  void visit_simulated() noexcept;
+  /// Takes a commit that is made, for a parked component, and starts it if the commit does. [rt] as far as the actions are,
+  /// command mutex held.
+  void take_parked(Participant& place) noexcept;
+  /// Machine::entered_ns() [rt], parked or condemned.
+  time_ns_t entered_ns() const MAUVE_RT { return machine_.entered_ns(); }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
-  /// FAULTED, without a state that did it. [non-rt], the machine parked, command mutex held.
-  void fault_parked(const std::string& what);
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
-  void write_outputs(bool commit) MAUVE_RT;
-  /// What the machine would note on coming to the gate, of a parked or simulated one. [non-rt], command mutex held.
-  void hold_parked(Participant& place) const noexcept;
-  /// Carries on after a commit, when parked or simulated. [non-rt], command mutex held.
-  void finish_parked(Participant& place, bool committed) noexcept;
+  void write_outputs(bool commit) MAUVE_RT { write_outputs(commit, machine_.clock_ns()); }
+  void write_outputs(bool commit, time_ns_t time_ns) MAUVE_RT;
   /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
   /// came first. May be called again. [non-rt]
   static bool wait_release(const Participant& place, time_ns_t until_ns) noexcept;
@@ -222,8 +224,7 @@ class Task final : public Waiter {
 
   // ---- watched executions (rule 11, execution_word.hpp)
 
-  /// Condemns the watched execution under way, whatever its bound - a state that declares one, or what the thread does and
-  /// waits for at a commit's gate: tells FAULTED, takes the thread's priority away, then
+  /// Condemns the watched execution under way, whatever its bound - a state that declares one, or an adopt or take: tells FAULTED, takes the thread's priority away, then
   /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
   bool condemn(std::string what, time_ns_t now_ns);
   /// The same where it is over its bound. [rt]
@@ -264,7 +265,7 @@ class Task final : public Waiter {
   /// Tells who waits for changes that there was one. [rt]
   void signal_change() MAUVE_RT { changes_.bump(); }
   /// Whether the machine is out of user code for good, until the next start. [non-rt]
-  bool is_parked() const noexcept { return parked_.load(std::memory_order_acquire) != 0; }
+  bool is_parked() const noexcept { return parked_.load(std::memory_order_seq_cst) != 0; }
   /// The state being executed or waited in; empty before the start. [non-rt]
   std::string current_state() const;
   /// How long that lasts, also while it does, against the declared bound and what counts as hung. [non-rt]
@@ -301,6 +302,7 @@ class Task final : public Waiter {
   time_ns_t start_on(std::optional<time_ns_t> reference_ns) noexcept;
   time_ns_t next_instant() const noexcept;
   time_ns_t restart_instant(const Participant& place) noexcept;
+  bool withdraw_start() noexcept;
   void require_startable() const;
   bool is_called_from_own_state() const noexcept;
   void begin_trace(bool trace);
@@ -311,23 +313,34 @@ class Task final : public Waiter {
   bool must_act(std::uint32_t control) noexcept;
 
   // its steps around the machine's
-  void take_up_start() noexcept;
+  void take_up_start();
   void start_machine(time_ns_t instant_ns) noexcept;
   void run_to_next_wait();
   void step();
   void settle_event() noexcept;
   void release(time_ns_t actual_ns) noexcept;
-  time_ns_t leaves_gate_at(const Participant& place) const noexcept;
-  bool may_commit_now() noexcept;
-  void pass_commit() noexcept;
-  void come_to_commit();
-  void visit(Participant& place) noexcept;
-  bool make_parked() noexcept;
-  void go_on_unchanged(Participant& place) noexcept;
-  std::int64_t skip_lost(const Participant& place, time_ns_t now_ns) noexcept;
-  void exchange_state(ComponentState from, ComponentState to) noexcept;
-  void continue_after(Participant& place) noexcept;
-  void refuse_commit() noexcept;
+  template <typename Steps>
+  void run_guarded(Steps&& steps) noexcept;
+
+  // its part in a commit
+  enum class Visit : std::uint8_t { goes_on, parks, condemned };
+  bool visit_posted();
+  bool visit_before_release();
+  bool settle_visit(Visit visit);
+  Visit visit_slot() noexcept;
+  Visit look_at_cut(Participant& place, time_ns_t began_ns) noexcept;
+  bool fits_in_wait(Participant& place) const noexcept;
+  bool vote(Participant& place, time_ns_t began_ns) noexcept;
+  Visit take(Participant& place, time_ns_t began_ns) noexcept;
+  void go_on_with(Participant& place, bool was_started) noexcept;
+  void trace_take(const Participant& place) noexcept;
+  void trace_refusal(Participant& place, time_ns_t began_ns) noexcept;
+  void pass(Participant& place) noexcept;
+  bool settle_slot(bool ends = false) noexcept;
+  bool end_slot(Participant& place) noexcept;
+  bool enter_slot() MAUVE_RT;
+  void leave_slot(std::uint32_t to) MAUVE_RT;
+  void skip_lost(Participant& place, time_ns_t began_ns) noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
   void park_condemned() noexcept;
@@ -376,7 +389,9 @@ class Task final : public Waiter {
   std::atomic<std::uint32_t> ready_{0};
   std::atomic<std::uint32_t> ended_{0};
   std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
-  Lent<Participant> place_;
+  static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
+  std::atomic<std::uint32_t> slot_{kEmpty};
+  Participant* place_{nullptr};
   time_ns_t start_at_ns_{0};
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
   std::atomic<std::uint32_t> outputs_{kAllWritten};
@@ -386,10 +401,8 @@ class Task final : public Waiter {
 
   // the machine's own
   QueuePlace queue_place_{};  // of a simulated one
-  int deferrals_{0};          // releases a commit was put off for want of time
   bool in_resume_{false};     // its code is on some stack: what it calls must not resume it
-  bool left_gate_{false};     // it came to the gate in this wait, and left for its instant
-  bool is_abandoned_{false};  // what it did or waited for at the gate lasted too long
+  bool place_kept_{false};    // the fsm that a commit has put in goes on in its place
   time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
 };
 

@@ -26,7 +26,7 @@ enum class OverrunPolicy : std::uint8_t {
 inline constexpr std::array<std::string_view, 3> kOverrunPolicies{"skip", "catch_up", "fault"};
 
 struct TaskSettings {
-  int priority{50};         // SCHED_FIFO; 99 is kept for the conductor of transactions
+  int priority{50};         // SCHED_FIFO; 99 is kept for the watchdog
   std::vector<int> cpus{};  // empty: any
   time_ns_t offset_ns{0};   // instants are epoch + offset + k * period
   time_ns_t period_ns{0};   // 0: the gcd of the FSM's cycles
@@ -72,7 +72,7 @@ constexpr TaskSetting number_setting(std::string_view name, std::int64_t least, 
 /// The table: what is added to TaskSettings gets a line here.
 inline constexpr std::array kTaskSettings{
     number_setting<&TaskSettings::priority>("priority", 1, 98,
-                                            "1 is the lowest, 98 the highest; 99 is kept for the conductor"),
+                                            "1 is the lowest, 98 the highest; 99 is kept for the watchdog"),
     TaskSetting{.name = "cpus",
                 .least = 0,
                 .most = CPU_SETSIZE - 1,
