@@ -109,9 +109,10 @@ def swap(source: SyntheticSource, component: str, pending_ns: int, *, blackout_n
     """Replace a core half a period before the pending instant."""
     parked = pending_ns - PERIOD_NS // 2
     source.add(component, Kind.PARKED, parked, name="wait", a=pending_ns)
-    for phase, took_ns in ((1, 4_000), (2, 1_000)):
+    for phase, took_ns, instant_ns in ((1, 4_000, 0), (2, 1_000, pending_ns - PERIOD_NS + 1)):
         armed = parked + blackout_ns
-        source.add(component, Kind.RECONFIGURATION, armed, name="replace_core pkg/New", a=phase, b=took_ns)
+        what = "replace_core pkg/New"
+        source.add(component, Kind.RECONFIGURATION, armed, name=what, a=phase, b=took_ns, c=instant_ns)
     source.add(component, Kind.ARMED, parked + blackout_ns, name="wait", a=pending_ns, b=1)
 
 

@@ -200,8 +200,12 @@ class FakeRobot:
         add("exploration", Kind.PARKED, parked_ns, name="wait", a=pending_ns)
         what = f"replace_core {core}"
         adopt, take = ReconfigurationPhase
-        for phase, took_ns, end_ns in ((adopt, 18 * US, 24 * US), (take, 6 * US, 33 * US)):
-            add("exploration", Kind.RECONFIGURATION, parked_ns + end_ns, name=what, a=phase, b=took_ns)
+        for phase, took_ns, end_ns, instant_ns in (
+            (adopt, 18 * US, 24 * US, 0),
+            (take, 6 * US, 33 * US, parked_ns),
+        ):
+            time_ns = parked_ns + end_ns
+            add("exploration", Kind.RECONFIGURATION, time_ns, name=what, a=phase, b=took_ns, c=instant_ns)
         add("exploration", Kind.ARMED, armed_ns, name="wait", a=pending_ns, b=1)
         step = self.messages.make(
             "mauve_msgs/msg/StepReport",

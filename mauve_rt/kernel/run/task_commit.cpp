@@ -273,7 +273,8 @@ void Task::trace_take(const Participant& place) noexcept {
   for (const CommitAction* action : place.actions) {
     if (action->trace_id() == 0) continue;  // a mere check
     machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
-    machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns);
+    machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns,
+                   place.commit->instant_ns());
   }
 }
 

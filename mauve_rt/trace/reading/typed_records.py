@@ -157,6 +157,8 @@ class Reconfigured(NamedTuple):
     what: str
     phase: ReconfigurationPhase
     duration_ns: int
+    instant_ns: int = 0
+    """T: the component executes with the change from this instant on. 0: of an adopt, or of a fallback."""
 
 
 class Marked(NamedTuple):
@@ -202,8 +204,8 @@ _MAKE: dict[int, Callable[[int, str, str, int, int, int], Record]] = {
     Kind.SERVICE_BEGIN: lambda t, who, name, _a, _b, _c: ServiceBegun(t, who, name),
     Kind.SERVICE_END: lambda t, who, name, _a, _b, _c: ServiceEnded(t, who, name),
     Kind.CONTENDED: lambda t, who, name, a, b, _c: Contended(t, who, name, a, b),
-    Kind.RECONFIGURATION: lambda t, who, name, a, b, _c: Reconfigured(
-        t, who, name, ReconfigurationPhase(a), b
+    Kind.RECONFIGURATION: lambda t, who, name, a, b, c: Reconfigured(
+        t, who, name, ReconfigurationPhase(a), b, c
     ),
     Kind.MARK: Marked,
 }

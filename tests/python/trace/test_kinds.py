@@ -57,6 +57,8 @@ def test_the_table_names_what_each_kind_uses():
         "release", {"name": "wait", "a": "nominal_ns", "b": "actual_ns", "c": "place_ns"}
     )
     assert told[Kind.DEPLOYMENT].fields == {"a": "epoch_ns", "b": "offset_ns", "c": "period_ns"}
+    reconfiguration = told[Kind.RECONFIGURATION]
+    assert reconfiguration.figures == {"a": "phase", "b": "duration_ns", "c": "instant_ns"}
     assert told[Kind.STATE_BEGIN].figures == {}
     assert all(kind.fields for kind in told.values())
 
