@@ -201,6 +201,8 @@ class StepReport:
     remark: Final[str]  # why releases were missed; empty when none was
     shift_ns: Final[int]  # by which a new epoch made its instants later
     released_ns: Final[int]  # the instant of the release that followed
+    instant_ns: Final[int]  # T: the component executes with the change from this instant on
+    release_ns: Final[int]  # nominal instant of the release that followed
 
 NOT_MEASURED: Final[int]
 
@@ -495,6 +497,7 @@ class TransactionReport:
     prepare_ns: Final[int]
     blackout_ns: Final[int]  # the longest of any component's
     is_complete: Final[bool]  # False: a release that follows has not come yet
+    instant_ns: Final[int]  # T; NOT_MEASURED when the transaction changed no running component
 
 @final
 class Committed:

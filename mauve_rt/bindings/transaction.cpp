@@ -150,7 +150,8 @@ void bind_transaction(py::module_& module) {
       .def_readonly("revision", &TransactionReport::revision)
       .def_readonly("prepare_ns", &TransactionReport::prepare_ns)
       .def_readonly("blackout_ns", &TransactionReport::blackout_ns)
-      .def_readonly("is_complete", &TransactionReport::is_complete);
+      .def_readonly("is_complete", &TransactionReport::is_complete)
+      .def_readonly("instant_ns", &TransactionReport::instant_ns);
   py::class_<ArchitectureDescription>(module, "ArchitectureDescription")
       .def(
           "__eq__",

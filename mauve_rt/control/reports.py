@@ -90,4 +90,6 @@ def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: b
         from_core=measured.from_core,
         to_core=measured.to_core,
         remark=measured.remark,
+        instant_ns=measured.instant_ns,
+        release_ns=measured.release_ns,
     )

@@ -130,6 +130,8 @@ class Report:
     from_core: str = ""
     to_core: str = ""
     remark: str = ""
+    instant_ns: int = NOT_MEASURED
+    release_ns: int = NOT_MEASURED
 
 
 @dataclass(frozen=True, kw_only=True)

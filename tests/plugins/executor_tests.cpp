@@ -64,6 +64,8 @@ struct StepReport {
   mauve::BoundedString<64> from_core;
   mauve::BoundedString<64> to_core;
   mauve::BoundedString<128> remark;
+  std::int64_t instant_ns{};
+  std::int64_t release_ns{};
 };
 
 struct Stop {
@@ -106,7 +108,8 @@ MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s, force)
 MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
-           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark)
+           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
+           release_ns)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
            instance_id, revision, report)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")

@@ -81,6 +81,8 @@ struct Report {
   mauve::BoundedString<16> from_core;
   mauve::BoundedString<16> to_core;
   mauve::BoundedString<16> remark;
+  std::int64_t instant_ns{};
+  std::int64_t release_ns{};
 };
 
 struct Large {
@@ -103,7 +105,8 @@ MAUVE_TYPE(misfits::TriggerRequest, "std_srvs/srv/Trigger_Request")
 MAUVE_TYPE(misfits::TriggerResponse, "std_srvs/srv/Trigger_Response", message, success)
 MAUVE_CALL_TYPE(misfits::Trigger, "std_srvs/srv/Trigger")
 MAUVE_TYPE(misfits::Report, "mauve_msgs/msg/StepReport", step, component_name, prepare_ns, blackout_ns,
-           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark)
+           missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
+           release_ns)
 MAUVE_TYPE(misfits::Large, "misfits/Large", data)
 
 namespace misfits {

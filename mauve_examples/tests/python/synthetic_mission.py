@@ -219,6 +219,8 @@ class FakeRobot:
             from_core=self.core,
             to_core=core,
             remark="",
+            instant_ns=parked_ns,
+            release_ns=pending_ns,
         )
         event = self.messages.cdr(
             "mauve_msgs/msg/ReconfigurationEvent",

@@ -475,6 +475,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     const bool is_open = !place->has_passed() || (!is_simulated_ && place->awaits_release());
     if (committed_ && is_open) report.is_complete = false;
+    if (committed_ && place->in_flight) report.instant_ns = commit_->instant_ns();
   }
   const auto& steps = transaction_.steps();
   const auto for_all =
@@ -495,6 +496,8 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     step.phase_nominal_ns = found->second.phase_nominal_ns;
     step.phase_actual_ns = found->second.phase_actual_ns;
     step.released_ns = found->second.released_ns;
+    step.instant_ns = found->second.instant_ns;
+    step.release_ns = found->second.release_ns;
     step.remark = found->second.remark;
     const Participant& place = *places_.at(step.component);
     step.shift_ns = place.has_passed() ? place.shift_ns : 0;

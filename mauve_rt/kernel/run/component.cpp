@@ -289,6 +289,7 @@ std::string why_missed(const Participant& place) {
 StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   StepReport report;
   report.component = place.task->name();
+  if (place.in_flight) report.instant_ns = place.commit->instant_ns();
   if (!place.has_passed()) {
     report.remark = "it is late, and takes the change before its next release";
     return report;
@@ -301,6 +302,7 @@ StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
   if (released) {
     report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
     report.released_ns = place.release_actual_ns;
+    report.release_ns = place.release_nominal_ns;
   }
   report.missed_releases = place.lost + missed_releases(place, nominal_ns - place.shift_ns);
   if (report.missed_releases != 0) report.remark = why_missed(place);

@@ -13,7 +13,7 @@ import pytest
 from mauve_rt._kernel import ComponentDescription
 from mauve_rt.control import control as executor_control
 from mauve_rt.control.control import Control
-from mauve_rt.control.reports import message_of
+from mauve_rt.control.reports import message_of, reports_of
 from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Request, Step
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.model import load_architecture
@@ -135,6 +135,25 @@ def test_force_is_the_kernel_s_to_use(
     outcome = control.handle(Request(steps=(Step("stop", "counter"),), timeout_s=10.0, force=True))
     assert (outcome.success, outcome.message) == (True, "component 'counter' is stopped"), "it was well"
     assert _part(runtime, "counter").state == "STOPPED"
+
+
+def test_the_report_of_a_late_component_has_the_instant_and_no_release() -> None:
+    late = SimpleNamespace(
+        component="a",
+        blackout_ns=0,
+        missed_releases=0,
+        phase_nominal_ns=0,
+        phase_actual_ns=NOT_MEASURED,
+        from_core="",
+        to_core="",
+        remark="it is late",
+        instant_ns=7_000_001,
+        release_ns=NOT_MEASURED,
+    )
+    measured: Any = SimpleNamespace(steps=[late], prepare_ns=5, blackout_ns=0, is_complete=False)
+    (report,) = reports_of((Step("set_property", "a", "x", "1"),), measured)
+    assert (report.instant_ns, report.release_ns) == (7_000_001, NOT_MEASURED)
+    assert (report.blackout_ns, report.remark) == (NOT_MEASURED, "it is late")
 
 
 def test_releases_that_were_missed_are_in_the_message() -> None:
@@ -434,6 +453,11 @@ def test_every_step_names_the_core_that_it_changed(runtime: Runtime, control: Co
     followed = _followed(outcome)
     assert [report.to_core for report in followed.report] == [report.to_core for report in outcome.report]
     assert all(report.phase_actual_ns != NOT_MEASURED for report in followed.report[:3])
+    (instant_ns,) = {report.instant_ns for report in (*outcome.report[:3], *followed.report[:3])}
+    assert instant_ns != NOT_MEASURED
+    assert all(report.release_ns >= instant_ns for report in followed.report[:3])
+    added = followed.report[3]
+    assert (added.instant_ns, added.release_ns) == (NOT_MEASURED, NOT_MEASURED)
 
 
 def test_changes_made_at_once_have_a_revision_each(runtime: Runtime, control: Control) -> None:

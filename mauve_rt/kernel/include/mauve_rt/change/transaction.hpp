@@ -160,10 +160,11 @@ struct TransactionOptions {
 
 struct TransactionReport {
   std::vector<StepReport> steps;
-  std::uint64_t revision{0};  // of the architecture, after
-  time_ns_t prepare_ns{0};    // all of it
-  time_ns_t blackout_ns{0};   // the longest of any component's
-  bool is_complete{true};     // false: a release that follows has not come yet
+  std::uint64_t revision{0};           // of the architecture, after
+  time_ns_t prepare_ns{0};             // all of it
+  time_ns_t blackout_ns{0};            // the longest of any component's
+  bool is_complete{true};              // false: a release that follows has not come yet
+  time_ns_t instant_ns{kNotMeasured};  // T; kNotMeasured when the transaction changed no running component
 };
 
 }  // namespace mauve

@@ -33,6 +33,8 @@ struct StepReport {
   std::string remark{};                 // why releases were missed; empty when none was
   time_ns_t shift_ns{0};                // by which a new epoch made its instants later
   time_ns_t released_ns{kNotMeasured};  // the instant of the release that followed
+  time_ns_t instant_ns{kNotMeasured};   // T: the component executes with the change from this instant on
+  time_ns_t release_ns{kNotMeasured};   // nominal instant of the release that followed
 };
 
 struct CommitTimeouts {
