@@ -47,21 +47,36 @@ def report_lines(report: Sequence[Any]) -> list[str]:
     """What each step cost, in words: a line for each of several, for one when something was measured."""
     lines = []
     for step in report:
+        none = type(step).NOT_MEASURED
         facts = [f"prepared in {duration(step.prepare_ns)}"] if step.prepare_ns >= _WORTH_TELLING_NS else []
-        if step.blackout_ns != type(step).NOT_MEASURED:
+        if step.blackout_ns != none:
             facts.append(f"blackout {duration(step.blackout_ns)}")
-            if step.missed_releases != type(step).NOT_MEASURED:
+            if step.missed_releases != none:
                 facts.append(f"missed releases {step.missed_releases}")
             else:
                 facts.append("next release still to come")
-        if step.phase_actual_ns != type(step).NOT_MEASURED:
-            facts.append(f"next release woken {duration(step.phase_actual_ns)} after its instant")
+        elif step.instant_ns != none and step.release_ns == none and step.remark:
+            facts.append(step.remark)  # the component is late
+        if step.phase_actual_ns != none:
+            facts.append(_next_release(step))
         if len(report) > 1:
             subject = f"{step.component}: " if step.component else ""
             lines.append(f"{subject}{step.step}" + (f": {', '.join(facts)}" if facts else ""))
         elif facts:
             lines.append(f"{step.step}: {', '.join(facts)}")
     return lines
+
+
+def _next_release(step: Any) -> str:
+    """When the release is due that follows the change, and how late it was."""
+    woken = f"woken {_after(step.phase_actual_ns, 'its instant')}"
+    if type(step).NOT_MEASURED in (step.instant_ns, step.release_ns):
+        return f"next release {woken}"
+    return f"next release due {_after(step.release_ns - step.instant_ns, 'the change')}, {woken}"
+
+
+def _after(nanoseconds: int, event: str) -> str:
+    return f"{duration(nanoseconds)} after {event}" if nanoseconds else f"at {event}"
 
 
 def event_line(event: Any) -> str:

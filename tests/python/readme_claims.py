@@ -612,6 +612,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ChangeModel.HoldsInEveryInterleaving",
         "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
     ),
+    "The report gives T, and when the first release of each component with the change was due and came": (
+        "ChangeInstant.IsTheSameForAllComponentsAndSplitsNoneOfThem",
+        "ChangeInstantOnThreads.IsKnownOfALateComponentBeforeItTakesTheChange",
+        "python/cli/test_verbs.py::test_the_next_release_in_words",
+    ),
     "to a resource whose writer has changed are dropped": (
         "WeakenedChangeModel.Breaks",
         "Rule10Floor.WhatALateOneWritesToAnEndThatHasMovedIsDropped",
@@ -623,9 +628,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
         "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
     ),
-    "Where no budget is declared, none is checked": (
-        "Rule10Commit.WhoIsOverItsBudgetIsNamedAndNobodyElse",
-    ),
+    "Where no budget is declared, none is checked": ("Rule10Commit.WhoIsOverItsBudgetIsNamedAndNobodyElse",),
     "leaves the architecture as it was, and the error names the step": (
         "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
         "python/control/test_control.py::test_a_refusal_names_the_step_and_changes_nothing",

@@ -111,14 +111,39 @@ def test_plugins(plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "executor_tests/PyCounter" in capsys.readouterr().out
 
 
+def _words_of(**measured: int | str) -> str:
+    """What a report says of a step, of which only this was measured."""
+    none = StepReport.NOT_MEASURED
+    unknown = {"blackout_ns": none, "phase_actual_ns": none, "instant_ns": none, "release_ns": none}
+    (line,) = views.report_lines([StepReport(step="step", **{**unknown, **measured})])
+    return line
+
+
+def test_the_next_release_in_words() -> None:
+    none = StepReport.NOT_MEASURED
+    assert _words_of(phase_actual_ns=14_000) == "step: next release woken 14 us after its instant"
+    due = {"phase_actual_ns": 14_000, "instant_ns": 5, "release_ns": 5}
+    assert _words_of(**due) == "step: next release due at the change, woken 14 us after its instant"
+    simulated = {"phase_actual_ns": 0, "instant_ns": 5, "release_ns": 2_005}
+    assert _words_of(**simulated) == "step: next release due 2 us after the change, woken at its instant"
+    awaited = {"blackout_ns": 5_000, "missed_releases": none, "instant_ns": 5}
+    assert _words_of(**awaited) == "step: blackout 5 us, next release still to come"
+    assert _words_of(instant_ns=5, remark="it is late") == "step: it is late"
+
+
 def test_reports_and_events_in_words() -> None:
     none = StepReport.NOT_MEASURED
     measured = StepReport(
-        step="replace_core p/B", prepare_ns=2_000_000, blackout_ns=35_000, phase_actual_ns=-1_500
+        step="replace_core p/B",
+        prepare_ns=2_000_000,
+        blackout_ns=35_000,
+        phase_actual_ns=-1_500,
+        instant_ns=7_000_000,
+        release_ns=8_200_000,
     )
     stop = StepReport(step="stop", blackout_ns=none, phase_actual_ns=none)
     line = "replace_core p/B: prepared in 2 ms, blackout 35 us, missed releases 0, next release "
-    line += "woken -1.5 us after its instant"
+    line += "due 1.2 ms after the change, woken -1.5 us after its instant"
     assert views.report_lines([measured]) == [line]
     assert views.report_lines([stop]) == []
     two = [StepReport(step="stop", component="guidance", blackout_ns=none, phase_actual_ns=none), measured]
