@@ -116,10 +116,10 @@ def _check(args: argparse.Namespace) -> int:
     with shown() as progress:
         findings = check_bag(bag, progress=progress)
     for finding in findings:
-        print(f"{'damage' if finding.is_damage else 'loss' if finding.is_loss else 'note'}: {finding.text}")
-    bad = [finding for finding in findings if finding.is_damage or finding.is_loss]
+        print(f"{finding.kind}: {finding.text}")
+    bad = [finding for finding in findings if finding.kind != "note"]
     if not bad:
-        print(f"{bag}: whole, nothing is missing")
+        print(f"{bag}: whole, nothing is missing, no split change found")
     elif any(finding.is_damage for finding in bad):
         print(f"`mauve trace repair {bag}` makes a bag of it that every reader opens")
     return REFUSED if bad else OK
@@ -160,7 +160,7 @@ def _stats(args: argparse.Namespace) -> int:
 
 SUB_VERBS = (
     Verb("info", "show what a bag holds", _add_bag_and_json, _info),
-    Verb("check", "see whether a bag is whole and nothing is missing", _add_bag, _check),
+    Verb("check", "see whether a bag is whole, nothing is missing and no change was split", _add_bag, _check),
     Verb("repair", "finish a bag that a kill or a full disk left unfinished", _add_bag, _repair),
     Verb("stats", "show statistics of components, states, services", _add_bag_and_json, _stats),
     Verb("export", "write a trace as a file for ui.perfetto.dev, or as CSV files", _add_export, _export),

@@ -397,7 +397,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_reader.py::test_loss_is_known_from_sequences_and_counters",
     ),
     "mauve trace info": ("python/cli/test_trace.py::test_info",),
-    "mauve trace check": ("python/cli/test_trace.py::test_check_tells_losses",),
+    "mauve trace check": (
+        "python/cli/test_trace.py::test_check_tells_losses",
+        "python/trace/test_split_changes.py::test_the_verb_says_wrong_and_fails",
+    ),
     "mauve trace repair": ("python/cli/test_trace.py::test_check_and_repair",),
     "mauve trace stats": ("python/cli/test_trace.py::test_stats",),
     "mauve trace export": (
@@ -616,6 +619,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ChangeInstant.IsTheSameForAllComponentsAndSplitsNoneOfThem",
         "ChangeInstantOnThreads.IsKnownOfALateComponentBeforeItTakesTheChange",
         "python/cli/test_verbs.py::test_the_next_release_in_words",
+    ),
+    "`mauve trace check` finds each change in a bag of which a release ran on the wrong side of T": (
+        "python/trace/test_split_changes.py::test_a_release_before_t_after_the_take_is_wrong",
+        "python/trace/test_split_changes.py::test_a_release_at_or_after_t_before_the_take_is_wrong",
     ),
     "to a resource whose writer has changed are dropped": (
         "WeakenedChangeModel.Breaks",

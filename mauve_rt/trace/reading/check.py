@@ -1,4 +1,4 @@
-"""Whether a bag can be trusted: finished, whole, and nothing missing that was recorded."""
+"""Whether a bag can be trusted: finished, whole, nothing missing that was recorded, no change split."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.recorder import DROPPED_MESSAGES
 
@@ -23,6 +24,14 @@ class Finding:
     """The bag is no finished one: other readers may refuse it. A repair helps."""
     is_loss: bool = False
     """Something that was to be recorded is missing."""
+    is_wrong: bool = False
+    """The records show that the kernel broke a rule of its own."""
+
+    @property
+    def kind(self) -> str:
+        """`damage`, `loss`, `wrong`, or `note` where the bag can be trusted all the same."""
+        kinds = {"damage": self.is_damage, "loss": self.is_loss, "wrong": self.is_wrong}
+        return next((kind for kind, is_so in kinds.items() if is_so), "note")
 
 
 def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
@@ -47,6 +56,11 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         for file in state.files
         if not file.is_in_order
     ]
+    found += [
+        Finding(_split_words(name, split), is_wrong=True)
+        for name, rows in trace.records.items()
+        for split in split_changes(rows)
+    ]
     return found + _notes(trace)
 
 
@@ -56,6 +70,21 @@ def _words(component: str, loss: Loss) -> str:
         f"component '{component}': {loss.lost:,} of {loss.written:,} records ({share:.2%}) are missing: "
         f"{loss.dropped:,} found no room in its ring (trace_records in the architecture file), and the "
         f"sequence numbers have gaps of {loss.gaps:,}"
+    )
+
+
+def _split_words(component: str, split: SplitChange) -> str:
+    distance_ns = abs(split.release_ns - split.instant_ns)
+    if split.is_new:
+        what, where = "a release before T ran with new parts", f"{distance_ns:,} ns before T"
+        expected = "releases with new parts at or after T only"
+    else:
+        what, where = "a release at or after T ran with old parts", f"{distance_ns:,} ns after T"
+        expected = "releases with old parts before T only"
+    where = where if distance_ns else "at T"
+    return (
+        f"component '{component}': the change at T = {split.instant_ns} ns was split: {what}; "
+        f"found the release at {split.release_ns} ns, {where}, expected {expected}"
     )
 
 
@@ -75,6 +104,13 @@ def _notes(trace: Trace) -> list[Finding]:
             )
         if len(rows) and int(rows["name"].max()) >= len(trace.names):
             notes.append(Finding(f"component '{name}': words of its last records are not in the bag"))
+    if any(has_takes_without_instant(rows) for rows in trace.records.values()):
+        notes.append(
+            Finding(
+                "the bag does not tell T of its changes (recorded by an earlier version): "
+                "whether one was split cannot be checked"
+            )
+        )
     if not trace.architecture:
         notes.append(Finding("the bag does not tell the architecture (recorded by an earlier version)"))
     return notes
