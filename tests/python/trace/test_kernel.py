@@ -8,9 +8,10 @@ from perfetto_decoding import Decoded
 
 from mauve_rt import _kernel
 from mauve_rt.trace.export.perfetto import export_perfetto
-from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.format.records import Kind, ReconfigurationPhase
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
+from mauve_rt.trace.reading.split_changes import split_changes
 from mauve_rt.trace.reading.statistics import all_statistics
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.recorder import Recorder
@@ -92,6 +93,14 @@ def test_swaps_are_as_the_kernel_reported_them(run: Run):
         assert (one.blackout_ns, one.missed_releases) == (told.blackout_ns, told.missed_releases)
         assert (one.phase_nominal_ns, one.phase_actual_ns) == (told.phase_nominal_ns, told.phase_actual_ns)
         assert one.parked_ns + one.adopt_ns + one.take_ns <= one.armed_ns
+
+
+def test_every_take_tells_the_instant_that_was_reported(run: Run):
+    changes = run.trace.of("slow", Kind.RECONFIGURATION)
+    takes = changes[changes["a"] == ReconfigurationPhase.TAKE]
+    assert takes["c"].tolist() == [told.instant_ns for told in run.reports]
+    assert all(told.release_ns >= told.instant_ns for told in run.reports)
+    assert [split_changes(run.trace.of(name)) for name in run.trace.components] == [[], []]
 
 
 def test_perfetto_shows_them(run: Run, tmp_path: Path):
