@@ -21,7 +21,7 @@ constexpr time_ns_t kLook = ms_to_ns(20);
 
 Commit::Commit(std::size_t participants, std::vector<CommitAction*> actions)
     : participants_(participants), actions_(std::move(actions)) {
-  for (Participant& place : participants_) place.commit = this;
+  for (Participant& participant : participants_) participant.commit = this;
   // relaxed: no thread knows the commit yet
   to_vote_.store(static_cast<std::uint32_t>(participants), std::memory_order_relaxed);
   to_pass_.store(static_cast<std::uint32_t>(participants), std::memory_order_relaxed);
@@ -29,20 +29,20 @@ Commit::Commit(std::size_t participants, std::vector<CommitAction*> actions)
 
 Commit::~Commit() {
   if (!is_made()) return;
-  for (Participant& place : participants_) {
-    if (place.has_passed() && place.in_flight && place.afterwards != Afterwards::stop)
-      place.task->forget_release(place);
+  for (Participant& participant : participants_) {
+    if (participant.has_passed() && participant.in_flight && participant.afterwards != Afterwards::stop)
+      participant.task->forget_release(participant);
   }
 }
 
 void Commit::assign_actions() {
   order_.clear();
-  for (Participant& place : participants_) {
-    place.actions.clear();
+  for (Participant& participant : participants_) {
+    participant.actions.clear();
     for (CommitAction* action : actions_) {
-      if (action->task == place.task) place.actions.push_back(action);
+      if (action->task == participant.task) participant.actions.push_back(action);
     }
-    order_.push_back(&place);
+    order_.push_back(&participant);
   }
   std::sort(order_.begin(), order_.end(),
             [](const Participant* a, const Participant* b) { return a->task->number() < b->task->number(); });
@@ -50,11 +50,11 @@ void Commit::assign_actions() {
 
 // ---- participants
 
-bool Commit::adopt(Participant& place) noexcept {
-  const Clock& clock = place.task->clock();
+bool Commit::adopt(Participant& participant) noexcept {
+  const Clock& clock = participant.task->clock();
   time_ns_t began = clock.now_ns();
   const CommitAction* slowest = nullptr;
-  for (CommitAction* action : place.actions) {
+  for (CommitAction* action : participant.actions) {
     bool has_agreed = false;
     std::exception_ptr why;
     try {
@@ -68,38 +68,38 @@ bool Commit::adopt(Participant& place) noexcept {
     if (slowest == nullptr || action->adopt_ns > slowest->adopt_ns) slowest = action;
     const bool is_late = action->declared_ns() != 0 && action->adopt_ns > action->declared_ns();
     if (has_agreed && !is_late) continue;
-    refuse(&place, *action, why, has_agreed);
+    refuse(&participant, *action, why, has_agreed);
     return false;
   }
-  if (slowest != nullptr && off() == Off::timed_out) refuse(&place, *slowest, nullptr, true);
+  if (slowest != nullptr && off() == Off::timed_out) refuse(&participant, *slowest, nullptr, true);
   return cut_.look().is_open();
 }
 
-void Commit::refuse(const Participant* place, const CommitAction& action, std::exception_ptr why,
+void Commit::refuse(const Participant* participant, const CommitAction& action, std::exception_ptr why,
                     bool is_late) noexcept {
   if (!is_refused_.exchange(true, std::memory_order_acq_rel)) {
     refused_by_ = &action;
     refusal_ = std::move(why);
     adopt_was_late_ = is_late;
   }
-  call_off(Off::withdrawn, place != nullptr ? place->task : nullptr);
+  call_off(Off::withdrawn, participant != nullptr ? participant->task : nullptr);
 }
 
-void Commit::vote(Participant& place, time_ns_t entered_ns) noexcept {
+void Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
   const CutWord seen = cut_.raise(entered_ns);
-  place.has_voted = true;
-  place.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
+  participant.has_voted = true;
+  participant.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
   if (seen.is_off()) return;
   if (to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
   cut_.close();
   decided();
 }
 
-time_ns_t Commit::take(Participant& place) noexcept {
-  const Clock& clock = place.task->clock();
+time_ns_t Commit::take(Participant& participant) noexcept {
+  const Clock& clock = participant.task->clock();
   time_ns_t began = clock.now_ns();
   time_ns_t overlong = 0;
-  for (CommitAction* action : place.actions) {
+  for (CommitAction* action : participant.actions) {
     const time_ns_t declared = action->declared_ns();  // of the new core; after take, that is another
     action->instant_ns = instant_ns();
     action->take();
@@ -112,8 +112,8 @@ time_ns_t Commit::take(Participant& place) noexcept {
   return overlong;
 }
 
-void Commit::pass(Participant& place) noexcept {
-  place.passed.store(true, std::memory_order_release);
+void Commit::pass(Participant& participant) noexcept {
+  participant.passed.store(true, std::memory_order_release);
   // The commit may be freed once this was the last one: only the word's address is used after it.
   if (to_pass_.fetch_sub(1, std::memory_order_acq_rel) == 1) futex_wake_all(to_pass_);
 }
@@ -178,14 +178,14 @@ bool Commit::lock(time_ns_t until_ns) noexcept {
 }
 
 void Commit::unlock() noexcept {
-  for (Participant* place : order_) place->task->command_mutex().unlock();
+  for (Participant* participant : order_) participant->task->command_mutex().unlock();
 }
 
 const Task* Commit::find_unfit() const noexcept {
-  for (const Participant* place : order_) {
-    if (place->afterwards == Afterwards::stop || place->repairs) continue;
-    const ComponentState state = place->task->state();
-    if (state == ComponentState::stopping || state == ComponentState::faulted) return place->task;
+  for (const Participant* participant : order_) {
+    if (participant->afterwards == Afterwards::stop || participant->repairs) continue;
+    const ComponentState state = participant->task->state();
+    if (state == ComponentState::stopping || state == ComponentState::faulted) return participant->task;
   }
   return nullptr;
 }
@@ -193,16 +193,16 @@ const Task* Commit::find_unfit() const noexcept {
 /// The commands held: no start comes between this and the takes of the parked ones.
 void Commit::begin() noexcept {
   bool takes_epoch = false;
-  for (Participant* place : order_) {
-    Task& task = *place->task;
-    place->period_ns = task.grid().period_ns;
-    place->left_behind = place->afterwards == Afterwards::stop && task.claim();
-    place->in_flight = !place->left_behind && !task.is_parked();
+  for (Participant* participant : order_) {
+    Task& task = *participant->task;
+    participant->period_ns = task.grid().period_ns;
+    participant->left_behind = participant->afterwards == Afterwards::stop && task.claim();
+    participant->in_flight = !participant->left_behind && !task.is_parked();
     // New parts may hang in adopt: that costs the component's own thread, where there is one.
-    const bool has_own_thread = task.has_thread() && place->replaces_parts;
-    place->is_own = place->in_flight || (!place->left_behind && has_own_thread);
-    has_own_ |= place->is_own;
-    takes_epoch |= place->epoch_lead_ns != 0;
+    const bool has_own_thread = task.has_thread() && participant->replaces_parts;
+    participant->is_own = participant->in_flight || (!participant->left_behind && has_own_thread);
+    has_own_ |= participant->is_own;
+    takes_epoch |= participant->epoch_lead_ns != 0;
   }
   // A new epoch counts from T, and lies ahead of all that was executed by now.
   if (takes_epoch) cut_.raise(order_.front()->task->clock().now_ns());
@@ -218,21 +218,21 @@ bool Commit::check() noexcept {
 }
 
 void Commit::vote_for_parked() noexcept {
-  for (Participant* place : order_) {
-    if (place->is_own) continue;
-    if (!adopt(*place)) return;
+  for (Participant* participant : order_) {
+    if (participant->is_own) continue;
+    if (!adopt(*participant)) return;
     // A claimed one executed last at its `entered`: T comes after that.
-    vote(*place, place->task->entered_ns());
+    vote(*participant, participant->task->entered_ns());
   }
   if (order_.empty()) cut_.close();
 }
 
 void Commit::post_all(time_ns_t until_ns) noexcept {
-  for (Participant* place : order_) {
-    if (!place->is_own) continue;
+  for (Participant* participant : order_) {
+    if (!participant->is_own) continue;
     if (!cut_.look().is_open()) return;
-    if (place->task->post(*place, until_ns)) continue;
-    occupied_ = place->task;
+    if (participant->task->post(*participant, until_ns)) continue;
+    occupied_ = participant->task;
     call_off(Off::timed_out);
     return;
   }
@@ -240,8 +240,8 @@ void Commit::post_all(time_ns_t until_ns) noexcept {
 
 /// In virtual time no thread comes: the requester's runs the components' steps of the change.
 void Commit::visit_simulated() noexcept {
-  for (Participant* place : order_) {
-    if (place->is_own && place->task->is_simulated()) place->task->visit_simulated();
+  for (Participant* participant : order_) {
+    if (participant->is_own && participant->task->is_simulated()) participant->task->visit_simulated();
   }
 }
 
@@ -260,46 +260,46 @@ void Commit::await_decision(time_ns_t until_ns) noexcept {
 
 /// A stop, a fault or a condemnation wins: what it does not get to do itself is done here.
 void Commit::call_off_if_one_left() noexcept {
-  for (const Participant* place : order_) {
-    if (!place->in_flight) continue;
-    const ComponentState state = place->task->state();
-    if (state != ComponentState::running) call_off(Off::withdrawn, place->task);
+  for (const Participant* participant : order_) {
+    if (!participant->in_flight) continue;
+    const ComponentState state = participant->task->state();
+    if (state != ComponentState::running) call_off(Off::withdrawn, participant->task);
   }
 }
 
 void Commit::retract_all(time_ns_t until_ns) noexcept {
   if (off() == Off::shut_down) until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
-  for (Participant* place : order_) {
-    if (place->left_behind) place->task->give_up_claim();
-    if (!place->is_own) continue;
-    while (!place->task->retract(*place, monotonic_now_ns() + kLook)) {  // busy: its adopt
-      const bool is_late = monotonic_now_ns() >= until_ns && give_up(*place, "adopt");
-      if (!is_late && !place->task->is_left_behind()) continue;
-      kept_by_ = place->task;  // its thread may come back to the record
+  for (Participant* participant : order_) {
+    if (participant->left_behind) participant->task->give_up_claim();
+    if (!participant->is_own) continue;
+    while (!participant->task->retract(*participant, monotonic_now_ns() + kLook)) {  // busy: its adopt
+      const bool is_late = monotonic_now_ns() >= until_ns && give_up(*participant, "adopt");
+      if (!is_late && !participant->task->is_left_behind()) continue;
+      kept_by_ = participant->task;  // its thread may come back to the record
       break;
     }
   }
 }
 
 void Commit::complete(time_ns_t until_ns) noexcept {
-  for (Participant* place : order_) {
-    if (place->is_own) {
-      place->task->notify_commit();
+  for (Participant* participant : order_) {
+    if (participant->is_own) {
+      participant->task->notify_commit();
     } else {
-      place->task->take_parked(*place);
-      if (place->left_behind) place->task->abandon();
+      participant->task->take_parked(*participant);
+      if (participant->left_behind) participant->task->abandon();
     }
   }
   visit_simulated();
   until_ns = std::max(until_ns, monotonic_now_ns() + kPatience);
   start_parked(until_ns);
-  for (Participant* place : order_) {
-    const Task& task = *place->task;
-    while (!place->has_passed() && !task.is_simulated() && !task.is_left_behind()) {
+  for (Participant* participant : order_) {
+    const Task& task = *participant->task;
+    while (!participant->has_passed() && !task.is_simulated() && !task.is_left_behind()) {
       const time_ns_t now = monotonic_now_ns();
       if (now >= until_ns) {
-        const bool is_taking = place->visit_ns.load(std::memory_order_relaxed) != 0;
-        if (!is_taking || give_up(*place, "take")) break;  // it is late: it takes the change by itself
+        const bool is_taking = participant->visit_ns.load(std::memory_order_relaxed) != 0;
+        if (!is_taking || give_up(*participant, "take")) break;  // it is late: it takes the change by itself
       }
       const std::uint32_t to_pass = to_pass_.load(std::memory_order_acquire);
       if (to_pass != 0) futex_wait_until(to_pass_, to_pass, now + kLook);
@@ -310,8 +310,9 @@ void Commit::complete(time_ns_t until_ns) noexcept {
 
 /// Those whose threads the requester has started: a thread that gets no processor is not waited for beyond the instant.
 void Commit::start_parked(time_ns_t until_ns) noexcept {
-  for (Participant* place : order_) {
-    if (!place->is_own && place->afterwards == Afterwards::restart) place->task->wait_started(until_ns);
+  for (Participant* participant : order_) {
+    if (!participant->is_own && participant->afterwards == Afterwards::restart)
+      participant->task->wait_started(until_ns);
   }
 }
 
@@ -326,9 +327,9 @@ bool Commit::wait_passed(time_ns_t until_ns) const noexcept {
 }
 
 /// Condemns a component whose adopt or take lasts beyond all patience; false when it has ended, or has just begun.
-bool Commit::give_up(const Participant& place, const char* call) noexcept {
-  const time_ns_t began = place.visit_ns.load(std::memory_order_relaxed);
-  Task& task = *place.task;
+bool Commit::give_up(const Participant& participant, const char* call) noexcept {
+  const time_ns_t began = participant.visit_ns.load(std::memory_order_relaxed);
+  Task& task = *participant.task;
   if (began == 0 || task.clock().now_ns() - began < kPatience) return false;
   if (!task.condemn(std::string(call) + " of its new part does not end", task.clock().now_ns())) return false;
   given_up_ = &task;
@@ -399,26 +400,27 @@ void Commit::throw_timeout() const {
     occupied_->throw_state_running("the component has not taken an earlier change yet; nothing was changed",
                                    timeout_ns_, "try again when its state has ended, or remove it by force");
   }
-  for (const Participant* place : order_) {
-    if (!place->is_own || place->has_agreed.load(std::memory_order_relaxed)) continue;
-    if (place->unfit_waits.load(std::memory_order_relaxed) != 0) {
+  for (const Participant* participant : order_) {
+    if (!participant->is_own || participant->has_agreed.load(std::memory_order_relaxed)) continue;
+    if (participant->unfit_waits.load(std::memory_order_relaxed) != 0) {
       time_ns_t declared = 0;
-      for (const CommitAction* action : place->actions) declared += action->declared_ns();
+      for (const CommitAction* action : participant->actions) declared += action->declared_ns();
       throw Error(ErrorCode::timeout,
                   "the declared budget fits in no wait of the component; nothing was changed",
-                  {.component = place->task->name(),
+                  {.component = participant->task->name(),
                    .element = "budget_ns",
                    .expected = "less than what is left of a wait",
                    .found = std::to_string(declared / us_to_ns(1)) + " us for adopt and take",
                    .remedy = "declare a shorter budget"});
     }
-    if (place->in_flight) {
-      place->task->throw_state_running("the component did not reach a wait in time; nothing was changed",
-                                       timeout_ns_, "try again, or allow a longer commit timeout");
+    if (participant->in_flight) {
+      participant->task->throw_state_running(
+          "the component did not reach a wait in time; nothing was changed", timeout_ns_,
+          "try again, or allow a longer commit timeout");
     }
     throw Error(ErrorCode::timeout, "the component's thread did not get to run in time; nothing was changed",
-                {.component = place->task->name(),
-                 .element = "priority " + std::to_string(place->task->settings().priority),
+                {.component = participant->task->name(),
+                 .element = "priority " + std::to_string(participant->task->settings().priority),
                  .remedy = "look for a component of equal or higher priority that does not wait"});
   }
   throw Error(ErrorCode::timeout, "the change was not decided in time; nothing was changed",

@@ -269,43 +269,47 @@ StepReport Component::swap_core(std::unique_ptr<CoreBase> core, const CommitTime
 namespace {
 
 /// The instants of the grid before the change that lie between the pending one and the release that follows.
-std::int64_t missed_releases(const Participant& place, time_ns_t release_ns) noexcept {
-  if (place.period_ns == 0 || release_ns <= place.pending_ns) return 0;
-  return (release_ns - place.pending_ns + place.period_ns - 1) / place.period_ns;
+std::int64_t missed_releases(const Participant& participant, time_ns_t release_ns) noexcept {
+  if (participant.period_ns == 0 || release_ns <= participant.pending_ns) return 0;
+  return (release_ns - participant.pending_ns + participant.period_ns - 1) / participant.period_ns;
 }
 
-std::string why_missed(const Participant& place) {
+std::string why_missed(const Participant& participant) {
   const auto in_us = [](time_ns_t duration_ns) { return std::to_string(duration_ns / us_to_ns(1)) + " us"; };
-  if (place.start_clock_ns) return "it starts on the clock that was asked for";
-  const bool was_to_go_on = place.grid.first_not_before(place.pending_ns) == place.pending_ns;
-  if (place.afterwards != Afterwards::restart || was_to_go_on)
+  if (participant.start_clock_ns) return "it starts on the clock that was asked for";
+  const bool was_to_go_on =
+      participant.grid.first_not_before(participant.pending_ns) == participant.pending_ns;
+  if (participant.afterwards != Afterwards::restart || was_to_go_on)
     return "adopt and take lasted beyond its pending instant";
-  return "the pending instant, of a period of " + in_us(place.period_ns) +
-         ", is none of the new one's: it starts at the first of " + in_us(place.grid.period_ns) + " after it";
+  return "the pending instant, of a period of " + in_us(participant.period_ns) +
+         ", is none of the new one's: it starts at the first of " + in_us(participant.grid.period_ns) +
+         " after it";
 }
 
 }  // namespace
 
-StepReport report_of(const Participant& place, time_ns_t phase_timeout_ns) {
+StepReport report_of(const Participant& participant, time_ns_t phase_timeout_ns) {
   StepReport report;
-  report.component = place.task->name();
-  if (place.in_flight) report.instant_ns = place.commit->instant_ns();
-  if (!place.has_passed()) {
+  report.component = participant.task->name();
+  if (participant.in_flight) report.instant_ns = participant.commit->instant_ns();
+  if (!participant.has_passed()) {
     report.remark = "it is late, and takes the change before its next release";
     return report;
   }
-  if (place.in_flight) report.blackout_ns = place.armed_ns - place.parked_ns;
-  if (!place.is_followed_by_release()) return report;
-  const bool released = place.task->wait_release(place, later_by(monotonic_now_ns(), phase_timeout_ns));
-  const time_ns_t nominal_ns = released ? place.release_nominal_ns : place.resumes_ns;
-  report.phase_nominal_ns = place.grid.phase_error(nominal_ns - place.grid_place_ns);
+  if (participant.in_flight) report.blackout_ns = participant.armed_ns - participant.parked_ns;
+  if (!participant.is_followed_by_release()) return report;
+  const bool released =
+      participant.task->wait_release(participant, later_by(monotonic_now_ns(), phase_timeout_ns));
+  const time_ns_t nominal_ns = released ? participant.release_nominal_ns : participant.resumes_ns;
+  report.phase_nominal_ns = participant.grid.phase_error(nominal_ns - participant.grid_place_ns);
   if (released) {
-    report.phase_actual_ns = report.phase_nominal_ns + place.release_actual_ns - place.release_nominal_ns;
-    report.released_ns = place.release_actual_ns;
-    report.release_ns = place.release_nominal_ns;
+    report.phase_actual_ns =
+        report.phase_nominal_ns + participant.release_actual_ns - participant.release_nominal_ns;
+    report.released_ns = participant.release_actual_ns;
+    report.release_ns = participant.release_nominal_ns;
   }
-  report.missed_releases = place.lost + missed_releases(place, nominal_ns - place.shift_ns);
-  if (report.missed_releases != 0) report.remark = why_missed(place);
+  report.missed_releases = participant.lost + missed_releases(participant, nominal_ns - participant.shift_ns);
+  if (report.missed_releases != 0) report.remark = why_missed(participant);
   return report;
 }
 

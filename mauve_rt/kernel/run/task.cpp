@@ -57,7 +57,7 @@ std::string_view to_string(ComponentState state) noexcept {
 void ChangeSignal::bump() noexcept {
   word.fetch_add(1, std::memory_order_release);  // release: who sees the bump sees the change
   futex_wake_all(word);
-  if (listener.is_lent()) listener.use([](ChangeSignal& other) { other.bump(); });
+  if (listener.is_set()) listener.use([](ChangeSignal& other) { other.bump(); });
 }
 
 Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)

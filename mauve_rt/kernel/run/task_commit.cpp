@@ -17,7 +17,7 @@ constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without t
 
 // ---- the slot: the requester's side
 
-bool Task::post(Participant& place, time_ns_t until_ns) noexcept {
+bool Task::post(Participant& participant, time_ns_t until_ns) noexcept {
   std::uint32_t seen = slot_.load(std::memory_order_acquire);
   while ((seen & kSlot) != kEmpty) {
     if (simulated_) return false;
@@ -26,12 +26,12 @@ bool Task::post(Participant& place, time_ns_t until_ns) noexcept {
       return false;
     seen = slot_.load(std::memory_order_acquire);
   }
-  place_ = &place;
+  participant_ = &participant;
   // seq_cst: the thread, on its way into a park or its end, sees this, or this thread sees that it has parked or ended
   slot_.store(kPosted, std::memory_order_seq_cst);
   notify_commit();
   if (!simulated_ && ended_.load(std::memory_order_seq_cst) != 0)
-    place.commit->call_off(Commit::Off::withdrawn, this);
+    participant.commit->call_off(Commit::Off::withdrawn, this);
   return true;
 }
 
@@ -40,10 +40,10 @@ void Task::notify_commit() noexcept {
   futex_wake_all(control_);
 }
 
-bool Task::retract(const Participant& place, time_ns_t until_ns) noexcept {
+bool Task::retract(const Participant& participant, time_ns_t until_ns) noexcept {
   std::uint32_t seen = slot_.load(std::memory_order_acquire);
   for (;;) {
-    if ((seen & kSlot) == kEmpty || place_ != &place) return true;
+    if ((seen & kSlot) == kEmpty || participant_ != &participant) return true;
     if ((seen & kSlot) == kPosted) {
       if (!slot_.compare_exchange_weak(seen, kEmpty, std::memory_order_acq_rel)) continue;
       control_.fetch_and(~kCommit, std::memory_order_acq_rel);
@@ -96,100 +96,100 @@ bool Task::settle_visit(Visit visit) {
 Task::Visit Task::visit_slot() noexcept {
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // before the look: a later notice is not lost
   if (!enter_slot()) return Visit::goes_on;
-  Participant& place = *place_;
-  if (place.in_flight && !machine_.is_started()) {  // posted just before the park
-    end_slot(place);
+  Participant& participant = *participant_;
+  if (participant.in_flight && !machine_.is_started()) {  // posted just before the park
+    end_slot(participant);
     return Visit::goes_on;
   }
   const time_ns_t began = clock().now_ns();
-  if (!place.has_voted) {
-    if (!fits_in_wait(place)) {
+  if (!participant.has_voted) {
+    if (!fits_in_wait(participant)) {
       leave_slot(kPosted);
       return Visit::goes_on;
     }
-    if (!vote(place, began)) return Visit::condemned;
+    if (!vote(participant, began)) return Visit::condemned;
   }
-  return look_at_cut(place, began);
+  return look_at_cut(participant, began);
 }
 
 /// In a wait, after its vote.
-Task::Visit Task::look_at_cut(Participant& place, time_ns_t began_ns) noexcept {
-  const CutWord seen = place.commit->look();
+Task::Visit Task::look_at_cut(Participant& participant, time_ns_t began_ns) noexcept {
+  const CutWord seen = participant.commit->look();
   const bool belongs_to_new = due_ns() == kForever || !machine_.is_settled() || due_ns() >= seen.instant_ns();
-  if (seen.is_closed() && belongs_to_new) return take(place, began_ns);
-  if (!place.has_voted) {
-    trace_refusal(place, began_ns);
+  if (seen.is_closed() && belongs_to_new) return take(participant, began_ns);
+  if (!participant.has_voted) {
+    trace_refusal(participant, began_ns);
   } else {
-    skip_lost(place, began_ns);
+    skip_lost(participant, began_ns);
   }
   leave_slot(seen.is_off() ? kEmpty : kPosted);
   return Visit::goes_on;
 }
 
 /// Its own adopt has refused, or the commit was called off while that lasted.
-void Task::trace_refusal(Participant& place, time_ns_t began_ns) noexcept {
+void Task::trace_refusal(Participant& participant, time_ns_t began_ns) noexcept {
   if (!machine_.is_started()) return;
   const time_ns_t pending = due_ns();
   machine_.trace_at(began_ns, TraceKind::parked, machine_.state_name(), pending);
-  for (const CommitAction* action : place.actions) {
+  for (const CommitAction* action : participant.actions) {
     if (action->trace_id() != 0 && action->adopt_ns != 0)
       machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
   }
   const time_ns_t now = machine_.look_at_clock();
   const std::int64_t lost = machine_.skip_lost(began_ns, now);
-  place.lost += lost;
+  participant.lost += lost;
   machine_.trace_at(now, TraceKind::armed, machine_.state_name(), due_ns(), 0, lost);
 }
 
 /// Before the release that is due: the cut says in one step whether its clock belongs to the old parts.
 bool Task::visit_before_release() {
   if (!enter_slot()) return true;
-  Participant& place = *place_;
-  if (!place.has_voted) {
+  Participant& participant = *participant_;
+  if (!participant.has_voted) {
     leave_slot(kPosted);
     return true;
   }
-  const CutWord seen = place.commit->raise(due_ns());
+  const CutWord seen = participant.commit->raise(due_ns());
   if (seen.is_closed() && due_ns() >= seen.instant_ns())
-    return settle_visit(take(place, clock().now_ns())) && machine_.is_started();
+    return settle_visit(take(participant, clock().now_ns())) && machine_.is_started();
   leave_slot(seen.is_off() ? kEmpty : kPosted);
   return true;
 }
 
 /// With less time left than adopt and take declare, the change is made after the release that is due.
-bool Task::fits_in_wait(Participant& place) const noexcept {
+bool Task::fits_in_wait(Participant& participant) const noexcept {
   const time_ns_t due = due_ns();
   if (simulated_ || due == kForever) return true;
   time_ns_t declared = 0;
-  for (const CommitAction* action : place.actions) declared += action->declared_ns();
+  for (const CommitAction* action : participant.actions) declared += action->declared_ns();
   if (declared == 0 || clock().now_ns() + declared <= due) return true;
-  place.unfit_waits.fetch_add(1, std::memory_order_relaxed);
+  participant.unfit_waits.fetch_add(1, std::memory_order_relaxed);
   return false;
 }
 
 /// False when the thread was condemned meanwhile; the slot is left then.
-bool Task::vote(Participant& place, time_ns_t began_ns) noexcept {
-  Commit& commit = *place.commit;
+bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
+  Commit& commit = *participant.commit;
   if (!machine_.begin_execution(began_ns, kForever)) {  // the requester watches it
     leave_slot(kPosted);
     return false;
   }
-  place.visit_ns.store(began_ns, std::memory_order_relaxed);
+  participant.visit_ns.store(began_ns, std::memory_order_relaxed);
   const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
-  const bool has_agreed = commit.adopt(place);
-  place.visit_ns.store(0, std::memory_order_relaxed);
+  const bool has_agreed = commit.adopt(participant);
+  participant.visit_ns.store(0, std::memory_order_relaxed);
   if (!machine_.end_execution()) {
     commit.call_off(Commit::Off::withdrawn, this);
     leave_slot(kEmpty);
     return false;
   }
   if (was_parked) parked_.store(1, std::memory_order_seq_cst);
-  if (has_agreed) commit.vote(place, machine_.entered_ns());
+  if (has_agreed) commit.vote(participant, machine_.entered_ns());
   return true;
 }
 
-Task::Visit Task::take(Participant& place, time_ns_t began_ns) noexcept {
-  Commit& commit = *place.commit;
+Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
+  Commit& commit = *participant.commit;
   if (!machine_.begin_execution(clock().now_ns(), kForever)) {
     leave_slot(kPosted);
     return Visit::condemned;
@@ -197,95 +197,96 @@ Task::Visit Task::take(Participant& place, time_ns_t began_ns) noexcept {
   const bool was_started = machine_.is_started();
   const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
   const std::uint32_t wait_name = machine_.state_name();
-  place.visit_ns.store(clock().now_ns(), std::memory_order_relaxed);
-  place.parked_ns = began_ns;
-  place.pending_ns = was_started ? due_ns() : 0;
+  participant.visit_ns.store(clock().now_ns(), std::memory_order_relaxed);
+  participant.parked_ns = began_ns;
+  participant.pending_ns = was_started ? due_ns() : 0;
   // Of the time before T: where an end of these moves, what its new owner has written since stays.
-  if (was_started && place.replaces_parts) write_outputs(true, commit.instant_ns() - 1);
+  if (was_started && participant.replaces_parts) write_outputs(true, commit.instant_ns() - 1);
   place_kept_ = false;
-  overlong_ns_ = commit.take(place);
+  overlong_ns_ = commit.take(participant);
   machine_.change_at(commit.instant_ns());
-  place.visit_ns.store(0, std::memory_order_relaxed);
+  participant.visit_ns.store(0, std::memory_order_relaxed);
   const bool is_condemned = !machine_.end_execution();
-  const bool stops = was_started && place.afterwards == Afterwards::stop;
+  const bool stops = was_started && participant.afterwards == Afterwards::stop;
   if (was_parked && !is_condemned) parked_.store(1, std::memory_order_seq_cst);
-  if (was_started) trace_take(place);
+  if (was_started) trace_take(participant);
   if (is_condemned) {
-    place.released.store(Participant::kSuperseded, std::memory_order_release);
+    participant.released.store(Participant::kSuperseded, std::memory_order_release);
   } else if (!stops) {
-    go_on_with(place, was_started);
+    go_on_with(participant, was_started);
   }
-  place.armed_ns = machine_.look_at_clock();
+  participant.armed_ns = machine_.look_at_clock();
   const bool goes_on = !is_condemned && !stops && machine_.is_started();
   // In adopt and take: they are no overrun of the component. Counted by what lies between the pending instant and the release.
-  const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, place.armed_ns) : 0;
-  place.resumes_ns = due_ns();
-  if (was_started) machine_.trace_at(place.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
+  const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, participant.armed_ns) : 0;
+  participant.resumes_ns = due_ns();
+  if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
   if (stops && !is_condemned) park_stopped();
-  pass(place);
+  pass(participant);
   if (is_condemned) return Visit::condemned;
   return stops ? Visit::parks : Visit::goes_on;
 }
 
-void Task::pass(Participant& place) noexcept {
-  const bool is_late = place.commit->is_answered();
-  place.commit->pass(place);
+void Task::pass(Participant& participant) noexcept {
+  const bool is_late = participant.commit->is_answered();
+  participant.commit->pass(participant);
   leave_slot(kEmpty);
   if (is_late) signal_change();  // it can be completed
 }
 
-void Task::go_on_with(Participant& place, bool was_started) noexcept {
-  const time_ns_t epoch_ns =
-      place.epoch_lead_ns != 0 ? later_by(place.commit->instant_ns() - 1, place.epoch_lead_ns) : 0;
-  const bool restarts = place.afterwards == Afterwards::restart && !place_kept_;
+void Task::go_on_with(Participant& participant, bool was_started) noexcept {
+  const time_ns_t epoch_ns = participant.epoch_lead_ns != 0
+                                 ? later_by(participant.commit->instant_ns() - 1, participant.epoch_lead_ns)
+                                 : 0;
+  const bool restarts = participant.afterwards == Afterwards::restart && !place_kept_;
   if (!was_started) {
     if (epoch_ns != 0) join(epoch_ns);
     if (!restarts) return;
     if (!simulated_) counters_.mark();
     regain_priority();
-    return start_machine(start_on(place.start_clock_ns));
+    return start_machine(start_on(participant.start_clock_ns));
   }
   if (epoch_ns != 0) {
-    place.shift_ns = machine_.resynchronise(epoch_ns);
+    participant.shift_ns = machine_.resynchronise(epoch_ns);
   }
   if (!restarts && (epoch_ns != 0 || place_kept_)) machine_.trace_deployment();
-  if (restarts) start_machine(restart_instant(place));
-  place.grid = grid();
-  place.grid_place_ns = machine_.grid_place_ns();
-  if (Participant* earlier = awaiting_release_.exchange(&place, std::memory_order_acq_rel)) {
+  if (restarts) start_machine(restart_instant(participant));
+  participant.grid = grid();
+  participant.grid_place_ns = machine_.grid_place_ns();
+  if (Participant* earlier = awaiting_release_.exchange(&participant, std::memory_order_acq_rel)) {
     earlier->released.store(Participant::kSuperseded, std::memory_order_release);
     futex_wake_all(earlier->released);
   }
 }
 
 /// In flight nothing is to be made ready any more: the new machine takes the pending instant, if it is one of its own.
-time_ns_t Task::restart_instant(const Participant& place) noexcept {
-  if (place.start_clock_ns) return start_on(place.start_clock_ns);
+time_ns_t Task::restart_instant(const Participant& participant) noexcept {
+  if (participant.start_clock_ns) return start_on(participant.start_clock_ns);
   const bool is_pending =
-      machine_.is_settled() && place.pending_ns != kForever;  // else an event may come any time
+      machine_.is_settled() && participant.pending_ns != kForever;  // else an event may come any time
   const time_ns_t earliest =
-      std::max(place.commit->instant_ns(), is_pending ? place.pending_ns : clock().now_ns());
+      std::max(participant.commit->instant_ns(), is_pending ? participant.pending_ns : clock().now_ns());
   return grid().period_ns == 0 ? earliest : grid().first_not_before(earliest);
 }
 
-void Task::trace_take(const Participant& place) noexcept {
-  machine_.trace_at(place.parked_ns, TraceKind::parked, machine_.state_name(), place.pending_ns);
-  for (const CommitAction* action : place.actions) {
+void Task::trace_take(const Participant& participant) noexcept {
+  machine_.trace_at(participant.parked_ns, TraceKind::parked, machine_.state_name(), participant.pending_ns);
+  for (const CommitAction* action : participant.actions) {
     if (action->trace_id() == 0) continue;  // a mere check
     machine_.trace(TraceKind::reconfiguration, action->trace_id(), kAdopt, action->adopt_ns);
     machine_.trace(TraceKind::reconfiguration, action->trace_id(), kTake, action->take_ns,
-                   place.commit->instant_ns());
+                   participant.commit->instant_ns());
   }
 }
 
 /// Skips the instants that passed in an adopt without a take: they are no overrun of the component.
-void Task::skip_lost(Participant& place, time_ns_t began_ns) noexcept {
+void Task::skip_lost(Participant& participant, time_ns_t began_ns) noexcept {
   if (!machine_.is_started()) return;
   const time_ns_t now = machine_.look_at_clock();
   const time_ns_t pending = due_ns();
   const std::int64_t lost = machine_.skip_lost(began_ns, now);
   if (lost == 0) return;
-  place.lost += lost;
+  participant.lost += lost;
   machine_.trace_at(began_ns, TraceKind::parked, machine_.state_name(), pending);
   machine_.trace_at(now, TraceKind::armed, machine_.state_name(), due_ns(), kInVain, lost);
 }
@@ -294,48 +295,50 @@ void Task::skip_lost(Participant& place, time_ns_t began_ns) noexcept {
 /// posted for a parked component stays, unless the thread ends. Whether it has taken one.
 bool Task::settle_slot(bool ends) noexcept {
   if (!enter_slot()) return false;
-  Participant& place = *place_;
-  if (place.in_flight || ends) return end_slot(place);
+  Participant& participant = *participant_;
+  if (participant.in_flight || ends) return end_slot(participant);
   leave_slot(kPosted);
   return false;
 }
 
-bool Task::end_slot(Participant& place) noexcept {
-  Commit& commit = *place.commit;
+bool Task::end_slot(Participant& participant) noexcept {
+  Commit& commit = *participant.commit;
   if (commit.call_off(Commit::Off::withdrawn, this)) {
     leave_slot(kEmpty);
     return false;
   }
   const bool was_started = machine_.is_started();
-  place.parked_ns = clock().now_ns();
-  place.pending_ns = was_started ? due_ns() : 0;
-  commit.take(place);
+  participant.parked_ns = clock().now_ns();
+  participant.pending_ns = was_started ? due_ns() : 0;
+  commit.take(participant);
   machine_.change_at(commit.instant_ns());
-  place.armed_ns = place.resumes_ns = machine_.look_at_clock();
-  place.released.store(Participant::kSuperseded, std::memory_order_release);  // it parks, so none follows
+  participant.armed_ns = participant.resumes_ns = machine_.look_at_clock();
+  participant.released.store(Participant::kSuperseded,
+                             std::memory_order_release);  // it parks, so none follows
   if (was_started) {
-    trace_take(place);
-    machine_.trace_at(place.armed_ns, TraceKind::armed, machine_.state_name(), place.pending_ns, 1);
+    trace_take(participant);
+    machine_.trace_at(participant.armed_ns, TraceKind::armed, machine_.state_name(), participant.pending_ns,
+                      1);
   }
-  pass(place);
+  pass(participant);
   return true;
 }
 
-void Task::take_parked(Participant& place) noexcept {
-  Commit& commit = *place.commit;
-  place.parked_ns = clock().now_ns();
-  commit.take(place);
+void Task::take_parked(Participant& participant) noexcept {
+  Commit& commit = *participant.commit;
+  participant.parked_ns = clock().now_ns();
+  commit.take(participant);
   machine_.change_at(commit.instant_ns());
-  if (place.epoch_lead_ns != 0) join(later_by(commit.instant_ns() - 1, place.epoch_lead_ns));
+  if (participant.epoch_lead_ns != 0) join(later_by(commit.instant_ns() - 1, participant.epoch_lead_ns));
   // A shutdown may have come before the commit held the task.
   const bool can_start = simulated_ || has_thread();
-  if (can_start && place.afterwards == Afterwards::restart) {
-    post_start(start_on(place.start_clock_ns));
+  if (can_start && participant.afterwards == Afterwards::restart) {
+    post_start(start_on(participant.start_clock_ns));
   } else {
     started_.store(1, std::memory_order_relaxed);  // relaxed: nobody but its requester waits for it
   }
-  place.armed_ns = clock().now_ns();
-  commit.pass(place);
+  participant.armed_ns = clock().now_ns();
+  commit.pass(participant);
 }
 
 // ---- after a commit
@@ -345,18 +348,18 @@ void Task::leave_behind(std::shared_ptr<void> used) {
   left_behind_.push_back(std::move(used));
 }
 
-bool Task::wait_release(const Participant& place, time_ns_t until_ns) noexcept {
-  while (place.released.load(std::memory_order_acquire) == 0) {
-    if (until_ns <= monotonic_now_ns() || !futex_wait_until(place.released, 0, until_ns)) break;
+bool Task::wait_release(const Participant& participant, time_ns_t until_ns) noexcept {
+  while (participant.released.load(std::memory_order_acquire) == 0) {
+    if (until_ns <= monotonic_now_ns() || !futex_wait_until(participant.released, 0, until_ns)) break;
   }
-  return place.released.load(std::memory_order_acquire) == Participant::kReleased;
+  return participant.released.load(std::memory_order_acquire) == Participant::kReleased;
 }
 
-void Task::forget_release(Participant& place) noexcept {
-  Participant* mine = &place;
+void Task::forget_release(Participant& participant) noexcept {
+  Participant* mine = &participant;
   // Out of the slot the machine cannot reach it any more; not in the slot, it has written it, or does this moment.
   if (awaiting_release_.compare_exchange_strong(mine, nullptr, std::memory_order_acq_rel)) return;
-  wait_release(place, kForever);
+  wait_release(participant, kForever);
 }
 
 void Task::write_outputs(bool commit, time_ns_t time_ns) noexcept {

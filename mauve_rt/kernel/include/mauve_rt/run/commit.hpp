@@ -191,14 +191,14 @@ class Commit {
   /// Before a participant that has voted executes at this clock. [rt]
   CutWord raise(time_ns_t clock_ns) MAUVE_RT { return cut_.raise(clock_ns); }
   /// Runs the adopts of a participant; false when the change is refused, and called off. [rt] as far as the actions are.
-  bool adopt(Participant& place) noexcept;
+  bool adopt(Participant& participant) noexcept;
   /// The participant agrees, and has executed nothing beyond this clock. [rt]
-  void vote(Participant& place, time_ns_t entered_ns) MAUVE_RT;
+  void vote(Participant& participant, time_ns_t entered_ns) MAUVE_RT;
   /// Takes all actions of a participant; how long these and the adopts took beyond what they declared, else 0. [rt] as far as
   /// the actions are.
-  time_ns_t take(Participant& place) noexcept;
+  time_ns_t take(Participant& participant) noexcept;
   /// The participant has taken the change: its last touch of it. [rt]
-  void pass(Participant& place) MAUVE_RT;
+  void pass(Participant& participant) MAUVE_RT;
   /// False when the change is made already. Any thread that knows the commit to exist. [rt]
   bool call_off(Off why, const Task* by = nullptr) MAUVE_RT;
 
@@ -208,7 +208,7 @@ class Commit {
   const Task* find_unfit() const noexcept;
   void begin() noexcept;
   bool check() noexcept;
-  void refuse(const Participant* place, const CommitAction& action, std::exception_ptr why,
+  void refuse(const Participant* participant, const CommitAction& action, std::exception_ptr why,
               bool is_late) noexcept;
   void post_all(time_ns_t until_ns) noexcept;
   void vote_for_parked() noexcept;
@@ -217,7 +217,7 @@ class Commit {
   void call_off_if_one_left() noexcept;
   void retract_all(time_ns_t until_ns) noexcept;
   void complete(time_ns_t until_ns) noexcept;
-  bool give_up(const Participant& place, const char* call) noexcept;
+  bool give_up(const Participant& participant, const char* call) noexcept;
   void start_parked(time_ns_t until_ns) noexcept;
   void decided() noexcept;
   [[noreturn]] void throw_unfit() const;

@@ -18,9 +18,9 @@
 #include "mauve_rt/base/threads.hpp"
 #include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/run/commit.hpp"
-#include "mauve_rt/run/lent.hpp"
 #include "mauve_rt/run/machine.hpp"
 #include "mauve_rt/run/queue_place.hpp"
+#include "mauve_rt/run/revocable_reference.hpp"
 #include "mauve_rt/run/task_settings.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
@@ -49,12 +49,12 @@ struct FaultNote {
 /// A component not listed yet has nobody to tell.
 struct ChangeSignal {
   std::atomic<std::uint32_t> word{0};
-  Lent<ChangeSignal> listener;
+  RevocableReference<ChangeSignal> listener;
 
   /// Who else is told from now on; nullptr: nobody, and who was told before is told no more on return. [non-rt]
   void set_listener(ChangeSignal* other) noexcept {
-    listener.recall(kForever);
-    if (other != nullptr) listener.lend(*other);
+    listener.revoke(kForever);
+    if (other != nullptr) listener.set(*other);
   }
   void bump() MAUVE_RT;  // [rt]
 };
@@ -73,7 +73,7 @@ struct ChangeSignal {
 /// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
 /// | slot_ (futex)          | requester: empty -> posted -> empty;  | both         | acq_rel: hands over the participant; seq_cst with  |
 /// |                        | machine: posted -> busy -> any        |              | parked_, ended_: one sees the other |
-/// | place_                 | requester, slot empty                 | machine      | slot_                              |
+/// | participant_           | requester, slot empty                 | machine      | slot_                              |
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
@@ -179,16 +179,16 @@ class Task final : public Waiter {
 
   /// Posts a commit: the component votes in its next wait. Waits for an earlier change that it has not taken yet; false when
   /// it has not at the instant. [rt], command mutex held.
-  bool post(Participant& place, time_ns_t until_ns) MAUVE_RT;
+  bool post(Participant& participant, time_ns_t until_ns) MAUVE_RT;
   /// Lets it look at its slot: the commit is decided. [rt]
   void notify_commit() MAUVE_RT;
   /// Takes back a commit that was called off; false while the component is in its adopt, at the instant. [rt]
-  bool retract(const Participant& place, time_ns_t until_ns) MAUVE_RT;
+  bool retract(const Participant& participant, time_ns_t until_ns) MAUVE_RT;
   /// Its steps of a commit, in virtual time. [non-rt]
   void visit_simulated() noexcept;
   /// Takes a commit that is made, for a parked component, and starts it if the commit does. [rt] as far as the actions are,
   /// command mutex held.
-  void take_parked(Participant& place) noexcept;
+  void take_parked(Participant& participant) noexcept;
   /// Machine::entered_ns() [rt], parked or condemned.
   time_ns_t entered_ns() const MAUVE_RT { return machine_.entered_ns(); }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
@@ -198,9 +198,9 @@ class Task final : public Waiter {
   void write_outputs(bool commit, time_ns_t time_ns) MAUVE_RT;
   /// Waits for the release that follows a commit; false when it had not come by the instant, or when another commit
   /// came first. May be called again. [non-rt]
-  static bool wait_release(const Participant& place, time_ns_t until_ns) noexcept;
+  static bool wait_release(const Participant& participant, time_ns_t until_ns) noexcept;
   /// After this the machine does not refer to the participant any more. [non-rt]
-  void forget_release(Participant& place) noexcept;
+  void forget_release(Participant& participant) noexcept;
   ChangeSignal& changes() noexcept { return changes_; }
   PiMutex& command_mutex() noexcept { return command_mutex_; }
   [[noreturn]] void throw_state_running(const std::string& what, time_ns_t timeout_ns,
@@ -301,7 +301,7 @@ class Task final : public Waiter {
   void order_stop();
   time_ns_t start_on(std::optional<time_ns_t> reference_ns) noexcept;
   time_ns_t next_instant() const noexcept;
-  time_ns_t restart_instant(const Participant& place) noexcept;
+  time_ns_t restart_instant(const Participant& participant) noexcept;
   bool withdraw_start() noexcept;
   void require_startable() const;
   bool is_called_from_own_state() const noexcept;
@@ -328,19 +328,19 @@ class Task final : public Waiter {
   bool visit_before_release();
   bool settle_visit(Visit visit);
   Visit visit_slot() noexcept;
-  Visit look_at_cut(Participant& place, time_ns_t began_ns) noexcept;
-  bool fits_in_wait(Participant& place) const noexcept;
-  bool vote(Participant& place, time_ns_t began_ns) noexcept;
-  Visit take(Participant& place, time_ns_t began_ns) noexcept;
-  void go_on_with(Participant& place, bool was_started) noexcept;
-  void trace_take(const Participant& place) noexcept;
-  void trace_refusal(Participant& place, time_ns_t began_ns) noexcept;
-  void pass(Participant& place) noexcept;
+  Visit look_at_cut(Participant& participant, time_ns_t began_ns) noexcept;
+  bool fits_in_wait(Participant& participant) const noexcept;
+  bool vote(Participant& participant, time_ns_t began_ns) noexcept;
+  Visit take(Participant& participant, time_ns_t began_ns) noexcept;
+  void go_on_with(Participant& participant, bool was_started) noexcept;
+  void trace_take(const Participant& participant) noexcept;
+  void trace_refusal(Participant& participant, time_ns_t began_ns) noexcept;
+  void pass(Participant& participant) noexcept;
   bool settle_slot(bool ends = false) noexcept;
-  bool end_slot(Participant& place) noexcept;
+  bool end_slot(Participant& participant) noexcept;
   bool enter_slot() MAUVE_RT;
   void leave_slot(std::uint32_t to) MAUVE_RT;
-  void skip_lost(Participant& place, time_ns_t began_ns) noexcept;
+  void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
   void park_condemned() noexcept;
@@ -391,7 +391,7 @@ class Task final : public Waiter {
   std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   std::atomic<std::uint32_t> slot_{kEmpty};
-  Participant* place_{nullptr};
+  Participant* participant_{nullptr};
   time_ns_t start_at_ns_{0};
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
   std::atomic<std::uint32_t> outputs_{kAllWritten};

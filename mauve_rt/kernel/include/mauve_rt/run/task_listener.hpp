@@ -7,7 +7,7 @@
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
-#include "mauve_rt/run/lent.hpp"
+#include "mauve_rt/run/revocable_reference.hpp"
 
 namespace mauve {
 
@@ -38,13 +38,13 @@ class TaskListener {
 /// | member               | written by       | read by               | order                                            |
 /// | -------------------- | ---------------- | --------------------- | ------------------------------------------------ |
 /// | ..._from_ns_         | ordinary threads | the component's thread | relaxed: lone numbers; the next release has them |
-/// | listener_            | ordinary threads | who tells             | its own: lent.hpp                                |
+/// | listener_            | ordinary threads | who tells             | its own: revocable_reference.hpp                              |
 class TaskListening {
  public:
   /// From now on, until unlisten(). [non-rt], one thread at a time. False: another one listens.
   bool listen(TaskListener& listener, time_ns_t late_from_ns, time_ns_t response_from_ns) noexcept {
-    if (listener_.is_lent()) return false;
-    listener_.lend(listener);
+    if (listener_.is_set()) return false;
+    listener_.set(listener);
     late_from_ns_.store(late_from_ns, std::memory_order_relaxed);
     response_from_ns_.store(response_from_ns, std::memory_order_relaxed);
     return true;
@@ -53,7 +53,7 @@ class TaskListening {
   void unlisten() noexcept {
     late_from_ns_.store(kForever, std::memory_order_relaxed);
     response_from_ns_.store(kForever, std::memory_order_relaxed);
-    listener_.recall(kForever);
+    listener_.revoke(kForever);
   }
 
   /// [rt]
@@ -63,17 +63,17 @@ class TaskListening {
   bool is_late_response(time_ns_t response_ns) const MAUVE_RT {
     return response_ns >= response_from_ns_.load(std::memory_order_relaxed);
   }
-  bool is_heard() const MAUVE_RT { return listener_.is_lent(); }
+  bool is_heard() const MAUVE_RT { return listener_.is_set(); }
   /// Calls the function with the listener, if there is one. [rt] as far as that is
   template <typename Function>
   void tell(Function&& function) noexcept {
-    if (listener_.is_lent()) listener_.use(std::forward<Function>(function));
+    if (listener_.is_set()) listener_.use(std::forward<Function>(function));
   }
 
  private:
   std::atomic<time_ns_t> late_from_ns_{kForever};
   std::atomic<time_ns_t> response_from_ns_{kForever};
-  Lent<TaskListener> listener_;
+  RevocableReference<TaskListener> listener_;
 };
 
 }  // namespace mauve

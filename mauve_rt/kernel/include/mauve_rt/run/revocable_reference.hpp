@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// An object lent to other threads, which is theirs to use until it is recalled.
+// RevocableReference: a reference to an object for other threads, until its owner revokes it.
 #pragma once
 
 #include <atomic>
@@ -11,18 +11,18 @@
 
 namespace mauve {
 
-/// Lends an object for a while: who uses it is counted, and recall() returns once nobody does any more.
+/// The users of the object are counted: revoke() returns once no thread uses it any more.
 ///
 /// | member         | written by   | read by    | order                                                                |
 /// | -------------- | ------------ | ---------- | -------------------------------------------------------------------- |
-/// | object_        | who lends it | its users  | seq_cst with users_: either a user finds nothing, or it is counted   |
-/// | users_ (futex) | its users    | who lends  | seq_cst: as above; hands over what the users have written            |
+/// | object_        | the owner    | its users  | seq_cst with users_: either a user finds nothing, or it is counted   |
+/// | users_ (futex) | its users    | the owner  | seq_cst: as above; hands over what the users have written            |
 template <typename T>
-class Lent {
+class RevocableReference {
  public:
   /// [rt]
-  void lend(T& object) MAUVE_RT { object_.store(&object, std::memory_order_seq_cst); }
-  bool is_lent() const MAUVE_RT { return object_.load(std::memory_order_seq_cst) != nullptr; }
+  void set(T& object) MAUVE_RT { object_.store(&object, std::memory_order_seq_cst); }
+  bool is_set() const MAUVE_RT { return object_.load(std::memory_order_seq_cst) != nullptr; }
 
   /// Calls the function with the object, if there is one; any number of threads. [rt] as far as that is.
   template <typename Function>
@@ -30,20 +30,18 @@ class Lent {
     users_.fetch_add(1, std::memory_order_seq_cst);
     if (T* const object = object_.load(std::memory_order_seq_cst)) std::forward<Function>(function)(*object);
     users_.fetch_sub(1, std::memory_order_seq_cst);
-    if (!is_lent()) futex_wake_all(users_);
+    if (!is_set()) futex_wake_all(users_);
   }
 
-  /// Lets nobody begin to use it; whether all have ended by the instant. [rt]
-  bool recall(time_ns_t until_ns) MAUVE_RT {
-    forget();
+  /// No thread begins to use the object any more; whether all have ended by the instant. [rt]
+  bool revoke(time_ns_t until_ns) MAUVE_RT {
+    object_.store(nullptr, std::memory_order_seq_cst);
     for (;;) {
       const std::uint32_t users = users_.load(std::memory_order_seq_cst);
       if (users == 0) return true;
       if (!futex_wait_until(users_, users, until_ns)) return users_.load(std::memory_order_seq_cst) == 0;
     }
   }
-  /// Lets nobody begin to use it, and waits for nobody. [rt]
-  void forget() MAUVE_RT { object_.store(nullptr, std::memory_order_seq_cst); }
 
  private:
   std::atomic<T*> object_{nullptr};
