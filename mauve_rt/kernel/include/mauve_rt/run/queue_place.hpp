@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// QueuePlace: where a simulated task stands in the queue of its processor.
+// QueuePlace: a simulated task as the queue of its processor sees it.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 namespace mauve {
 
-/// Where a task stands in its queue.
+/// Whether a task is queued, and which of its entries counts.
 struct QueuePlace {
-  static constexpr std::size_t kNone = SIZE_MAX;
-
-  std::size_t index{kNone};
-  bool is_late{false};  // which of the two heaps
+  std::uint32_t entry{0};  // the number of the last one; earlier ones count no more
+  bool is_queued{false};
+  bool is_late{false};  // its instant has passed while others ran
 };
 
 }  // namespace mauve
