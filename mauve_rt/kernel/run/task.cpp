@@ -217,8 +217,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   const std::lock_guard lock(command_mutex_, std::adopt_lock);
   require_startable();
   post_start(start_on(clock_ns));
-  if (wait_started(until)) return;
-  throw_late("the component's thread does not get to run; the start stays pending",
+  if (wait_started(until) || !withdraw_start()) return;
+  throw_late("the component's thread does not get to run; it was not started",
              "look for a component of equal or higher priority that does not wait");
 }
 

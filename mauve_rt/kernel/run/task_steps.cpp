@@ -58,7 +58,12 @@ void Task::step() {
 
 void Task::take_up_start() {
   if (!visit_posted() || machine_.is_started()) return;  // the change has started it
-  if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return;
+  if ((control_.load(std::memory_order_acquire) & kStart) == 0) return;
+  parked_.store(0, std::memory_order_seq_cst);  // before the bit goes: is_parked() sees one of them
+  if ((control_.fetch_and(~kStart, std::memory_order_seq_cst) & kStart) == 0) {
+    parked_.store(1, std::memory_order_seq_cst);  // a stop has withdrawn it
+    return;
+  }
   if (!simulated_) counters_.mark();
   regain_priority();
   start_machine(start_at_ns_);

@@ -201,6 +201,39 @@ TEST_F(Rule10Failure, AnAddedComponentWhoseThreadDoesNotGetToRunHoldsNobodyUp) {
   expect_running("d");
 }
 
+/// The start of one that gets no processor ends in time, and blocks no change of another.
+TEST_F(Rule10Failure, AStartOfOneThatDoesNotGetToRunHasADeadline) {
+  if (!may_use_fifo())
+    GTEST_SKIP() << "needs the right to SCHED_FIFO: only then does a thread starve another";
+  ComponentParts less_urgent = parts();
+  less_urgent.settings.priority = 30;
+  Transaction addition;
+  addition.add_component("d", less_urgent);
+  commit(addition);
+  Task& starved = architecture.component("d").task();
+  spin = true;
+  wait_until([&] { return spinning.load(); }, "g to spin");
+  try {
+    starved.start(std::nullopt, ms_to_ns(100));
+    ADD_FAILURE() << "it was started";
+  } catch (const Error& error) {
+    EXPECT_EQ(ErrorCode::timeout, error.code()) << error.what();
+    EXPECT_EQ("d", error.detail().component);
+  }
+  EXPECT_TRUE(starved.is_parked());
+  Transaction change;
+  change.start("d");  // made: its start is posted, and waits for the processor
+  commit(change, {.timeouts = {.commit_ns = ms_to_ns(200), .phase_ns = 0}});
+  EXPECT_FALSE(starved.is_parked());
+  starved.stop(0);  // takes the start back
+  EXPECT_TRUE(starved.is_parked());
+  spin = false;
+  expect_running("a");
+  EXPECT_EQ(ComponentState::stopped, facts("d").state);
+  starved.start();
+  expect_running("d");
+}
+
 TEST_F(Rule10Failure, AFaultedComponentCanBeRemovedButNotChanged) {
   broken = true;
   wait_until([&] { return facts("g").state == ComponentState::faulted; }, "the fault");

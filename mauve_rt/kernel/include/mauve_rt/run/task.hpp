@@ -160,7 +160,7 @@ class Task final : public Waiter {
   /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
   /// is still to come is the start itself; without one it is the deployment's first instant. Another fsm keeps that grid.
   /// [non-rt] Throws Error: already_running, faulted, not_configured; timeout while a commit or another command of the
-  /// component lasts, or when its thread does not get to run: the start stays pending then.
+  /// component lasts, or when its thread does not get to run; it is not started then.
   void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = s_to_ns(2));
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
   /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other
@@ -264,8 +264,12 @@ class Task final : public Waiter {
   void clear_fault() noexcept;
   /// Tells who waits for changes that there was one. [rt]
   void signal_change() MAUVE_RT { changes_.bump(); }
-  /// Whether the machine is out of user code for good, until the next start. [non-rt]
-  bool is_parked() const noexcept { return parked_.load(std::memory_order_seq_cst) != 0; }
+  /// Whether the machine is out of user code for good, until the next start, and no start is posted. [non-rt]
+  bool is_parked() const noexcept {
+    // seq_cst, in this order: the thread sets parked_ to 0 before it clears kStart
+    return (control_.load(std::memory_order_seq_cst) & kStart) == 0 &&
+           parked_.load(std::memory_order_seq_cst) != 0;
+  }
   /// The state being executed or waited in; empty before the start. [non-rt]
   std::string current_state() const;
   /// How long that lasts, also while it does, against the declared bound and what counts as hung. [non-rt]
