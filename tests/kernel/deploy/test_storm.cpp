@@ -45,6 +45,20 @@ struct SlowCore : WritingCore {
   }
 };
 
+/// Its adopt throws.
+struct ThrowingStormCore : WritingCore {
+  bool adopt(const CoreBase& /*old*/) override { throw std::runtime_error("as it was told"); }
+};
+
+/// Now and then it executes beyond several of its instants, so that it is late to a change.
+struct LateCore : TestCore {
+  void act() override {
+    TestCore::act();
+    if (runs.load(std::memory_order_relaxed) % 7 != 0) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+};
+
 /// Times that sums of may not fit into 64 bits.
 constexpr std::array kEdges{INT64_MIN,     INT64_MIN + 1, time_ns_t{-1}, time_ns_t{0},  time_ns_t{1},
                             us_to_ns(100), kLongest,      kLongest + 1,  INT64_MAX - 1, kForever};
@@ -122,6 +136,11 @@ class Storm : public ::testing::Test {
 
   const std::string& any(Random& random) const { return names_[random() % names_.size()]; }
 
+  static std::unique_ptr<CoreBase> core(Random& random) {
+    if (random() % 4 == 0) return std::make_unique<ThrowingStormCore>();
+    if (random() % 3 == 0) return std::make_unique<LateCore>();
+    return std::make_unique<SlowCore>();
+  }
   static time_ns_t edge(Random& random) { return kEdges[random() % kEdges.size()]; }
 
   /// Waits for so long, and for an event with so long a time-out.
@@ -145,7 +164,8 @@ class Storm : public ::testing::Test {
         transaction.replace_core(any(random), std::make_unique<WritingCore>());
         break;
       case 8:
-        transaction.replace_core(any(random), std::make_unique<SlowCore>());
+        transaction.replace_core(any(random), core(random));
+        transaction.set_property(any(random), "gain", 1.0);
         break;
       case 9:
         transaction.replace_fsm(any(random), edge_fsm(edge(random), edge(random)));
