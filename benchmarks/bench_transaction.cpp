@@ -2,7 +2,9 @@
 // Transactions over five running 1 kHz components: three get another core, two are wired to another resource;
 // three more on the same CPUs are not touched.
 //   bench_transaction [--count 100] [--priority 80] [--cpus 2] [--work-us 20] [--seed 1]
-// Prints {"blackout_ns": [...]}, of each transaction the longest of its components', and of the releases in the
+// After each a transaction that replaces one core alone.
+// Prints {"blackout_ns": [...]}, of each transaction the longest of its components', {"blackout_of_one_ns": [...]} of those
+// over one component, and of the releases in the
 // trace how many "touched_missed" and "untouched_missed" (and of these two "..._in_stalls" of the machine),
 // of "touched_releases" and "untouched_releases".
 #include <memory>
@@ -62,6 +64,7 @@ void measure(const bench::Options& options) {
   bench::RandomPause pause(options.seed(), {0, 2 * kPeriodUs});
 
   std::vector<std::int64_t> blackouts;
+  std::vector<std::int64_t> of_one;
   std::vector<std::vector<mauve::TraceRecord>> releases(kComponents);
   const auto collect = [&] {
     const mauve::TraceDrain drain = deployer.drain_trace();
@@ -73,6 +76,11 @@ void measure(const bench::Options& options) {
   for (std::int64_t i = 0; i < count; ++i) {
     pause();
     blackouts.push_back(deployer.commit(make_transaction(i), patient).blackout_ns);
+    collect();
+    pause();
+    mauve::Transaction one;
+    one.replace_core(name_of(0), std::unique_ptr<mauve::CoreBase>(std::make_unique<WiredWorker>()));
+    of_one.push_back(deployer.commit(std::move(one), patient).blackout_ns);
     collect();
   }
   deployer.shutdown();
@@ -92,6 +100,7 @@ void measure(const bench::Options& options) {
   }
   bench::JsonLine()
       .add("blackout_ns", blackouts)
+      .add("blackout_of_one_ns", of_one)
       .add("touched_missed", touched.ours)
       .add("touched_missed_in_stalls", touched.machines)
       .add("touched_releases", touched_releases)

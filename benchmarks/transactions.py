@@ -6,10 +6,12 @@ from typing import Any
 
 import native
 from ratios import percentile
-from rows import Row, alone, exactly_zero, never_over, pooled
+from rows import Row, alone, compared, exactly_zero, never_over, pooled
 from settings import Settings
 
 _KIB = 1024
+_OF_ONE = 1.5
+"""No component waits for another one: five cost the one with the longest blackout little more than one."""
 _FLAT_KIB = 64
 """What the heap may grow by in nine tenths of a soak: a leak of some bytes a transaction makes more of it."""
 
@@ -30,6 +32,12 @@ def transaction_rows(settings: Settings) -> Iterator[Row]:
     for percent, limit in ((50, None), (99, 200)):
         values = [percentile(found["blackout_ns"], percent) / 1000 for found in rounds]
         yield alone(f"{what}, longest blackout p{percent}", values, unit="us", limit=limit)
+    pairs = [
+        (percentile(found["blackout_ns"], 50) / 1000, percentile(found["blackout_of_one_ns"], 50) / 1000)
+        for found in rounds
+    ]
+    one = "a transaction that replaces one core"
+    yield compared(f"{what}, longest blackout", pairs, unit="us", beside=one, ratio_limit=_OF_ONE)
     blackouts = [ns / 1000 for found in rounds for ns in found["blackout_ns"]]
     yield pooled(f"{what}, longest blackout p99.9", blackouts, 99.9, unit="us")
     for whose in ("untouched", "touched"):
