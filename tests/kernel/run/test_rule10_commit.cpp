@@ -90,11 +90,15 @@ class Rule10Commit : public Deployed {
   }
   /// A change of both is made at an instant up to which slow, in its long state, is late.
   void make_it_late() {
-    auto fresh = std::make_unique<ToldCore>();
-    fresh->adopting = [this] { fast_may_agree.wait(); };
-    Transaction both = replace("fast", std::move(fresh));
+    Transaction both = replace("fast", core_that_waits());
     both.set_property("slow", "gain", 2.0);
     make_it_late(std::move(both));
+  }
+  std::unique_ptr<ToldCore> core_that_waits() {
+    auto fresh = std::make_unique<ToldCore>();
+    fresh->adopting = [this] { fast_may_agree.wait(); };
+    fresh->taking = [this] { fast_has_taken = true; };
+    return fresh;
   }
   void make_it_late(Transaction both) {
     request(std::move(both), {.timeouts = {.commit_ns = s_to_ns(2), .phase_ns = 0}});
@@ -102,7 +106,7 @@ class Rule10Commit : public Deployed {
     wait_runs(*slow, core(*slow).runs + 5);  // it has voted by then
     keep_slow_busy();
     fast_may_agree.open();
-    wait_until([&] { return dynamic_cast<ToldCore*>(&fast->core()) != nullptr; }, "fast's new core");
+    wait_until([&] { return fast_has_taken.load(); }, "fast's new core");
   }
   double gain_of_slow() const { return slow->shell_as<TestShell>().gain.value(); }
   /// On a thread of its own; `error` is what it ended with.
@@ -138,6 +142,7 @@ class Rule10Commit : public Deployed {
   std::atomic<bool> busy{false};
   std::atomic<bool> broken{false};
   std::atomic<bool> fast_has_agreed{false};
+  std::atomic<bool> fast_has_taken{false};
   Latch fast_may_agree;
   std::function<void()> prepare = [] {};
   std::function<void()> at_the_end_of_slow = [] {};
@@ -467,8 +472,7 @@ TYPED_TEST(Rule10Floor, WhatALateOneWritesToAnEndThatHasMovedIsDropped) {
     has_written = true;
   };
   this->deploy_two();
-  auto fresh = std::make_unique<ToldCore>();
-  fresh->adopting = [this] { this->fast_may_agree.wait(); };
+  auto fresh = this->core_that_waits();
   ToldCore& told = *fresh;
   fresh->work = [&told] { told.exposed_shell().output.write({.value = 1}); };
   Transaction both = this->replace("fast", std::move(fresh));
