@@ -260,9 +260,12 @@ TEST_F(CallingComponent, IsAnsweredWithoutAllocation) {
   deploy();
   wait_until([&] { return made.load() > 100; }, "calls");
   EXPECT_EQ(0U, component.task().counters().allocations());
-  deployer.shutdown();
-  EXPECT_EQ(CallOutcome::answered, last.load());
-  EXPECT_EQ(client.counts().answered, static_cast<std::uint64_t>(made.load()));
+  deployer.shutdown();  // may come in the middle of a call
+  const bool is_last_stopped = last.load() == CallOutcome::stopped;
+  if (!is_last_stopped) {
+    EXPECT_EQ(CallOutcome::answered, last.load());
+  }
+  EXPECT_EQ(client.counts().answered, static_cast<std::uint64_t>(made.load()) - (is_last_stopped ? 1U : 0U));
 }
 
 TEST_F(CallingComponent, StopsInTheMiddleOfACall) {
