@@ -268,7 +268,9 @@ def test_the_command_lists_and_loads(start: Start, files: tuple[Path, Path], dom
     status, out, error = mauve("list", NODE)
     assert (status, error) == (0, "")
     line = next(line.strip() for line in out.splitlines() if line.startswith(" quiet"))
-    assert re.fullmatch(r"quiet +yes +false for [\d.]+ s +watching +(do in [\d.]+ s|-) +\d+ KiB", line), line
+    # A busy machine may have kept the voice from speaking for so long that the rule has acted.
+    standing = r"(watching +(do in [\d.]+ s|-)|in effect +(undo in [\d.]+ s|-))"
+    assert re.fullmatch(rf"quiet +yes +(true|false) for [\d.]+ s +{standing} +\d+ KiB", line), line
     status, out, _ = mauve("list", NODE, "--json")
     (rule,) = json.loads(out)["rules"]
     assert (rule["name"], rule["where"], rule["ready"]) == ("quiet", "executor", True)
