@@ -56,7 +56,8 @@ class SporadicChanges : public OnBothHosts<Way> {
   void swap(const Define& how) {
     Transaction change;
     change.replace_fsm("c", std::make_unique<FreeFsm>(how));
-    this->host.commit(std::move(change), 0);  // one that goes on in its wait is released by the next event only
+    this->host.commit(std::move(change),
+                      0);  // one that goes on in its wait is released by the next event only
   }
   /// As long as releases take that nobody expects.
   void rest() {

@@ -17,13 +17,14 @@ struct CutWord {
   std::uint64_t bits{0};  // frontier << 2 | off << 1 | closed
 
   static constexpr std::uint64_t kClosed = 1, kOff = 2;
+  static constexpr unsigned kFlags = 2;  // bits
   /// Clocks are held between 0 and this: 73 years of nanoseconds.
-  static constexpr time_ns_t kLastClock = kForever >> 2;
+  static constexpr time_ns_t kLastClock = kForever / 4;
 
   /// An open one with this frontier. [rt]
   static constexpr CutWord open_at(time_ns_t clock_ns) MAUVE_RT {
     const time_ns_t held = clock_ns < 0 ? 0 : clock_ns > kLastClock ? kLastClock : clock_ns;
-    return {static_cast<std::uint64_t>(held) << 2};
+    return {static_cast<std::uint64_t>(held) << kFlags};
   }
   /// [rt]
   constexpr bool is_open() const MAUVE_RT { return (bits & (kClosed | kOff)) == 0; }
@@ -32,7 +33,7 @@ struct CutWord {
   /// The change was called off. [rt]
   constexpr bool is_off() const MAUVE_RT { return (bits & kOff) != 0; }
   /// [rt]
-  constexpr time_ns_t frontier_ns() const MAUVE_RT { return static_cast<time_ns_t>(bits >> 2); }
+  constexpr time_ns_t frontier_ns() const MAUVE_RT { return static_cast<time_ns_t>(bits >> kFlags); }
   /// T: of a closed one, the first instant that belongs to the new parts. [rt]
   constexpr time_ns_t instant_ns() const MAUVE_RT { return frontier_ns() + 1; }
 };
