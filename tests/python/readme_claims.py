@@ -923,6 +923,7 @@ PROMISE_NOTHING = (
     "(5*) Of 2026-11-23",
     "(6*) Of the evening",
     "(7*) Of 2026-11-25",
+    "(8*) Of 2026-11-25",
     "With one thread in both, the start takes 1.39 x",
     "(**) Of the same day",
     "(***) Of the evening",
