@@ -50,20 +50,20 @@ void TransactionCommit::Work::wait_for_earlier() {
   constexpr std::chrono::milliseconds kBetweenLooks{1};
   const time_ns_t until = later_by(monotonic_now_ns(), options_.timeouts.commit_ns);
   architecture_.settle_changes();
-  while (is_waiting_for_earlier() && !is_simulated_ && monotonic_now_ns() < until) {
+  while (is_waiting_for_earlier()) {
+    if (is_simulated_ || monotonic_now_ns() >= until) architecture_.throw_late(options_.timeouts.commit_ns);
     std::this_thread::sleep_for(kBetweenLooks);
     architecture_.settle_changes();
   }
-  if (is_waiting_for_earlier()) architecture_.throw_late(options_.timeouts.commit_ns);
 }
 
 bool TransactionCommit::Work::is_waiting_for_earlier() const {
-  const auto is_late = [this](const auto& component) {
-    const std::lock_guard gate(architecture_.commit_gate().mutex);
+  const auto is_late = [](const auto& component) {
     return component->change_mark().is_unsettled() && !component->task().is_left_behind();
   };
   const auto& steps = transaction_.steps();
   const auto components = architecture_.components();
+  const std::lock_guard gate(architecture_.commit_gate().mutex);
   return std::any_of(components.begin(), components.end(), [&](const auto& component) {
     return is_late(component) && std::any_of(steps.begin(), steps.end(), [&](const auto& step) {
              return step->is_for_all() || step->component() == component->name();
@@ -197,8 +197,6 @@ Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noe
 }
 
 void TransactionCommit::Work::settle_committed() { finish(); }
-
-void TransactionCommit::Work::throw_not_made() { throw_refusal(); }
 
 /// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
 void TransactionCommit::Work::require_host_open() const {
@@ -334,7 +332,7 @@ void TransactionCommit::Work::carry_out_commit() {
   if (!changes_.empty()) {
     commit_->set_yields();
     committed_ = commit_->carry_out(options_.timeouts.commit_ns, gate) == Commit::Outcome::made;
-    if (!committed_) throw_refusal();
+    if (!committed_) throw_not_made();
   }
   if (draft_->is_structural()) gate.restructured();
 }
@@ -347,7 +345,7 @@ void TransactionCommit::Work::require_same_structure() const {
               {.remedy = "look at the architecture again, then decide again"});
 }
 
-void TransactionCommit::Work::throw_refusal() {
+void TransactionCommit::Work::throw_not_made() {
   const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->kept_by() == nullptr;
   try {
     commit_->rethrow_refusal();

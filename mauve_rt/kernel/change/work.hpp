@@ -85,7 +85,6 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   void wait_for_earlier();
   bool is_waiting_for_earlier() const;
   void require_same_structure() const;
-  [[noreturn]] void throw_refusal();
   void finish();
   void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
