@@ -99,6 +99,7 @@ Task::Visit Task::visit_slot() noexcept {
   Participant& participant = *participant_;
   if (participant.in_flight && !machine_.is_started()) {  // posted just before the park
     end_slot(participant);
+    release_withdrawn();
     return Visit::goes_on;
   }
   const time_ns_t began = clock().now_ns();
@@ -292,7 +293,8 @@ void Task::skip_lost(Participant& participant, time_ns_t began_ns) noexcept {
 }
 
 /// On the way into a park, and to the thread's end: calls off a commit that is open, takes one that is made. One that was
-/// posted for a parked component stays, unless the thread ends. Whether it has taken one.
+/// posted for a parked component stays, unless the thread ends. Whether it has taken one. The slot of one that was called off
+/// stays busy until release_withdrawn().
 bool Task::settle_slot(bool ends) noexcept {
   if (!enter_slot()) return false;
   Participant& participant = *participant_;
@@ -303,8 +305,8 @@ bool Task::settle_slot(bool ends) noexcept {
 
 bool Task::end_slot(Participant& participant) noexcept {
   Commit& commit = *participant.commit;
-  if (commit.call_off(Commit::Off::withdrawn, this)) {
-    leave_slot(kEmpty);
+  if (commit.call_off_quietly(Commit::Off::withdrawn, this)) {
+    withdrawn_ = &participant;
     return false;
   }
   const bool was_started = machine_.is_started();
@@ -322,6 +324,13 @@ bool Task::end_slot(Participant& participant) noexcept {
   }
   pass(participant);
   return true;
+}
+
+/// Once the state is published: a stop does not wait for the requester of the change that it calls off.
+void Task::release_withdrawn() noexcept {
+  if (withdrawn_ == nullptr) return;
+  std::exchange(withdrawn_, nullptr)->commit->wake_requester();
+  leave_slot(kEmpty);
 }
 
 void Task::take_parked(Participant& participant) noexcept {

@@ -342,6 +342,7 @@ class Task final : public Waiter {
   void pass(Participant& participant) noexcept;
   bool settle_slot(bool ends = false) noexcept;
   bool end_slot(Participant& participant) noexcept;
+  void release_withdrawn() noexcept;
   bool enter_slot() MAUVE_RT;
   void leave_slot(std::uint32_t to) MAUVE_RT;
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
@@ -404,9 +405,10 @@ class Task final : public Waiter {
   std::atomic<bool> fallen_back_{false};
 
   // the machine's own
-  QueuePlace queue_place_{};  // of a simulated one
-  bool in_resume_{false};     // its code is on some stack: what it calls must not resume it
-  bool place_kept_{false};    // the fsm that a commit has put in goes on in its place
+  QueuePlace queue_place_{};         // of a simulated one
+  bool in_resume_{false};            // its code is on some stack: what it calls must not resume it
+  Participant* withdrawn_{nullptr};  // its commit is called off, and its requester sleeps still
+  bool place_kept_{false};           // the fsm that a commit has put in goes on in its place
   time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
 };
 
