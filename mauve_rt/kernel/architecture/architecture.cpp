@@ -123,6 +123,12 @@ void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<Ea
   }
 }
 
+bool Architecture::has_open_addition(const std::string& name) const noexcept {
+  const auto has_added = [&name](const auto& change) { return change->has_added(name); };
+  return std::any_of(prepared_.begin(), prepared_.end(), has_added) ||
+         std::any_of(open_.begin(), open_.end(), has_added);
+}
+
 void Architecture::throw_late(time_ns_t waited_ns) const {
   for (const auto& change : open_) {
     if (const Task* late = change->find_late())

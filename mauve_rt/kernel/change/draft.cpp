@@ -153,7 +153,8 @@ Resource& Draft::resource(const std::string& name) {
 
 DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
   check_name("component", name);
-  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
+  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr) ||
+      architecture_.has_open_addition(name))
     throw_taken("component", name);
   DraftComponent added;
   added.component = architecture_.make_unlisted(name);
@@ -182,7 +183,7 @@ void Draft::remove_component(const std::string& name) {
 
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
   check_name("resource", name);
-  if (find_resource(name) != nullptr) throw_taken("resource", name);
+  if (find_resource(name) != nullptr || architecture_.has_open_addition(name)) throw_taken("resource", name);
   resource->set_name(name);
   architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});

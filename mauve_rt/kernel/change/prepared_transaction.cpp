@@ -215,6 +215,10 @@ void PreparedTransaction::drop_if_stale() noexcept {
   let_go();
 }
 
+bool PreparedTransaction::has_added(const std::string& name) const noexcept {
+  return state_->phase.load(std::memory_order_acquire) == State::kCommitted && state_->work->has_added(name);
+}
+
 /// The change lock held.
 void PreparedTransaction::note_failure() noexcept {
   State& state = *state_;

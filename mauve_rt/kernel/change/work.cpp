@@ -157,6 +157,14 @@ const Task* TransactionCommit::Work::Late::find_late() const noexcept {
   return nullptr;
 }
 
+bool TransactionCommit::Work::has_added(const std::string& name) const noexcept {
+  const auto& resources = draft_->resources();
+  const DraftComponent* component = draft_->find(name);
+  return (component != nullptr && component->is_added) ||
+         std::any_of(resources.begin(), resources.end(),
+                     [&name](const DraftResource& added) { return added.name() == name; });
+}
+
 void TransactionCommit::Work::finish() {
   publish();
   architecture_.drop_stale_prepared();  // they refer to what goes now

@@ -43,6 +43,8 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   bool wait_passed(time_ns_t until_ns) const noexcept;
   /// Has the architecture complete a prepared change that was committed. [non-rt], the change lock held.
   void keep_open(std::vector<std::shared_ptr<Component>> unsettled);
+  /// Whether it adds a component or resource of that name. [non-rt], before it is completed.
+  bool has_added(const std::string& name) const noexcept;
   /// What follows the commit, once all components have taken the change. [non-rt], the change lock held.
   void settle_committed();
   /// Throws why it was not made. [non-rt]
@@ -155,6 +157,7 @@ class TransactionCommit::Work::Late final : public OpenChange {
       : work_(std::move(work)), unsettled_(std::move(unsettled)) {}
   bool settle() noexcept override;
   const Task* find_late() const noexcept override;
+  bool has_added(const std::string& name) const noexcept override { return work_->has_added(name); }
 
  private:
   std::shared_ptr<Work> work_;

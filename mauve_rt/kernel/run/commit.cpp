@@ -90,14 +90,13 @@ void Commit::refuse(const Participant* participant, const CommitAction& action, 
   call_off(Off::withdrawn, participant != nullptr ? participant->task : nullptr);
 }
 
-void Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
+bool Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
   const CutWord seen = cut_.raise(entered_ns);
   participant.has_voted = true;
   participant.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
-  if (seen.is_off()) return;
-  if (to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+  if (seen.is_off() || to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return false;
   cut_.close();
-  wake_requester();
+  return true;
 }
 
 time_ns_t Commit::take(Participant& participant) noexcept {

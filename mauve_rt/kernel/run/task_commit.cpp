@@ -123,6 +123,7 @@ Task::Visit Task::look_at_cut(Participant& participant, time_ns_t began_ns) noex
   } else {
     skip_lost(participant, began_ns);
   }
+  wake_if_decided(*participant.commit);
   leave_slot(seen.is_off() ? kEmpty : kPosted);
   return Visit::goes_on;
 }
@@ -185,13 +186,14 @@ bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
     return false;
   }
   if (was_parked) parked_.store(1, std::memory_order_seq_cst);
-  if (has_agreed) commit.vote(participant, machine_.entered_ns());
+  if (has_agreed) has_decided_ = commit.vote(participant, machine_.entered_ns());
   return true;
 }
 
 Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   Commit& commit = *participant.commit;
   if (!machine_.begin_execution(clock().now_ns(), kForever)) {
+    wake_if_decided(commit);
     leave_slot(kPosted);
     return Visit::condemned;
   }
@@ -223,9 +225,15 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   participant.resumes_ns = due_ns();
   if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
   if (stops && !is_condemned) park_stopped();
+  wake_if_decided(commit);
   pass(participant);
   if (is_condemned) return Visit::condemned;
   return stops ? Visit::parks : Visit::goes_on;
+}
+
+/// After its own take: the wake-up of an ordinary thread is no part of a component's blackout.
+void Task::wake_if_decided(Commit& commit) noexcept {
+  if (std::exchange(has_decided_, false)) commit.wake_requester();
 }
 
 void Task::pass(Participant& participant) noexcept {

@@ -226,6 +226,9 @@ class Architecture final : public Configurable {
   void wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look);
   /// What changes under way have claimed beside components. [non-rt], the change lock held.
   ArchitectureClaims& claims() noexcept { return claims_; }
+  /// Whether a change that is made and not completed has added a component or resource of that name. [non-rt], the change lock
+  /// held.
+  bool has_open_addition(const std::string& name) const noexcept;
   /// Throws Error (timeout) that names a component which has not taken an earlier change. [non-rt], change lock held.
   [[noreturn]] void throw_late(time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.

@@ -199,8 +199,9 @@ class Commit {
   CutWord raise(time_ns_t clock_ns) MAUVE_RT { return cut_.raise(clock_ns); }
   /// Runs the adopts of a participant; false when the change is refused, and called off. [rt] as far as the actions are.
   bool adopt(Participant& participant) noexcept;
-  /// The participant agrees, and has executed nothing beyond this clock. [rt]
-  void vote(Participant& participant, time_ns_t entered_ns) MAUVE_RT;
+  /// The participant agrees, and has executed nothing beyond this clock. True when it was the last: the caller wakes the
+  /// requester, after what is more urgent. [rt]
+  bool vote(Participant& participant, time_ns_t entered_ns) MAUVE_RT;
   /// Takes all actions of a participant; how long these and the adopts took beyond what they declared, else 0. [rt] as far as
   /// the actions are.
   time_ns_t take(Participant& participant) noexcept;
