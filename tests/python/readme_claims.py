@@ -651,13 +651,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "which sleeps until the next bound can be exceeded": (
         "Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",
     ),
-    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheCondemnedOneHolds",),
+    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheTimedOutOneHolds",),
     "repaired in place by a step `configure` or `replace_core`, then started": (
         "Rule11Repaired.AndStartedInOneTransaction",
         "Rule11Repaired.ByConfiguringItAnew",
     ),
     "is removed and added anew, in one transaction": (
-        "Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",
+        "Rule11Watchdog.ATimedOutComponentIsReplacedWhileItsThreadRuns",
     ),
     "the component's own thread puts that one in": (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
