@@ -57,6 +57,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "one that finds another under way for 10 s is refused": (
         "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
     ),
+    "Threads of one program prepare and make changes of different components in parallel": (
+        "ParallelChanges.WaitForNoPreparationOfOthers",
+        "ParallelChanges.WaitForNoCommitOfOthers",
+        "ParallelChanges.ThatAddOrRemoveGoOneAfterTheOther",
+    ),
     "a faulted component gets a new core": (
         "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
