@@ -3,6 +3,18 @@
 from collections.abc import Sequence
 from typing import overload
 
+def start_console() -> None:
+    """From here on a thread of its own writes the process's log lines to the console.
+
+    Once, after rclpy.init(), which was told `--disable-stdout-logs`.
+    """
+
+def flush_console(timeout_ns: int) -> bool:
+    """Wait until all lines are written; False: nobody reads them."""
+
+def console_dropped() -> int:
+    """Lines that were left out, because too many waited to be written."""
+
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""
 

@@ -751,6 +751,17 @@ def allocation_counting() -> str:
 
 def monotonic_ns() -> int: ...
 
+END_SIGNALS: set[int]
+"""Signals that end a process in order: see wait_end_signal()."""
+
+def wait_end_signal(*, grace_ns: int, dump_signal: int = 0) -> int:
+    """Sleep until one of END_SIGNALS comes, which all threads have to block; returns it.
+
+    Before it returns, every deployer of the process is shut down for good: outputs are safe. None of that needs
+    the interpreter's lock. The process ends `grace_ns` after the signal at the latest, with status 1; it raises
+    `dump_signal` then, for a handler that shows where the threads are.
+    """
+
 # ---- rules: the engine that the supervisor, virtual time and tools share; instants are the caller's
 
 @final
@@ -1013,6 +1024,6 @@ class Reflex:
         """End that wait, now and from now on."""
     def facts(self) -> list[RuleFacts]: ...
     def lost(self) -> int:
-        """Decisions that nobody took in time."""
+        """Decisions that were left out, because those before them were not taken in time."""
     def advance(self) -> int:
         """In virtual time: do all that is due now; when to call again at the latest."""

@@ -17,6 +17,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_simulation(module);
   bind_rules(module);
   bind_reflex(module);
+  bind_process_end(module);
   module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;
   module.def("monotonic_ns", &mauve::monotonic_now_ns);

@@ -38,6 +38,7 @@ void bind_python_fsm(py::module_& module);
 void bind_rules(py::module_& module);
 /// Registers what lets rules act beside the components of a host; after Host and the engine of rules.
 void bind_reflex(py::module_& module);
+void bind_process_end(py::module_& module);
 /// Registers Simulation and its hosts; after Host.
 void bind_simulation(py::module_& module);
 

@@ -144,6 +144,12 @@ class Runtime:
         self.active = True
         self.observe()
 
+    def make_safe(self) -> None:
+        """Write safe outputs and park the components, whatever else is under way; deactivate() does the rest."""
+        host = self._host
+        if host is not None:
+            host.shutdown()
+
     def deactivate(self) -> None:
         """Write safe outputs, park the components, join their threads; a change under way is called off."""
         self.active = False

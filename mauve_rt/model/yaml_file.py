@@ -1,5 +1,7 @@
 """A YAML file with the place of every element, so that errors point at it."""
 
+import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,12 +14,15 @@ Location = tuple[int | str, ...]
 class YamlFile:
     """A parsed file: `data` in plain Python values, and `position()` of any element of it."""
 
-    def __init__(self, path: str | Path, *, text: str | None = None) -> None:
+    def __init__(self, path: str | Path, *, text: str | None = None, waits: bool = True) -> None:
         """Read and parse a file, or parse `text` in its place.
+
+        With `waits=False` only a regular file will do: a pipe may keep its reader waiting for ever.
 
         Raises:
             ArchitectureFileError: no such file, too large, not UTF-8, not YAML, or a key given twice.
         """
+        self._waits = waits
         self.path = Path(path)
         try:
             self._root = parse_yaml(self._read() if text is None else text)
@@ -59,7 +64,10 @@ class YamlFile:
 
     def _read(self) -> str:
         try:
-            with self.path.open("rb") as file:
+            with self.path.open("rb", opener=None if self._waits else _open_at_once) as file:
+                if not self._waits and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                    what, remedy = "not a regular file", "copy its contents into one"
+                    raise self.error(what, expected="a regular file", code="io", remedy=remedy)
                 raw = file.read(MAX_BYTES + 1)
         except OSError as error:
             reason = error.strerror or str(error)
@@ -75,6 +83,11 @@ class YamlFile:
             raise self.error(
                 "not text in UTF-8", line=line, column=column, code="io", remedy=remedy
             ) from None
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Opens without waiting for the other end of a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _part(node: Node, part: int | str) -> tuple[Node, tuple[int, int]] | None:

@@ -27,6 +27,13 @@ constexpr unsigned kEndsAt = 5;
 
 constexpr std::array kActs{Act::do_, Act::undo};
 
+/// So many decisions may wait for who reports them. Outcomes of actions come on top: each is reported.
+constexpr std::size_t kMostTold = 1000;
+
+bool is_outcome(const Decision& decision) noexcept {
+  return decision.decided == Decided::done || decision.decided == Decided::failed;
+}
+
 }  // namespace
 
 Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
@@ -271,12 +278,18 @@ void Reflex::tell() {
                                  .name = rule.name,
                                  .kind = static_cast<std::uint16_t>(TraceKind::decision),
                                  .component = trace_number_});
-    if (decision->decided != Decided::done && decision->decided != Decided::failed) continue;
+    if (!is_outcome(*decision)) continue;
     if (auto report = rule.action(decision->act).report()) all.back().action = std::move(*report);
   }
   if (all.empty()) return;
   const std::lock_guard lock(told_mutex_);
-  for (Told& each : all) told_.push_back(std::move(each));
+  for (Told& each : all) {
+    if (told_.size() >= kMostTold && !is_outcome(each.decision)) {
+      ++left_out_;
+    } else {
+      told_.push_back(std::move(each));
+    }
+  }
   told_changed_.notify_all();
 }
 
@@ -295,6 +308,11 @@ void Reflex::wake() {
   const std::lock_guard lock(told_mutex_);
   woken_ = true;
   told_changed_.notify_all();
+}
+
+std::uint64_t Reflex::lost() const {
+  const std::lock_guard lock(told_mutex_);
+  return engine_->lost() + left_out_;
 }
 
 std::vector<RuleFacts> Reflex::facts() const {

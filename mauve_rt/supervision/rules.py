@@ -85,14 +85,14 @@ def lacks_type(leaf: When) -> bool:
 class RulesFile:
     """A checked rules file: `rules`, and `error()` for what only its user can check, e.g. installed types."""
 
-    def __init__(self, path: str | Path) -> None:
-        """Read and check a rules file.
+    def __init__(self, path: str | Path, *, waits: bool = True) -> None:
+        """Read and check a rules file; `waits` as of YamlFile.
 
         Raises:
             ArchitectureFileError: it cannot be read, is no YAML or breaks the schema;
                 `FILE:LINE:COLUMN: what`, one line.
         """
-        self._file = YamlFile(path)
+        self._file = YamlFile(path, waits=waits)
         faults: Faults = []
         self.rules = Rules.read(self._file.data, (), faults)
         if faults:

@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "bridge.hpp"
+#include "console.hpp"
 
 namespace py = pybind11;
 
@@ -54,6 +55,9 @@ PYBIND11_MODULE(_bridge, module) {
   module.doc() = "Resources on ROS topics and services, natively, on a node of rclpy's.";
   // What the threads wait for may want the interpreter's lock: never wait for them under it.
   using Unlocked = py::call_guard<py::gil_scoped_release>;
+  module.def("start_console", &Console::start);
+  module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked());
+  module.def("console_dropped", &Console::dropped);
   py::class_<rmw_qos_profile_t>(module, "Qos")
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,

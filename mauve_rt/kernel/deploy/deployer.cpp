@@ -2,6 +2,7 @@
 #include "mauve_rt/deploy/deployer.hpp"
 
 #include <algorithm>
+#include <set>
 #include <thread>
 
 #include "mauve_rt/base/error.hpp"
@@ -15,6 +16,19 @@ namespace {
 
 constexpr time_ns_t kStopTimeout = ms_to_ns(500);
 constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
+
+/// The deployers of the process, for its end.
+struct Living {
+  std::mutex mutex;
+  std::set<Deployer*> deployers;
+  bool has_ended{false};
+};
+
+/// Not destroyed with static objects: a thread may end the process later.
+Living& living() {
+  static auto* const all = new Living;
+  return *all;
+}
 
 }  // namespace
 
@@ -44,9 +58,19 @@ class Deployer::Barrier {
 };
 
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
-    : Host(architecture), options_(options) {}
+    : Host(architecture), options_(options) {
+  Living& all = living();
+  const std::lock_guard lock(all.mutex);
+  all.deployers.insert(this);
+  has_ended_ = all.has_ended;
+}
 
 Deployer::~Deployer() {
+  {
+    Living& all = living();
+    const std::lock_guard lock(all.mutex);
+    all.deployers.erase(this);
+  }
   shutdown();
   wait_unused();
 }
@@ -64,6 +88,9 @@ void Deployer::deploy() {
   const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
   architecture().settle_changes();
   const std::lock_guard life(life_mutex_);
+  if (has_ended_) {
+    throw Error(ErrorCode::not_configured, "the process ends", {.remedy = "deploy in a new process"});
+  }
   require_deployable();
   prepare_process();
   architecture().set_host(*this);
@@ -109,10 +136,28 @@ void Deployer::create_threads() {
 
 void Deployer::shutdown() noexcept {
   const std::lock_guard life(life_mutex_);
+  shut_down(false);
+}
+
+void Deployer::end() noexcept {
+  const std::lock_guard life(life_mutex_);
+  has_ended_ = true;
+  shut_down(true);
+}
+
+void Deployer::end_all() noexcept {
+  Living& all = living();
+  const std::lock_guard lock(all.mutex);
+  all.has_ended = true;
+  for (Deployer* deployer : all.deployers) deployer->end();
+}
+
+void Deployer::shut_down(bool for_good) noexcept {
   if (!is_deployed()) return;
   set_deployed(false);
   architecture().commit_gate().close();
   stop_all(monotonic_now_ns() + kStopTimeout);
+  if (for_good) give_up_hung();
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : architecture().components()) component->task().end_thread(until);
   watchdog_->stop();  // last: stopping is watched too

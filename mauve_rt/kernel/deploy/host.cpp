@@ -130,4 +130,14 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
   }
 }
 
+void Host::give_up_hung() noexcept {
+  for (const auto& component : architecture_.components()) {
+    try {
+      if (component->task().state() == ComponentState::stopping) component->task().stop(0, true);
+    } catch (
+        const Error&) {  // it has stopped, or cannot be given up in a wait, whose outputs its thread makes safe
+    }
+  }
+}
+
 }  // namespace mauve

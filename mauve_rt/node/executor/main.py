@@ -5,7 +5,8 @@
         [-p peers:=[robot_2]] [-p COMPONENT.PROPERTY:=VALUE]
         [-p record_topics:="['supervisor/decisions:mauve_msgs/msg/SupervisorDecision:transient_local']"]
 
-Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr, nothing started), 1 otherwise.
+Exit status: 0 after SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 or SIGUSR2, 2 for bad input (one line on
+stderr, nothing started), 1 otherwise.
 """
 
 import gc
@@ -70,17 +71,17 @@ def _work(words: list[str], stop: Stop, discovery: str) -> int:
 
 
 def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str) -> int:
-    import rclpy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
     from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
+    from mauve_rt.node.shared.background_console import init_logging_apart, last_lines  # noqa: PLC0415
     from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
 
     node, opens_late = None, False
     addresses = usable_addresses()
     try:
-        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+        init_logging_apart(words, signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
         node = ExecutorNode(runtime, namespace=namespace)
         # Components in Python would wait for the interpreter while modules load: then these come first.
@@ -91,6 +92,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     if node is None or not (opens_late or _open(node)):
         node = None
         gc.collect()  # what there is of the node holds itself alone, and the DDS participant with it
+        last_lines()
         try_shutdown()
         return BAD_INPUT
     if discovery:
@@ -108,6 +110,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     finally:
         interfaces.close()
         node.close()
+        last_lines()
         try_shutdown()
     return status
 

@@ -245,6 +245,7 @@ class ExecutorNode(LifecycleNode):
 
     def quiesce(self) -> None:
         """Outputs safe, components parked, last words published, threads joined. May be called again."""
+        self._runtime.make_safe()  # first: a request that lasts may hold the lock
         with self._starting_or_ending:
             self._rules.stop()
             if self._runtime.active:

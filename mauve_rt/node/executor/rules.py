@@ -180,9 +180,16 @@ class OwnRules:
         messages = loaded.messages(self._runtime, who=who, name=name)
         tell_one = self._watch.guarded("a decision", self._tell)
 
+        reported = 0
+
         def tell() -> None:
+            nonlocal reported
             for told in reflex.wait_told(_WAIT_NS):
                 tell_one(messages, told)
+            if (lost := reflex.lost()) != reported:
+                text = f"{lost - reported} decisions were left out: they came faster than they can be reported"
+                self._node.get_logger().warning(text)
+                reported = lost
 
         return tell
 

@@ -32,7 +32,7 @@ class LoadedRules:
         Raises:
             ArchitectureFileError: the executor cannot run it.
         """
-        file = RulesFile(path)
+        file = RulesFile(path, waits=False)  # requests wait for the one that reads it
         rules = own_rules(file)
         unheard_of = [*only_outside(file)]
         if topics is not None:

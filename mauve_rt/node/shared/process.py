@@ -1,4 +1,4 @@
-"""A process that ends well: SIGINT and SIGTERM at any moment, gone within 3 s."""
+"""A process that ends well: on a signal at any moment, outputs first, gone within 3 s."""
 
 import faulthandler
 import os
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import NoReturn
 
 _GRACE_S = 2.7  # after a signal; then the process ends where it stands, telling where that is
-_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+_DUMP = signal.SIGRTMIN + 1  # shows where every thread is
 FAILED = 1
 BAD_INPUT = 2
 
@@ -37,17 +37,19 @@ class Stop(threading.Event):
 
 
 def run_until_signalled(work: Callable[[Stop], int]) -> int:
-    """Run `work(stop)` on a thread of its own and return its exit status; SIGINT and SIGTERM set `stop`.
+    """Run `work(stop)` on a thread of its own and return its exit status; a signal sets `stop`.
 
-    Every thread blocks both signals and the main one waits for them: none is lost, none is late, whatever the
-    work is doing. One before `stop.begin()`, while modules load, ends the process at once, with status 0.
+    Signals are SIGINT, SIGTERM and, unless the parent process had them ignored, SIGHUP, SIGQUIT, SIGUSR1 and
+    SIGUSR2. Every thread blocks them, and the main one waits for them in C++: none is lost, none is late,
+    whatever the work is doing. There the outputs of all components are made safe, before anything needs the
+    interpreter's lock. One before `stop.begin()`, while modules load, ends the process at once, with status 0.
     Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of
     every thread on stderr. For the main thread.
 
     Raises:
         ImportError: the work could not load what it needs.
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _end_signals())
     main_thread = threading.get_ident()
     stop = Stop()
     done = threading.Event()
@@ -68,14 +70,22 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
 
     worker = threading.Thread(target=body, name="work", daemon=True)
     worker.start()
-    signal.sigwait(_SIGNALS)
+    from mauve_rt._kernel import wait_end_signal  # noqa: PLC0415 - takes its time to load, the signals blocked
+
+    faulthandler.register(_DUMP, all_threads=True)
+    wait_end_signal(grace_ns=round(_GRACE_S * 1e9), dump_signal=_DUMP)
     if not done.is_set():
         stop.ask()
-        faulthandler.dump_traceback_later(_GRACE_S, exit=True)
     worker.join()
     if missing is not None:
         raise missing
     return status
+
+
+def _end_signals() -> set[signal.Signals]:
+    ignored_stays = (signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)  # as nohup asks
+    kept = {number for number in ignored_stays if signal.getsignal(number) != signal.SIG_IGN}
+    return {signal.SIGINT, signal.SIGTERM, *kept}
 
 
 def leave_now(status: int) -> NoReturn:

@@ -2,7 +2,8 @@
 
     ros2 run mauve_rt supervisor --ros-args -r __ns:=/robot_1 -p rules:=FILE
 
-Exit status: 0 after SIGINT or SIGTERM, 2 for bad input (one line on stderr).
+Exit status: 0 after SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 or SIGUSR2, 2 for bad input (one line on
+stderr).
 """
 
 import sys

@@ -29,6 +29,7 @@ from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
 from mauve_rt.interfaces.outside_feeds import OutsideFeeds
+from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
 from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
@@ -176,10 +177,7 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     try:
         remarks = check_arguments(arguments)
         addresses = usable_addresses()
-        rclpy.init(
-            args=list(arguments),
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        init_logging_apart(arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Node(NODE_NAME)
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"supervisor: {error}")
@@ -209,6 +207,7 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
             interfaces.close()
         executor.shutdown()
         node.destroy_node()
+        last_lines()
         try_shutdown()
     return 0
 

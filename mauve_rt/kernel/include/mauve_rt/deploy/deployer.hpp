@@ -17,7 +17,7 @@ struct DeployerOptions {
 
 /// The host of threads: one for each component. Ordinary threads.
 ///
-/// All members are written and read by deploy() and shutdown(), under life_mutex_.
+/// All members are written and read by deploy(), shutdown() and end(), under life_mutex_.
 class Deployer final : public Host {
  public:
   explicit Deployer(Architecture& architecture, DeployerOptions options = {});
@@ -31,6 +31,11 @@ class Deployer final : public Host {
   void deploy() override;
   /// Also ends the threads: those that execute a state for half a second more are left behind. [non-rt]
   void shutdown() noexcept override;
+  /// The same, for good: it cannot be deployed again. A component whose state does not end within half a second is given up:
+  /// its outputs are safe on return, too. [non-rt]
+  void end() noexcept;
+  /// end() of every deployer of the process, those to come included. [non-rt]
+  static void end_all() noexcept;
 
   const RealtimeStatus& realtime_status() const noexcept override { return process_.status(); }
   const Clock& clock() const noexcept override { return MonotonicClock::instance(); }
@@ -45,10 +50,12 @@ class Deployer final : public Host {
   class Barrier;
 
   void create_threads();
+  void shut_down(bool for_good) noexcept;
 
   DeployerOptions options_;
   RealtimeProcess process_;
   std::mutex life_mutex_;
+  bool has_ended_{false};
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
 };

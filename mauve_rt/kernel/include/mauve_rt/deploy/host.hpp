@@ -84,6 +84,8 @@ class Host : public Runner {
   void start_all(time_ns_t epoch_ns);
   /// Stops all, the last one first; who does not come to rest soon keeps none of the others running. [non-rt]
   void stop_all(time_ns_t until_ns) noexcept;
+  /// After that: makes the outputs of those safe whose state does not end. [non-rt]
+  void give_up_hung() noexcept;
 
  private:
   void require_own() const;

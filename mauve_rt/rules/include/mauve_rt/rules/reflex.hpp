@@ -63,7 +63,7 @@ struct RuleFacts {
 /// | ends_             | stepper    | tender         | release/acquire: what was done before lies in the architecture   |
 /// | work_ (futex)     | anyone     | tender         | release/acquire: who sees the bump sees the work                 |
 /// | ending_ (futex)   | stop()     | both           | release/acquire                                                  |
-/// | told_, kept_, woken_ | tender, wake() | anyone | told_mutex_                                                    |
+/// | told_ ... woken_  | tender, wake() | anyone  | told_mutex_                                                      |
 class Reflex {
  public:
   /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
@@ -86,8 +86,8 @@ class Reflex {
   void wake();
   /// [non-rt]
   std::vector<RuleFacts> facts() const;
-  /// How many decisions nobody took in time. [rt]
-  std::uint64_t lost() const MAUVE_RT { return engine_->lost(); }
+  /// How many decisions were left out, because those before them were not taken in time. [non-rt]
+  std::uint64_t lost() const;
 
   /// In virtual time: does all that is to be done now; when it has to be called again at the latest. [non-rt]
   time_ns_t advance();
@@ -137,6 +137,7 @@ class Reflex {
   mutable std::mutex told_mutex_;
   std::condition_variable told_changed_;
   std::deque<Told> told_;
+  std::uint64_t left_out_{0};
   struct Kept {
     std::string problem{};
     std::size_t memory_bytes{0};

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deploy/process_end.hpp"
+
+#include <pybind11/stl.h>
+
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+void bind_process_end(py::module_& module) {
+  module.attr("END_SIGNALS") = py::cast(std::set<int>(kEndSignals.begin(), kEndSignals.end()));
+  module.def(
+      "wait_end_signal",
+      [](time_ns_t grace_ns, int dump_signal) {
+        return wait_end_signal({.grace_ns = grace_ns, .dump_signal = dump_signal});
+      },
+      py::kw_only(), py::arg("grace_ns"), py::arg("dump_signal") = 0,
+      py::call_guard<py::gil_scoped_release>());
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/deploy/process_end.hpp"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "mauve_rt/deploy/deployer.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// For the handler of the dump signal.
+constexpr std::chrono::milliseconds kDump{100};
+
+/// Whether the parent process has it ignored, as nohup and shells do. SIGINT is not left ignored, as it is in the background of
+/// a script: who starts an executor there ends it by that signal.
+bool stays_ignored(int signal) noexcept {
+  struct sigaction present{};
+  sigaction(signal, nullptr, &present);
+  return signal != SIGINT && signal != SIGTERM && present.sa_handler == SIG_IGN;
+}
+
+sigset_t end_signals() noexcept {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int each : kEndSignals) {
+    if (!stays_ignored(each)) sigaddset(&signals, each);
+  }
+  return signals;
+}
+
+}  // namespace
+
+void block_end_signals() noexcept {
+  const sigset_t signals = end_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+int wait_end_signal(const EndOptions& options) noexcept {
+  const sigset_t signals = end_signals();
+  int signal = 0;
+  while (sigwait(&signals, &signal) != 0) {
+  }
+  end_process_after(options);  // first: a component that does not end must not keep the process
+  Deployer::end_all();
+  return signal;
+}
+
+void end_process_after(const EndOptions& options) noexcept {
+  std::thread([options] {
+    std::this_thread::sleep_for(std::chrono::nanoseconds(options.grace_ns));
+    if (options.dump_signal != 0) {
+      std::thread([options] {
+        dprintf(STDERR_FILENO, "The process did not end within %lld ms of the signal. Its threads:\n",
+                static_cast<long long>(options.grace_ns / ms_to_ns(1)));
+        raise(options.dump_signal);
+      }).detach();
+      std::this_thread::sleep_for(kDump);
+    }
+    _exit(options.status);
+  }).detach();
+}
+
+}  // namespace mauve

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The end of a process: a signal makes the outputs of all components safe before anything else ends.
+#pragma once
+
+#include <array>
+#include <csignal>
+
+#include "mauve_rt/base/time.hpp"
+
+namespace mauve {
+
+/// Signals that end a process in order. Each would end it at once otherwise, its outputs as they are. Where the parent process
+/// has one ignored that is neither SIGINT nor SIGTERM (nohup), it stays so.
+inline constexpr std::array kEndSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2};
+
+struct EndOptions {
+  time_ns_t grace_ns{ms_to_ns(2'700)};  // from the signal to the end of the process, whatever its threads do
+  int status{1};                        // its exit status then
+  int dump_signal{0};  // raised then, to report where the threads are; 0: none. Its handler may block.
+};
+
+/// Blocks the signals in the calling thread and in those that it creates from now on. [setup], first of all, main thread.
+void block_end_signals() noexcept;
+/// Sleeps until one of the signals comes. Then shuts down every deployer of the process, for good (Deployer::end()): outputs
+/// are safe on return. Waits for no other thread but for the components' own, and takes no lock of Python. Returns the
+/// signal. [non-rt]
+int wait_end_signal(const EndOptions& options = {}) noexcept;
+/// Ends the process after this time, without destroying anything, unless it has ended before. [non-rt]
+void end_process_after(const EndOptions& options) noexcept;
+
+}  // namespace mauve

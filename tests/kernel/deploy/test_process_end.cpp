@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The end of a process by a signal: outputs first, waiting for nobody. Each case ends a process of its own.
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+
+#include "mauve_rt/deploy/process_end.hpp"
+
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+using ::testing::ExitedWithCode;
+
+/// Components that write 42 in each period, in a process whose signals are blocked.
+class Robot {
+ public:
+  Robot() {
+    block_end_signals();
+    for (const char* name : {"first", "second"}) {
+      auto& component =
+          architecture.add_component<TestShell, TestCore, TestFsm>(name, {.cpus = {kComponentsCpu}});
+      outputs.push_back(&architecture.add_resource<SharedData<Number>>(std::string(name) + "_out"));
+      architecture.connect(name, "output", std::string(name) + "_out", "write");
+      auto& core = component.core_as<TestCore>();
+      core.work = [&core] { core.exposed_shell().output.write({42.0}); };
+    }
+    architecture.configure();
+    deployer.deploy();
+    wait_until([&] { return all_are(42.0); }, "the outputs");
+  }
+  bool all_are(double expected) {
+    return std::all_of(outputs.begin(), outputs.end(), [expected](SharedData<Number>* output) {
+      Number value;
+      time_ns_t time_ns = 0;
+      ReaderState seen;
+      output->read.read(value, time_ns, seen);
+      return value.value == expected;
+    });
+  }
+  /// From another thread, as from another process.
+  static std::thread send(int signal) {
+    return std::thread([signal] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      kill(getpid(), signal);
+    });
+  }
+
+  AwayFromComponents away;
+  Architecture architecture;
+  std::vector<SharedData<Number>*> outputs;
+  Deployer deployer{architecture};
+};
+
+class ProcessEnd : public ::testing::Test {
+ protected:
+  // A process of its own from the start: the threads of this one are not in a fork.
+  void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
+};
+
+class EndSignal : public ProcessEnd, public ::testing::WithParamInterface<int> {};
+INSTANTIATE_TEST_SUITE_P(Signals, EndSignal, ::testing::ValuesIn(kEndSignals));
+
+TEST_P(EndSignal, MakesOutputsSafe) {
+  const auto live = [&] {
+    Robot robot;
+    std::thread sender = Robot::send(GetParam());
+    const int signal = wait_end_signal();
+    sender.join();
+    const bool is_safe = robot.all_are(0.0) && !robot.deployer.is_deployed();
+    _exit(signal == GetParam() && is_safe ? 0 : 3);
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(0), "");
+}
+
+TEST_F(ProcessEnd, AComponentThatHangsIsGivenUp) {
+  const auto live = [] {
+    Robot robot;
+    std::atomic<bool> hangs{false};
+    Transaction change;
+    auto fresh = std::make_unique<TestCore>();
+    TestCore& hanging = *fresh;
+    hanging.work = [&] {
+      hanging.exposed_shell().output.write({42.0});
+      hangs = true;
+      for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
+    };
+    change.replace_core("first", std::move(fresh));
+    robot.deployer.commit(std::move(change), {.timeouts = {.commit_ns = s_to_ns(10), .phase_ns = 0}});
+    wait_until([&] { return hangs.load(); }, "the state that hangs");
+    std::thread sender = Robot::send(SIGTERM);
+    wait_end_signal({.grace_ns = s_to_ns(60)});
+    sender.join();
+    _exit(robot.all_are(0.0) ? 0 : 3);
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(0), "");
+}
+
+TEST_F(ProcessEnd, NothingIsDeployedAfterIt) {
+  const auto live = [] {
+    Robot robot;
+    std::thread sender = Robot::send(SIGHUP);
+    wait_end_signal();
+    sender.join();
+    Architecture other;
+    other.configure();
+    Deployer late(other);
+    for (Deployer* each : {&robot.deployer, &late}) {
+      try {
+        each->deploy();
+        _exit(3);
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::not_configured) _exit(4);
+      }
+    }
+    _exit(0);
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(0), "");
+}
+
+TEST_F(ProcessEnd, EndsAProcessThatHangs) {
+  const auto live = [] {
+    block_end_signals();
+    std::signal(SIGRTMIN, [](int) {
+      const char text[] = "here it is";
+      static_cast<void>(!write(STDERR_FILENO, text, sizeof text - 1));
+    });
+    std::thread sender = Robot::send(SIGINT);
+    wait_end_signal({.grace_ns = ms_to_ns(50), .status = 5, .dump_signal = SIGRTMIN});
+    for (;;) pause();
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(5), "did not end within 50 ms.*\nhere it is");
+}
+
+TEST_F(ProcessEnd, LeavesASignalIgnoredThatTheParentProcessIgnores) {
+  const auto live = [] {
+    std::signal(SIGHUP, SIG_IGN);
+    Robot robot;
+    kill(getpid(), SIGHUP);
+    std::thread sender = Robot::send(SIGTERM);
+    const int signal = wait_end_signal();
+    sender.join();
+    _exit(signal == SIGTERM ? 0 : 3);
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace mauve::testing
