@@ -145,7 +145,7 @@ class Runtime:
         self.observe()
 
     def make_safe(self) -> None:
-        """Write safe outputs and park the components, whatever else is under way; deactivate() does the rest."""
+        """Write safe outputs and park the components, whatever else is done; deactivate() does the rest."""
         host = self._host
         if host is not None:
             host.shutdown()

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -140,9 +140,9 @@ def start_executor(
     """start_executor("-p", "architecture:=FILE", ...): ended with the test, by force if need be."""
     started: list[ExecutorProcess] = []
 
-    def start(*arguments: str, wrapper: Sequence[str] = ()) -> ExecutorProcess:
+    def start(*arguments: str, **options: Any) -> ExecutorProcess:
         environment = {"ROS_DOMAIN_ID": str(domain)}
-        started.append(ExecutorProcess(tmp_path, environment, arguments, wrapper=wrapper))
+        started.append(ExecutorProcess(tmp_path, environment, arguments, **options))
         return started[-1]
 
     yield start

@@ -13,15 +13,19 @@ PATIENCE_S = 100.0
 
 
 def wait_for_signals(process_id: int) -> None:
-    """Until a process of ours handles signals: a thread blocks SIGINT and SIGTERM alone.
+    """Until a process of ours handles signals: a thread blocks SIGINT and SIGTERM, and not SIGCHLD.
 
     Threads of libraries that block every signal come sooner than that.
     """
     deadline = time.monotonic() + PATIENCE_S
-    ours = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
-    while ours not in _blocked_signals(process_id):
+    ours, others = (_mask(signal.SIGINT) | _mask(signal.SIGTERM)), _mask(signal.SIGCHLD)
+    while not any(blocked & (ours | others) == ours for blocked in _blocked_signals(process_id)):
         assert time.monotonic() < deadline, "it never did"
         time.sleep(0.002)
+
+
+def _mask(number: signal.Signals) -> int:
+    return 1 << (number - 1)
 
 
 def _blocked_signals(process_id: int) -> set[int]:
@@ -42,13 +46,15 @@ class ExecutorProcess:
         arguments: Sequence[str],
         *,
         wrapper: Sequence[str] = (),
+        console: int | None = None,
     ) -> None:
+        """`console`: a file descriptor for what it prints, in place of `output`."""
         self._log = folder / f"executor_{time.monotonic_ns()}.log"
         with self._log.open("w", encoding="utf-8") as log:
             self.process = subprocess.Popen(
                 [*wrapper, sys.executable, "-m", "mauve_rt.node.executor.main", "--ros-args", *arguments],
                 env={**os.environ, **environment},
-                stdout=log,
+                stdout=log if console is None else console,
                 stderr=subprocess.STDOUT,
             )
 

@@ -187,7 +187,7 @@ class OwnRules:
             for told in reflex.wait_told(_WAIT_NS):
                 tell_one(messages, told)
             if (lost := reflex.lost()) != reported:
-                text = f"{lost - reported} decisions were left out: they came faster than they can be reported"
+                text = f"{lost - reported} decisions were left out: they came faster than they are reported"
                 self._node.get_logger().warning(text)
                 reported = lost
 

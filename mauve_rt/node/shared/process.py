@@ -41,8 +41,8 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
 
     Signals are SIGINT, SIGTERM and, unless the parent process had them ignored, SIGHUP, SIGQUIT, SIGUSR1 and
     SIGUSR2. Every thread blocks them, and the main one waits for them in C++: none is lost, none is late,
-    whatever the work is doing. There the outputs of all components are made safe, before anything needs the
-    interpreter's lock. One before `stop.begin()`, while modules load, ends the process at once, with status 0.
+    whatever the work is doing. There the outputs of all components are made safe, before anything takes the
+    interpreter's lock. One before `stop.begin()`, while modules load, ends the process at once: status 0.
     Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of
     every thread on stderr. For the main thread.
 

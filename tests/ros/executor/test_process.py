@@ -17,6 +17,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ComponentInfo
 from mauve_msgs.srv import ListComponents, Start, Stop
+from mauve_rt._kernel import END_SIGNALS
 from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
@@ -122,7 +123,7 @@ def test_bag_that_exists_already(architecture: Path, start_executor: Starter, tm
 # ---- ends
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", sorted(map(signal.Signals, END_SIGNALS)))
 def test_signal_seals_the_bag(
     number: signal.Signals, architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
 ) -> None:
