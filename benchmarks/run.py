@@ -32,6 +32,7 @@ from recording import recording_rows
 from recording_killed import kill_rows
 from reflex import reflex_rows
 from rows import Row, markdown, not_available
+from safe_stop import safe_stop_rows
 from scale import idle_rows, scale_rows, simulation_rows
 from service_calls import service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
@@ -61,6 +62,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "scale": scale_rows,
     "idle": idle_rows,
     "simulation": simulation_rows,
+    "safe-stop": safe_stop_rows,
     "soak": soak_rows,
     "service": service_rows,
     "service-stop": service_stop_rows,
