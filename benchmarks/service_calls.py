@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
+import machine
 import native
 import numpy as np
 import rclpy
@@ -76,7 +77,7 @@ def service_blackout_rows(settings: Settings) -> Iterator[Row]:
                 raise BenchmarkError(f"no blackout in the report of {step.step}: {COMPONENT} does not run")
             return float(step.blackout_ns)
 
-        def idle(number: int) -> list[float]:
+        def blackouts(number: int) -> list[float]:
             random = np.random.default_rng(number)
             found = []
             for request in _replacements(number, settings.service_calls):
@@ -86,7 +87,15 @@ def service_blackout_rows(settings: Settings) -> Iterator[Row]:
 
         def busy(number: int) -> list[float]:
             with stress.computing():
-                return idle(number)
+                return blackouts(number)
+
+        idle_percents = []
+
+        def idle(number: int) -> list[float]:
+            meter = machine.IdleMeter()
+            found = blackouts(number)
+            idle_percents.append(meter.percent())
+            return found
 
         rounds = native.interleaved(settings.rounds, busy, idle)
     yield from _compared(
@@ -94,6 +103,7 @@ def service_blackout_rows(settings: Settings) -> Iterator[Row]:
         rounds,
         beside="the same, machine idle",
         ratio_limits={50: 1.2, 99: None},
+        note=f"the CPUs were idle for {np.median(idle_percents):.0f} % of the time of the idle side (median)",
     )
 
 
@@ -147,7 +157,12 @@ def _replacements(number: int, count: int) -> Iterator[ReplaceCore.Request]:
 
 
 def _compared(
-    what: str, rounds: Sequence[Any], *, beside: str, ratio_limits: Mapping[int, float | None]
+    what: str,
+    rounds: Sequence[Any],
+    *,
+    beside: str,
+    ratio_limits: Mapping[int, float | None],
+    note: str = "",
 ) -> Iterator[Row]:
     """One row for each percentile that has an entry in `ratio_limits`; None: no limit."""
     for percent, ratio_limit in ratio_limits.items():
@@ -158,6 +173,7 @@ def _compared(
             unit="us",
             beside=beside,
             ratio_limit=ratio_limit,
+            note=note,
         )
 
 
