@@ -130,7 +130,7 @@ void bind_architecture(py::module_& module) {
           "cleanup",
           [](PyArchitecture& self) {
             const auto change =
-                self.architecture.change_lock().join();  // first: a hook may ask for a description
+                self.architecture.change_lock().join_alone();  // first: a hook may ask for a description
             const std::lock_guard lock(self.describing);
             self.architecture.cleanup();
           },

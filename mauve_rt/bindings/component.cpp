@@ -55,7 +55,7 @@ void bind_component(py::module_& module) {
       .def("cleanup",
            [](const PyComponent& self) {
              unlocked(self, [&self](Component& component) {
-               const auto change = self.architecture().architecture.change_lock().join();  // before it
+               const auto change = self.architecture().architecture.change_lock().join_alone();  // before it
                const std::lock_guard lock(self.describing());
                component.cleanup();
              });

@@ -38,6 +38,33 @@ struct SyncopatedFsm : Fsm<TestShell, TestCore> {
   }
 };
 
+/// Lets a test hold a part up, and know that it has come there.
+struct Doors {
+  std::atomic<bool> entered{false};
+  std::atomic<bool> open{false};
+  void pass() {
+    entered = true;
+    while (!open) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+};
+struct HangingCore : TestCore {
+  explicit HangingCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
+  bool configure_hook() override {
+    doors->pass();
+    return true;
+  }
+  std::shared_ptr<Doors> doors;  // its thread may end after the test
+};
+/// In a long state, so that a commit waits for it.
+struct BusyCore : TestCore {
+  explicit BusyCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
+  void act() override {
+    TestCore::act();
+    doors->pass();
+  }
+  std::shared_ptr<Doors> doors;
+};
+
 struct WideShell : TestShell {
   ReadPort<Number>& second_input = read_port<Number>("second_input").optional();
 };

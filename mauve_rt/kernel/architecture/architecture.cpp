@@ -62,19 +62,19 @@ Architecture::~Architecture() {
 }
 
 void Architecture::configure() {
-  const auto change = change_lock_.join();
+  const auto change = change_lock_.join_alone();
   Configurable::configure();
 }
 
 void Architecture::cleanup() {
-  const auto change = change_lock_.join();
+  const auto change = change_lock_.join_alone();
   Configurable::cleanup();
 }
 
 std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
                                                       const TransactionOptions& options) {
   const std::lock_guard change(change_lock_);
-  std::unique_lock<std::mutex> use;
+  std::shared_lock<std::shared_mutex> use;
   Runner* const host = use_host(use);
   auto work = std::make_unique<TransactionCommit>(*this, host, options);
   work->make(std::move(transaction));
@@ -112,6 +112,23 @@ void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
   has_open_.store(true, std::memory_order_relaxed);  // relaxed: a hint
 }
 
+void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look) {
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  for (;;) {
+    settle_changes();
+    const EarlierChange earlier = look();
+    if (earlier == EarlierChange::none) return;
+    if (earlier == EarlierChange::late && monotonic_now_ns() >= until) throw_late(timeout_ns);
+    change_lock_.wait_for_others();
+  }
+}
+
+bool Architecture::has_open_addition(const std::string& name) const noexcept {
+  const auto has_added = [&name](const auto& change) { return change->has_added(name); };
+  return std::any_of(prepared_.begin(), prepared_.end(), has_added) ||
+         std::any_of(open_.begin(), open_.end(), has_added);
+}
+
 void Architecture::throw_late(time_ns_t waited_ns) const {
   for (const auto& change : open_) {
     if (const Task* late = change->find_late())
@@ -125,15 +142,15 @@ void Architecture::throw_late(time_ns_t waited_ns) const {
 void Architecture::settle_if_idle() noexcept {
   if (!has_open_.load(std::memory_order_relaxed) || !change_lock_.try_lock()) return;  // relaxed: a hint
   const std::lock_guard change(change_lock_, std::adopt_lock);
-  std::unique_lock<std::mutex> use;
+  std::shared_lock<std::shared_mutex> use;
   use_host(use);
   settle_changes();
 }
 
-Runner* Architecture::use_host(std::unique_lock<std::mutex>& use) const {
+Runner* Architecture::use_host(std::shared_lock<std::shared_mutex>& use) const {
   const std::lock_guard lock(host_mutex_);
-  // Only its end waits for that. Tried, as nobody has it: changes are made one at a time, and a host that ends was
-  // released before. A hook may shut down the host, which takes these locks the other way round.
+  // Only its end waits for that. Tried: changes share it, and a host that ends was released before. A hook may shut down
+  // the host, which takes these locks the other way round.
   if (host_ != nullptr) use = host_->use();
   return host_;
 }
@@ -211,15 +228,19 @@ void Architecture::connect(const std::string& component, const std::string& port
 }
 
 void Architecture::publish(const std::string& name) {
-  const std::lock_guard change(change_lock_);
+  const auto change = change_lock_.join_alone();
   prepare_outward(resource(name), TopicBinding::publish);
-  const std::lock_guard gate(commit_gate_.mutex);
-  commit_gate_.restructured();
+  note_restructured();
 }
 
 void Architecture::subscribe(const std::string& name) {
-  const std::lock_guard change(change_lock_);
+  const auto change = change_lock_.join_alone();
   resource(name).bind_input();
+  note_restructured();
+}
+
+void Architecture::note_restructured() noexcept {
+  const std::lock_guard structural(commit_gate_.structural);
   const std::lock_guard gate(commit_gate_.mutex);
   commit_gate_.restructured();
 }

@@ -61,8 +61,9 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
 void Draft::claim(const std::shared_ptr<Component>& component) {
   claimed_.reserve(claimed_.size() + 1);
   const std::lock_guard gate(architecture_.commit_gate().mutex);
+  const ChangeMark& mark = component->change_mark();
   // A thread that was left behind takes no change any more: what comes now removes its component.
-  if (component->change_mark().is_unsettled() && !component->task().is_left_behind()) {
+  if (mark.is_claimed() || (mark.is_unsettled() && !component->task().is_left_behind())) {
     throw Error(ErrorCode::wrong_revision, "an earlier change of the component is not completed yet",
                 {.component = component->name(), .remedy = "look at it again, then decide again"});
   }
@@ -70,10 +71,16 @@ void Draft::claim(const std::shared_ptr<Component>& component) {
   claimed_.push_back(component);
 }
 
-void Draft::release(bool changed) noexcept {
+void Draft::set_changed() noexcept {
+  const std::lock_guard gate(architecture_.commit_gate().mutex);
+  for (const auto& component : claimed_) component->change_mark().set_changed();
+  if (is_structural()) architecture_.commit_gate().restructured();
+}
+
+void Draft::release() noexcept {
   if (claimed_.empty()) return;
   const std::lock_guard gate(architecture_.commit_gate().mutex);
-  for (const auto& component : claimed_) component->change_mark().release(changed);
+  for (const auto& component : claimed_) component->change_mark().release();
   claimed_.clear();
 }
 
@@ -81,7 +88,7 @@ std::vector<std::shared_ptr<Component>> Draft::release_unsettled() noexcept {
   const std::lock_guard gate(architecture_.commit_gate().mutex);
   for (const auto& component : claimed_) {
     component->change_mark().unsettle();
-    component->change_mark().release(true);
+    component->change_mark().release();
   }
   return std::exchange(claimed_, {});
 }
@@ -89,8 +96,7 @@ std::vector<std::shared_ptr<Component>> Draft::release_unsettled() noexcept {
 bool Draft::is_structural() const noexcept {
   if (!removed_components_.empty() || !resources_.empty() || !removed_resources_.empty()) return true;
   return std::any_of(components_.begin(), components_.end(), [](const DraftComponent& component) {
-    return component.is_added || component.shell_step != 0 || component.fsm_step != 0 ||
-           component.wires != component.wires_before;
+    return component.is_added || component.shell_step != 0 || component.wires != component.wires_before;
   });
 }
 
@@ -147,7 +153,8 @@ Resource& Draft::resource(const std::string& name) {
 
 DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
   check_name("component", name);
-  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
+  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr) ||
+      architecture_.has_open_addition(name))
     throw_taken("component", name);
   DraftComponent added;
   added.component = architecture_.make_unlisted(name);
@@ -176,7 +183,7 @@ void Draft::remove_component(const std::string& name) {
 
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic) {
   check_name("resource", name);
-  if (find_resource(name) != nullptr) throw_taken("resource", name);
+  if (find_resource(name) != nullptr || architecture_.has_open_addition(name)) throw_taken("resource", name);
   resource->set_name(name);
   architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});
@@ -194,7 +201,8 @@ std::vector<std::string> Draft::ports_of(const Resource& resource) const {
   for (const DraftComponent& component : components_) look(component);
   for (const auto& component : architecture_.components()) {
     if (by_name_.contains(component->name()) || is_removed(component->name())) continue;
-    const std::lock_guard gate(architecture_.commit_gate().mutex);  // it is not claimed
+    const std::lock_guard structural(
+        architecture_.commit_gate().structural);  // a prepared commit may wire it
     look(present(component));
   }
   return ports;

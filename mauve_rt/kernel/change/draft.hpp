@@ -85,11 +85,11 @@ struct DraftResource {
 };
 
 /// An overlay of an architecture: what the steps touch of it, and nothing else, however large it is. Nothing of it is in
-/// force. Ordinary threads, the architecture's change lock held.
+/// force. Ordinary threads, the architecture's change lock held while steps enter and finish() checks.
 class Draft {
  public:
   Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {}
-  ~Draft() { release(false); }
+  ~Draft() { release(); }
   Draft(const Draft&) = delete;
   Draft& operator=(const Draft&) = delete;
 
@@ -101,12 +101,14 @@ class Draft {
   void begin(int step) noexcept { step_ = step; }
   int step() const noexcept { return step_; }
 
-  /// Every component that was there before and is touched is claimed until then: no prepared commit changes it.
-  void release(bool changed) noexcept;
-  /// The change is made, and a late component has not taken it yet: no change claims these until they are settled.
+  /// The change is made. CommitGate::structural held where the draft is structural.
+  void set_changed() noexcept;
+  /// Every component that was there before and is touched is claimed until then: no other change is about it.
+  void release() noexcept;
+  /// The same where a late component has not taken the change yet: no change claims these until they are settled.
   std::vector<std::shared_ptr<Component>> release_unsettled() noexcept;
   const std::vector<std::shared_ptr<Component>>& claimed() const noexcept { return claimed_; }
-  /// Whether it adds or removes something, wires a port, or replaces a shell or an fsm.
+  /// Whether it adds or removes something, wires a port, or replaces a shell: of such changes one at a time is made.
   bool is_structural() const noexcept;
 
   /// Marks it as touched by this step. Throws Error: unknown_component.

@@ -280,10 +280,14 @@ void TransactionCommit::Work::discard() noexcept {
   for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);
   for (const auto& resource : prepared_resources_) resource->cleanup();
-  // Of a prepared one others may have taken numbers since.
+  // Others may have taken numbers since the draft was finished.
   if (numbers_after_ == 0 || architecture_.numbers() == numbers_after_)
     architecture_.give_back_numbers(numbers_before_);
-  if (draft_ != nullptr) draft_->release(!configured_anew_.empty());
+  if (draft_ != nullptr) {
+    if (!configured_anew_.empty()) draft_->set_changed();
+    draft_->release();
+  }
+  release_whole();
 }
 
 }  // namespace mauve

@@ -44,10 +44,10 @@ std::size_t allocated_bytes() noexcept {
 /// | ---------- | --------------------------------------- | ------------- | -------------------------------------------- |
 /// | the rest   | [setup]                                 | anyone        | -                                            |
 /// | used       | who commits first                       | anyone        | acq_rel: one commits                         |
-/// | phase      | who commits; then who holds the change lock | both      | release/acquire: hands over the work         |
+/// | phase      | who commits, first under the gate; then who holds the change lock | both | release/acquire: hands over the work |
 /// | outcome    | who commits                             | who completes | relaxed: phase, or its caller, hands it over |
 /// | is_dropped | who holds the change lock, under the gate | anyone      | release/acquire                              |
-/// | work       | who commits, under the gate while it is current; else who holds the change lock | the same | phase, is_dropped |
+/// | work       | who commits; else who holds the change lock | the same  | phase: committing; is_dropped                |
 /// | failure    | who holds the change lock               | the same      | -                                            |
 class PreparedTransaction::State {
  public:
@@ -57,21 +57,43 @@ class PreparedTransaction::State {
         deployment(its_host.deployments()),
         work(std::make_shared<TransactionCommit::Work>(its_architecture, &its_host, options)) {}
 
-  /// Once false, false for ever, but for a change under way that is refused.
-  bool is_untouched() const MAUVE_RT {
+  /// Once false, false for ever. A change that is under way may still be refused.
+  bool is_unchanged() const MAUVE_RT {
     if (basis.is_structural && architecture.commit_gate().structure() != basis.structure) return false;
     return std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
-      return touched.component->change_mark().count() == touched.count;
+      return touched.component->change_mark().changes() == touched.changes;
     });
   }
   bool is_current() const MAUVE_RT {
     if (is_dropped.load(std::memory_order_acquire)) return false;
     if (!host.is_deployed() || host.deployments() != deployment) return false;
-    return is_untouched() && std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
-             return touched.component->task().state() == touched.state;
+    return is_unchanged() && std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
+             return touched.component->task().state() == touched.state &&
+                    !touched.component->change_mark().is_claimed();
            });
   }
-  /// The gate held, all current.
+  /// Claims all; false when what it was prepared against has changed, or is being changed. CommitGate::structural held where it
+  /// is structural.
+  bool begin() noexcept {
+    const std::lock_guard gate(architecture.commit_gate().mutex);
+    if (!is_current()) return false;
+    for (const auto& touched : basis.touched) touched.component->change_mark().claim();
+    phase.store(kCommitting, std::memory_order_release);
+    return true;
+  }
+  void end(bool is_made) noexcept {
+    const std::lock_guard gate(architecture.commit_gate().mutex);
+    for (const auto& touched : basis.touched) {
+      ChangeMark& mark = touched.component->change_mark();
+      if (is_made) {
+        mark.set_changed();
+        mark.unsettle();
+      }
+      mark.release();
+    }
+    if (is_made && basis.is_structural) architecture.commit_gate().restructured();
+    phase.store(is_made ? kCommitted : kNotMade, std::memory_order_release);
+  }
   PreparedOutcome commit(time_ns_t until_ns) noexcept {
     using Outcome = Commit::Outcome;
     switch (work->commit_prepared(until_ns)) {
@@ -86,8 +108,6 @@ class PreparedTransaction::State {
       case Outcome::off:
         return PreparedOutcome::withdrawn;
     }
-    for (const auto& touched : basis.touched) touched.component->change_mark().commit();
-    if (basis.is_structural) architecture.commit_gate().restructured();
     return PreparedOutcome::committed;
   }
 
@@ -99,7 +119,9 @@ class PreparedTransaction::State {
   time_ns_t phase_ns{0};
   std::size_t memory_bytes{0};
 
-  enum Phase : std::uint8_t { kReady, kCommitted, kNotMade, kSettled };
+  UrgentCommit urgent{};
+
+  enum Phase : std::uint8_t { kReady, kCommitting, kCommitted, kNotMade, kSettled };
   std::atomic<bool> used{false};
   std::atomic<Phase> phase{kReady};
   std::atomic<PreparedOutcome> outcome{PreparedOutcome::stale};
@@ -110,11 +132,14 @@ class PreparedTransaction::State {
 PreparedTransaction::PreparedTransaction(Architecture& architecture, Runner& host, Transaction transaction,
                                          const TransactionOptions& options) {
   const std::lock_guard change(architecture.change_lock());
-  const std::unique_lock<std::mutex> use = host.use();
+  const auto use = host.use();
   const std::size_t before = allocated_bytes();
   state_ = std::make_unique<State>(architecture, host, options);
   state_->phase_ns = options.timeouts.phase_ns;
   state_->basis = state_->work->prepare_for_later(std::move(transaction));
+  state_->urgent.is_structural = state_->basis.is_structural;
+  for (const auto& touched : state_->basis.touched)
+    state_->urgent.tasks.push_back(&touched.component->task());
   architecture.enlist(*this);
   const std::size_t after = allocated_bytes();
   state_->memory_bytes = sizeof(*this) + sizeof(State) + (after > before ? after - before : 0);
@@ -141,21 +166,18 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
   State& state = *state_;
   if (state.used.exchange(true, std::memory_order_acq_rel)) return PreparedOutcome::stale;
   const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
-  CommitGate& commit_gate = state.architecture.commit_gate();
-  PiMutex& gate = commit_gate.mutex;
-  commit_gate.press();
-  const bool has_gate = gate.try_lock_until(until_ns);
-  commit_gate.relax();
+  CommitGate& gate = state.architecture.commit_gate();
+  gate.press(state.urgent);
+  const bool has_gate = !state.basis.is_structural || gate.structural.try_lock_until(until_ns);
+  gate.relax(state.urgent);
   PreparedOutcome outcome = PreparedOutcome::timed_out;
   if (has_gate) {
-    const bool is_current = state.is_current();
-    outcome = is_current ? state.commit(until_ns) : PreparedOutcome::stale;
-    if (!state.host.is_deployed() && outcome == PreparedOutcome::stale) outcome = PreparedOutcome::withdrawn;
-    state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: phase publishes it
-    const bool is_made = outcome == PreparedOutcome::committed;
-    if (is_made || is_current)  // else the work may be gone
-      state.phase.store(is_made ? State::kCommitted : State::kNotMade, std::memory_order_release);
-    gate.unlock();
+    outcome = state.host.is_deployed() ? PreparedOutcome::stale : PreparedOutcome::withdrawn;
+    const bool is_current = state.begin();
+    if (is_current) outcome = state.commit(until_ns);
+    state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: phase, or its caller, hands it on
+    if (is_current) state.end(outcome == PreparedOutcome::committed);
+    if (state.basis.is_structural) gate.structural.unlock();
   } else {
     state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: its caller hands it on
   }
@@ -184,11 +206,17 @@ void PreparedTransaction::drop_if_stale() noexcept {
   {
     const std::lock_guard gate(state_->architecture.commit_gate().mutex);
     const State::Phase phase = state_->phase.load(std::memory_order_acquire);
-    if (phase == State::kCommitted || phase == State::kSettled || state_->is_untouched()) return;
+    const bool is_in_use =
+        phase == State::kCommitting || phase == State::kCommitted || phase == State::kSettled;
+    if (is_in_use || state_->is_unchanged()) return;
     state_->is_dropped.store(true, std::memory_order_release);
   }
   note_failure();
   let_go();
+}
+
+bool PreparedTransaction::has_added(const std::string& name) const noexcept {
+  return state_->phase.load(std::memory_order_acquire) == State::kCommitted && state_->work->has_added(name);
 }
 
 /// The change lock held.

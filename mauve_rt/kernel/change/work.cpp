@@ -3,8 +3,6 @@
 #include "change/work.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "mauve_rt/architecture/runner.hpp"
 
@@ -28,6 +26,18 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
 
 void TransactionCommit::Work::begin(Transaction transaction) {
   transaction_ = std::move(transaction);
+  const time_ns_t patience_ns = is_simulated_ ? 0 : options_.timeouts.commit_ns;
+  architecture_.wait_for_earlier(patience_ns, [this] { return look_at_earlier(); });
+  claim_whole();
+  try {
+    begin_alone();
+  } catch (...) {
+    release_whole();
+    throw;
+  }
+}
+
+void TransactionCommit::Work::begin_alone() {
   if (const std::uint64_t revision = architecture_.revision();
       options_.expected_revision != 0 && options_.expected_revision != revision) {
     throw Error(ErrorCode::wrong_revision, "the architecture has changed since",
@@ -36,39 +46,62 @@ void TransactionCommit::Work::begin(Transaction transaction) {
                  .found = std::to_string(revision),
                  .remedy = "look at it again, then decide again"});
   }
-  {
-    const std::lock_guard gate(architecture_.commit_gate().mutex);
+  if (claimed_.structure) {
+    const std::lock_guard structural(
+        architecture_.commit_gate().structural);  // after a prepared one that is being made
     structure_ = architecture_.commit_gate().structure();
   }
-  wait_for_earlier();
   architecture_.reap();
   numbers_before_ = architecture_.numbers();
 }
 
-/// All that had been committed by then is completed. A late component that a step names is waited for.
-void TransactionCommit::Work::wait_for_earlier() {
-  constexpr std::chrono::milliseconds kBetweenLooks{1};
-  const time_ns_t until = later_by(monotonic_now_ns(), options_.timeouts.commit_ns);
-  architecture_.settle_changes();
-  while (is_waiting_for_earlier()) {
-    if (is_simulated_ || monotonic_now_ns() >= until) architecture_.throw_late(options_.timeouts.commit_ns);
-    std::this_thread::sleep_for(kBetweenLooks);
-    architecture_.settle_changes();
-  }
-}
-
-bool TransactionCommit::Work::is_waiting_for_earlier() const {
-  const auto is_late = [](const auto& component) {
-    return component->change_mark().is_unsettled() && !component->task().is_left_behind();
-  };
+/// The changes of what this one is about: those under way, and those that a late component has not taken yet.
+EarlierChange TransactionCommit::Work::look_at_earlier() const {
+  const ArchitectureClaims& claims = architecture_.claims();
+  if ((claims.structure && is_structural()) || (claims.revision && options_.expected_revision != 0))
+    return EarlierChange::under_way;
   const auto& steps = transaction_.steps();
+  const auto is_named = [&steps](const Component& component) {
+    return std::any_of(steps.begin(), steps.end(), [&component](const auto& step) {
+      return step->is_for_all() || step->component() == component.name();
+    });
+  };
   const auto components = architecture_.components();
   const std::lock_guard gate(architecture_.commit_gate().mutex);
-  return std::any_of(components.begin(), components.end(), [&](const auto& component) {
-    return is_late(component) && std::any_of(steps.begin(), steps.end(), [&](const auto& step) {
-             return step->is_for_all() || step->component() == component->name();
-           });
-  });
+  EarlierChange found = EarlierChange::none;
+  for (const auto& component : components) {
+    const ChangeMark& mark = component->change_mark();
+    const bool is_late = mark.is_unsettled() && !component->task().is_left_behind();
+    if ((!mark.is_claimed() && !is_late) || !is_named(*component)) continue;
+    if (mark.is_claimed()) return EarlierChange::under_way;
+    found = EarlierChange::late;
+  }
+  return found;
+}
+
+bool TransactionCommit::Work::is_structural() const noexcept {
+  const auto& steps = transaction_.steps();
+  return std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step->is_structural(); });
+}
+
+void TransactionCommit::Work::claim_whole() noexcept {
+  claimed_ = {.structure = is_structural(), .revision = options_.expected_revision != 0};
+  architecture_.claims().structure |= claimed_.structure;
+  architecture_.claims().revision |= claimed_.revision;
+}
+
+void TransactionCommit::Work::release_whole() noexcept {
+  if (claimed_.structure) architecture_.claims().structure = false;
+  if (claimed_.revision) architecture_.claims().revision = false;
+  claimed_ = {};
+}
+
+/// Others go on while this change prepares its parts and waits for its components. Not where nobody waits for a component, and
+/// not where all components have a part.
+std::unique_ptr<ChangeLock::Pause> TransactionCommit::Work::let_others_in() {
+  numbers_after_ = architecture_.numbers();
+  if (!deployed_ || is_simulated_ || draft_->resynchronise_step() != 0) return nullptr;
+  return std::make_unique<ChangeLock::Pause>(architecture_.change_lock());
 }
 
 void TransactionCommit::Work::make(Transaction transaction) {
@@ -76,19 +109,23 @@ void TransactionCommit::Work::make(Transaction transaction) {
   begin(std::move(transaction));
   try {
     draft_steps();
+    const auto pause = let_others_in();
     prepare();
     prepare_ns_ = monotonic_now_ns() - began;
-    if (options_.dry_run) return discard();
-    require_host_open();
-    gather();
-    commit_by_force_if_asked();
+    if (!options_.dry_run) {
+      require_host_open();
+      gather();
+      commit_by_force_if_asked();
+    }
   } catch (...) {
     discard();
     throw;
   }
+  if (options_.dry_run) return discard();
   set_epoch();
   if (commit_->has_passed()) return finish();
   keep_open(draft_->release_unsettled());
+  release_whole();
 }
 
 bool TransactionCommit::Work::wait_passed(time_ns_t until_ns) const noexcept {
@@ -120,12 +157,21 @@ const Task* TransactionCommit::Work::Late::find_late() const noexcept {
   return nullptr;
 }
 
+bool TransactionCommit::Work::has_added(const std::string& name) const noexcept {
+  const auto& resources = draft_->resources();
+  const DraftComponent* component = draft_->find(name);
+  return (component != nullptr && component->is_added) ||
+         std::any_of(resources.begin(), resources.end(),
+                     [&name](const DraftResource& added) { return added.name() == name; });
+}
+
 void TransactionCommit::Work::finish() {
   publish();
   architecture_.drop_stale_prepared();  // they refer to what goes now
   settle_with_host();
   retire();
-  draft_->release(true);
+  draft_->release();
+  release_whole();
   keep_for_report();
 }
 
@@ -160,15 +206,17 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
   try {
     draft_steps();
     require_preparable();
-    prepare();
+    {
+      const auto pause = let_others_in();
+      prepare();
+    }
     in_reach_ = architecture_.resources();
     gather();
     require_host_open();
-    numbers_after_ = architecture_.numbers();
     basis.is_structural = draft_->is_structural();
     basis.structure = structure_;
     for (const auto& component : draft_->claimed())
-      basis.touched.push_back({.component = component, .count = 0, .state = {}});
+      basis.touched.push_back({.component = component, .changes = 0, .state = {}});
     const auto found = [&](std::list<DraftComponent>& components) {
       for (const DraftComponent& component : components) {
         for (Basis::Touched& touched : basis.touched) {
@@ -178,8 +226,10 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     };
     found(draft_->components());
     found(draft_->removed_components());
-    draft_->release(false);
-    for (Basis::Touched& touched : basis.touched) touched.count = touched.component->change_mark().count();
+    for (Basis::Touched& touched : basis.touched)
+      touched.changes = touched.component->change_mark().changes();
+    draft_->release();
+    release_whole();
   } catch (...) {
     discard();
     throw;
@@ -270,6 +320,7 @@ void TransactionCommit::Work::gather() {
   touched_.clear();
   for (const Change& change : changes_) touched_.push_back(change.draft->component);
   commit_->assign_actions();
+  if (draft_->is_structural()) commit_->set_structural();
 }
 
 void TransactionCommit::Work::commit_by_force_if_asked() {
@@ -327,19 +378,22 @@ bool TransactionCommit::Work::stop_by_force(const Change& change) {
 
 void TransactionCommit::Work::carry_out_commit() {
   CommitGate& gate = architecture_.commit_gate();
-  const std::lock_guard passing(gate.mutex);
-  require_same_structure();
+  std::unique_lock structural(gate.structural, std::defer_lock);
+  if (draft_->is_structural()) {
+    structural.lock();
+    require_same_structure();
+  }
   if (!changes_.empty()) {
     commit_->set_yields();
     committed_ = commit_->carry_out(options_.timeouts.commit_ns, gate) == Commit::Outcome::made;
     if (!committed_) throw_not_made();
   }
-  if (draft_->is_structural()) gate.restructured();
+  draft_->set_changed();
 }
 
 /// A prepared commit that came while this change was being prepared; of what it touches it is kept off otherwise.
 void TransactionCommit::Work::require_same_structure() const {
-  if (!draft_->is_structural() || architecture_.commit_gate().structure() == structure_) return;
+  if (architecture_.commit_gate().structure() == structure_) return;
   throw Error(ErrorCode::wrong_revision,
               "a prepared change of what there is, or of its wiring, came meanwhile; nothing was changed",
               {.remedy = "look at the architecture again, then decide again"});

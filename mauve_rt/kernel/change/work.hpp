@@ -28,7 +28,7 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   struct Basis {
     struct Touched {
       std::shared_ptr<Component> component;
-      std::uint32_t count;
+      std::uint32_t changes;
       ComponentState state;
     };
     std::vector<Touched> touched{};
@@ -37,12 +37,14 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   };
   /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
   Basis prepare_for_later(Transaction transaction);
-  /// The gate of commits held, the basis checked. [rt] as far as the actions are.
+  /// All components of the basis claimed, the basis checked. [rt] as far as the actions are.
   Commit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
   /// Sleeps until all components have taken the change that was committed, at most until the instant. [non-rt]
   bool wait_passed(time_ns_t until_ns) const noexcept;
   /// Has the architecture complete a prepared change that was committed. [non-rt], the change lock held.
   void keep_open(std::vector<std::shared_ptr<Component>> unsettled);
+  /// Whether it adds a component or resource of that name. [non-rt], before it is completed.
+  bool has_added(const std::string& name) const noexcept;
   /// What follows the commit, once all components have taken the change. [non-rt], the change lock held.
   void settle_committed();
   /// Throws why it was not made. [non-rt]
@@ -60,6 +62,12 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
 
   // draft
   void begin(Transaction transaction);
+  void begin_alone();
+  EarlierChange look_at_earlier() const;
+  bool is_structural() const noexcept;
+  void claim_whole() noexcept;
+  void release_whole() noexcept;
+  [[nodiscard]] std::unique_ptr<ChangeLock::Pause> let_others_in();
   void draft_steps();
   void require_preparable() const;
   // prepare
@@ -82,8 +90,6 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   bool force_hung();
   bool stop_by_force(const Change& change);
   void carry_out_commit();
-  void wait_for_earlier();
-  bool is_waiting_for_earlier() const;
   void require_same_structure() const;
   void finish();
   void require_host_open() const;
@@ -115,7 +121,8 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   Transaction transaction_;
   std::size_t numbers_before_{0};
   std::size_t numbers_after_{0};
-  std::uint32_t structure_{0};                       // as it was when this began to look
+  ArchitectureClaims claimed_{};
+  std::uint32_t structure_{0};                       // of a structural one: as it was when this began to look
   std::vector<std::shared_ptr<Resource>> in_reach_;  // of a prepared one: outlive what refers to them
   std::unique_ptr<Draft> draft_;
 
@@ -150,6 +157,7 @@ class TransactionCommit::Work::Late final : public OpenChange {
       : work_(std::move(work)), unsettled_(std::move(unsettled)) {}
   bool settle() noexcept override;
   const Task* find_late() const noexcept override;
+  bool has_added(const std::string& name) const noexcept override { return work_->has_added(name); }
 
  private:
   std::shared_ptr<Work> work_;

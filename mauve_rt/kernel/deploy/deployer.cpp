@@ -60,7 +60,8 @@ void Deployer::prepare_process() {
 }
 
 void Deployer::deploy() {
-  const std::lock_guard change(architecture().change_lock());
+  architecture().change_lock().lock_alone();
+  const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
   architecture().settle_changes();
   const std::lock_guard life(life_mutex_);
   require_deployable();

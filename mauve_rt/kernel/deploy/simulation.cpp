@@ -154,7 +154,7 @@ SimulatedHost::SimulatedHost(Simulation& simulation, Architecture& architecture)
 SimulatedHost::~SimulatedHost() { shutdown(); }
 
 void SimulatedHost::join() {
-  const auto change = architecture().change_lock().join();
+  const auto change = architecture().change_lock().join_alone();
   require_deployable();
   const std::size_t stack_bytes = own_stack_bytes();
   for (const auto& component : architecture().components()) {
@@ -169,7 +169,8 @@ void SimulatedHost::join() {
 }
 
 void SimulatedHost::deploy() {
-  const std::lock_guard change(architecture().change_lock());
+  architecture().change_lock().lock_alone();
+  const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
   if (architecture().host() != this) join();  // it was shut down
   require_deployable();
   if (simulation_.epoch_ns_ == 0) return simulation_.deploy();
@@ -177,7 +178,7 @@ void SimulatedHost::deploy() {
 }
 
 void SimulatedHost::begin(time_ns_t epoch_ns) {
-  const auto change = architecture().change_lock().join();
+  const auto change = architecture().change_lock().join_alone();
   architecture().settle_changes();
   for (const auto& component : architecture().components()) attach(component->task());
   start_all(epoch_ns);

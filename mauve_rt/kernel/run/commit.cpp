@@ -48,6 +48,11 @@ void Commit::assign_actions() {
             [](const Participant* a, const Participant* b) { return a->task->number() < b->task->number(); });
 }
 
+bool Commit::is_about(const Task& task) const noexcept {
+  return std::any_of(order_.begin(), order_.end(),
+                     [&task](const Participant* participant) { return participant->task == &task; });
+}
+
 // ---- participants
 
 bool Commit::adopt(Participant& participant) noexcept {
@@ -85,14 +90,13 @@ void Commit::refuse(const Participant* participant, const CommitAction& action, 
   call_off(Off::withdrawn, participant != nullptr ? participant->task : nullptr);
 }
 
-void Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
+bool Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
   const CutWord seen = cut_.raise(entered_ns);
   participant.has_voted = true;
   participant.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
-  if (seen.is_off()) return;
-  if (to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+  if (seen.is_off() || to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return false;
   cut_.close();
-  decided();
+  return true;
 }
 
 time_ns_t Commit::take(Participant& participant) noexcept {
@@ -119,15 +123,21 @@ void Commit::pass(Participant& participant) noexcept {
 }
 
 bool Commit::call_off(Off why, const Task* by) noexcept {
+  const bool is_off = call_off_quietly(why, by);
+  if (is_off) wake_requester();
+  return is_off;
+}
+
+bool Commit::call_off_quietly(Off why, const Task* by) noexcept {
   Off none = Off::not_yet;
   // relaxed: the cut's exchange publishes it
   if (off_.compare_exchange_strong(none, why, std::memory_order_relaxed))
     off_by_.store(by, std::memory_order_relaxed);
-  if (cut_.call_off()) decided();
+  cut_.call_off();
   return cut_.look().is_off();
 }
 
-void Commit::decided() noexcept {
+void Commit::wake_requester() noexcept {
   decided_.store(1, std::memory_order_release);
   futex_wake_all(decided_);
 }
@@ -155,7 +165,7 @@ Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexce
     visit_simulated();
     await_decision(until);
   }
-  gate.end();
+  gate.end(*this);
   if (is_made()) {
     complete(until);
   } else {

@@ -2,8 +2,6 @@
 #include "mauve_rt/run/component.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/error.hpp"
@@ -20,7 +18,6 @@ namespace {
 constexpr time_ns_t kShortestUndeclaredPeriod = us_to_ns(100);
 /// How long a command waits for a component that is late to take an earlier change.
 constexpr time_ns_t kEarlierChange = s_to_ns(1);
-constexpr std::chrono::milliseconds kBetweenLooks{1};
 
 }  // namespace
 
@@ -39,30 +36,26 @@ void Component::set_architecture(Architecture* architecture) noexcept {
 
 class Component::JoinedChange {
  public:
-  JoinedChange(Architecture* architecture, const Task& component, ChangeMark& mark) {
+  JoinedChange(Architecture* architecture, ChangeMark& mark) {
     if (architecture == nullptr) return;
     lock_ = architecture->change_lock().join();
     if (!lock_.owns_lock()) return;  // a part of a change, which has claimed what it touches
-    const time_ns_t until = later_by(monotonic_now_ns(), kEarlierChange);
-    std::unique_lock gate(architecture->commit_gate().mutex, std::defer_lock);
-    for (;;) {
-      architecture->settle_changes();
-      gate.lock();
-      if (!mark.is_unsettled()) break;
-      gate.unlock();
-      if (monotonic_now_ns() >= until)
-        component.throw_state_running("the component has not taken an earlier change yet", kEarlierChange,
-                                      "try again when its state has ended");
-      std::this_thread::sleep_for(kBetweenLooks);
-    }
-    mark.claim();
-    gate_ = &architecture->commit_gate();
+    CommitGate& commits = architecture->commit_gate();
+    architecture->wait_for_earlier(kEarlierChange, [&] {
+      const std::lock_guard gate(commits.mutex);
+      if (mark.is_claimed()) return EarlierChange::under_way;
+      if (mark.is_unsettled()) return EarlierChange::late;
+      mark.claim();
+      return EarlierChange::none;
+    });
+    gate_ = &commits;
     mark_ = &mark;
   }
   ~JoinedChange() {
     if (mark_ == nullptr) return;
     const std::lock_guard gate(gate_->mutex);
-    mark_->release(true);
+    mark_->set_changed();
+    mark_->release();
   }
   JoinedChange(const JoinedChange&) = delete;
   JoinedChange& operator=(const JoinedChange&) = delete;
@@ -74,7 +67,7 @@ class Component::JoinedChange {
 };
 
 Component::JoinedChange Component::join_change() {
-  return {architecture_.load(std::memory_order_acquire), task_, change_mark_};
+  return {architecture_.load(std::memory_order_acquire), change_mark_};
 }
 
 Architecture& Component::require_listed() const {

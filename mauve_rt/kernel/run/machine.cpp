@@ -257,7 +257,7 @@ time_ns_t Machine::earliest_excess_ns() const noexcept {
 std::int64_t Machine::skip_lost(time_ns_t since_ns, time_ns_t now_ns) noexcept {
   const time_ns_t period = grid().period_ns;
   const time_ns_t late = now_ns - clock_ns();
-  if (!event_settled_ || period == 0 || late < period || since_ns > clock_ns()) return 0;
+  if (!event_settled_ || period == 0 || late < period || since_ns - clock_ns() >= period) return 0;
   const std::int64_t lost = (late + period - 1) / period;
   set_clock_ns(clock_ns() + lost * period);
   return lost;

@@ -152,6 +152,7 @@ void Task::simulate(const Clock& clock, bool trace) {
 void Task::end_simulation() noexcept {
   if (!simulated_) return;
   settle_slot(true);
+  release_withdrawn();
   clock().leave(*this);
   simulated_ = false;
   machine_.set_clock(MonotonicClock::instance());

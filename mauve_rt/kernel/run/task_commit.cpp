@@ -99,6 +99,7 @@ Task::Visit Task::visit_slot() noexcept {
   Participant& participant = *participant_;
   if (participant.in_flight && !machine_.is_started()) {  // posted just before the park
     end_slot(participant);
+    release_withdrawn();
     return Visit::goes_on;
   }
   const time_ns_t began = clock().now_ns();
@@ -122,6 +123,7 @@ Task::Visit Task::look_at_cut(Participant& participant, time_ns_t began_ns) noex
   } else {
     skip_lost(participant, began_ns);
   }
+  wake_if_decided(*participant.commit);
   leave_slot(seen.is_off() ? kEmpty : kPosted);
   return Visit::goes_on;
 }
@@ -184,13 +186,14 @@ bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
     return false;
   }
   if (was_parked) parked_.store(1, std::memory_order_seq_cst);
-  if (has_agreed) commit.vote(participant, machine_.entered_ns());
+  if (has_agreed) has_decided_ = commit.vote(participant, machine_.entered_ns());
   return true;
 }
 
 Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   Commit& commit = *participant.commit;
   if (!machine_.begin_execution(clock().now_ns(), kForever)) {
+    wake_if_decided(commit);
     leave_slot(kPosted);
     return Visit::condemned;
   }
@@ -222,9 +225,15 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   participant.resumes_ns = due_ns();
   if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
   if (stops && !is_condemned) park_stopped();
+  wake_if_decided(commit);
   pass(participant);
   if (is_condemned) return Visit::condemned;
   return stops ? Visit::parks : Visit::goes_on;
+}
+
+/// After its own take: the wake-up of an ordinary thread is no part of a component's blackout.
+void Task::wake_if_decided(Commit& commit) noexcept {
+  if (std::exchange(has_decided_, false)) commit.wake_requester();
 }
 
 void Task::pass(Participant& participant) noexcept {
@@ -292,7 +301,8 @@ void Task::skip_lost(Participant& participant, time_ns_t began_ns) noexcept {
 }
 
 /// On the way into a park, and to the thread's end: calls off a commit that is open, takes one that is made. One that was
-/// posted for a parked component stays, unless the thread ends. Whether it has taken one.
+/// posted for a parked component stays, unless the thread ends. Whether it has taken one. The slot of one that was called off
+/// stays busy until release_withdrawn().
 bool Task::settle_slot(bool ends) noexcept {
   if (!enter_slot()) return false;
   Participant& participant = *participant_;
@@ -303,8 +313,8 @@ bool Task::settle_slot(bool ends) noexcept {
 
 bool Task::end_slot(Participant& participant) noexcept {
   Commit& commit = *participant.commit;
-  if (commit.call_off(Commit::Off::withdrawn, this)) {
-    leave_slot(kEmpty);
+  if (commit.call_off_quietly(Commit::Off::withdrawn, this)) {
+    withdrawn_ = &participant;
     return false;
   }
   const bool was_started = machine_.is_started();
@@ -322,6 +332,13 @@ bool Task::end_slot(Participant& participant) noexcept {
   }
   pass(participant);
   return true;
+}
+
+/// Once the state is published: a stop does not wait for the requester of the change that it calls off.
+void Task::release_withdrawn() noexcept {
+  if (withdrawn_ == nullptr) return;
+  std::exchange(withdrawn_, nullptr)->commit->wake_requester();
+  leave_slot(kEmpty);
 }
 
 void Task::take_parked(Participant& participant) noexcept {

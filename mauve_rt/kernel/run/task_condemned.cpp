@@ -93,6 +93,7 @@ void Task::park_condemned() noexcept {
   }
   machine_.park();  // removed meanwhile: kExit is set, and nobody is to hear of it
   parked_.store(1, std::memory_order_release);
+  release_withdrawn();
 }
 
 void Task::take_back_outputs() noexcept {

@@ -180,6 +180,7 @@ void Task::end_in_fault() noexcept {
   // Not parked in between: nobody may take parts away that are put in this moment.
   publish_state(ComponentState::faulted);
   settle_slot();
+  release_withdrawn();
   fall_back(*fallback);
 }
 
@@ -198,6 +199,7 @@ void Task::park(ComponentState state) noexcept {
   parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
   settle_slot();  // last: who is refused finds the state that tells why
+  release_withdrawn();
 }
 
 void Task::publish_state(ComponentState state) noexcept {

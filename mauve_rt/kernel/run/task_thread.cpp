@@ -108,6 +108,7 @@ void Task::thread_main() noexcept {
   // seq_cst: a commit posted this moment is found here, or post() finds that the thread has ended
   ended_.store(1, std::memory_order_seq_cst);
   settle_slot(true);
+  release_withdrawn();
   futex_wake_all(ended_);
 }
 

@@ -100,6 +100,8 @@ TYPED_TEST(Prepared, IsCurrentWhileOthersAreChanged) {
 TYPED_TEST(Prepared, OfStructureIsStaleOnceTheStructureChanged) {
   auto prepared = this->prepare(Transaction().add_component("new", new_parts()));
   this->commit(Transaction().replace_fsm("b", "t/Syncopated"));
+  EXPECT_TRUE(prepared->is_current()) << "an fsm is nothing but its component's";
+  this->commit(Transaction().replace_shell("b", "t/WideShell"));
   EXPECT_EQ(PreparedOutcome::stale, prepared->commit(kTimeout));
 }
 
@@ -212,32 +214,6 @@ TYPED_TEST(Prepared, ItsCommitAllocatesNothing) {
 
 // ---- on threads
 
-struct Doors {
-  std::atomic<bool> entered{false};
-  std::atomic<bool> open{false};
-  void pass() {
-    entered = true;
-    while (!open) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-};
-struct HangingCore : TestCore {
-  explicit HangingCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
-  bool configure_hook() override {
-    doors->pass();
-    return true;
-  }
-  std::shared_ptr<Doors> doors;  // its thread may end after the test
-};
-/// In a long state, so that a commit waits for it.
-struct BusyCore : TestCore {
-  explicit BusyCore(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
-  void act() override {
-    TestCore::act();
-    doors->pass();
-  }
-  std::shared_ptr<Doors> doors;
-};
-
 class PreparedBeside : public Prepared<OnThreads> {};
 
 TEST_F(PreparedBeside, ItWaitsForNoPreparation) {
@@ -261,8 +237,8 @@ TEST_F(PreparedBeside, ItWaitsForNoPreparation) {
 TEST_F(PreparedBeside, AnOrdinaryChangeOfWhatItChangedMeanwhileIsRefused) {
   const auto doors = std::make_shared<Doors>();
   Transaction later;
-  later.replace_core("b", std::make_unique<HangingCore>(doors)).replace_fsm("b", "t/Syncopated");
-  auto structural = prepare(Transaction().replace_fsm("a", "t/Syncopated"));
+  later.replace_core("b", std::make_unique<HangingCore>(doors)).replace_shell("b", "t/WideShell");
+  auto structural = prepare(Transaction().replace_shell("a", "t/WideShell"));
   auto change = std::async(std::launch::async, [&] { return refusal([&] { commit(later); }); });
   wait_until([&] { return doors->entered.load(); }, "the hook");
   EXPECT_EQ(PreparedOutcome::committed, structural->commit(kTimeout));
@@ -272,22 +248,37 @@ TEST_F(PreparedBeside, AnOrdinaryChangeOfWhatItChangedMeanwhileIsRefused) {
   structural->complete();
 }
 
-TEST_F(PreparedBeside, AnOrdinaryCommitUnderWayGivesWay) {
+TEST_F(PreparedBeside, AnOrdinaryCommitInItsWayIsCalledOff) {
   const auto doors = std::make_shared<Doors>();
   commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
   wait_until([&] { return doors->entered.load(); }, "the long state");
-  auto prepared = gain("a", 3.0);
+  auto prepared = prepare(Transaction().replace_shell("a", "t/WideShell"));
   auto change = std::async(std::launch::async, [&] {
-    return refusal([&] { commit(Transaction().set_property("b", "gain", 2.0)); });
+    return refusal([&] { commit(Transaction().replace_shell("b", "t/WideShell")); });
   });
   std::this_thread::sleep_for(
-      std::chrono::milliseconds(100));  // it waits at the gate by then; else it does later
-  EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
+      std::chrono::milliseconds(100));  // it waits for the long state by then; else it does later
+  EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout)) << "both change the structure";
   EXPECT_FALSE(doors->open) << "the other waits still";
   doors->open = true;
   const Error error = change.get();
   EXPECT_EQ(ErrorCode::wrong_revision, error.code()) << error.what();
-  EXPECT_EQ(PropertyValue(1.0), gain_of("b"));
+  prepared->complete();
+}
+
+TEST_F(PreparedBeside, AnOrdinaryCommitOfOtherComponentsGoesOn) {
+  const auto doors = std::make_shared<Doors>();
+  commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
+  wait_until([&] { return doors->entered.load(); }, "the long state");
+  auto prepared = gain("a", 3.0);
+  auto change = std::async(std::launch::async, [&] { commit(Transaction().set_property("b", "gain", 2.0)); });
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(100));  // it waits for the long state by then; else it does later
+  EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
+  EXPECT_EQ(PropertyValue(3.0), gain_of("a"));
+  doors->open = true;
+  EXPECT_NO_THROW(change.get());
+  EXPECT_EQ(PropertyValue(2.0), gain_of("b"));
   prepared->complete();
 }
 

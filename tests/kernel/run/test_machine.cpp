@@ -163,8 +163,9 @@ TEST_F(MachineByHand, SkipsTheInstantsThatPassedInAChange) {
   step();
   ASSERT_EQ(kPeriod, machine.due_ns());
   EXPECT_EQ(0, machine.skip_lost(ms_to_ns(5), ms_to_ns(15))) << "late by less than a period";
-  EXPECT_EQ(0, machine.skip_lost(ms_to_ns(11), ms_to_ns(31))) << "it was late before the change";
-  EXPECT_EQ(3, machine.skip_lost(ms_to_ns(5), ms_to_ns(31)));
+  EXPECT_EQ(0, machine.skip_lost(ms_to_ns(20), ms_to_ns(31))) << "it had an overrun before the change";
+  EXPECT_EQ(0, machine.skip_lost(ms_to_ns(11), ms_to_ns(19))) << "late by less than a period";
+  EXPECT_EQ(3, machine.skip_lost(ms_to_ns(11), ms_to_ns(31))) << "the wait was over, and nothing else late";
   EXPECT_EQ(4 * kPeriod, machine.due_ns());
 }
 

@@ -452,6 +452,40 @@ TEST_F(Rule10Commit, ALateOneThatHangsCanBeRemovedByForce) {
   expect_going_on(*fast);
 }
 
+TEST_F(Rule10Commit, WhatALateOnesChangeAddsIsNotAddedTwice) {
+  deploy_two();
+  Transaction first = replace("fast", core_that_waits());
+  first.set_property("slow", "gain", 2.0)
+      .add_component("new",
+                     {.shell = std::make_unique<TestShell>(),
+                      .core = std::make_unique<TestCore>(),
+                      .fsm = std::make_unique<TestFsm>()},
+                     {})
+      .add_resource("data", std::make_unique<SharedData<Number>>());
+  make_it_late(std::move(first));
+  wait_ended();
+  EXPECT_EQ(nullptr, architecture.find_component("new")) << "the change is not completed";
+  Transaction component;
+  component.add_component("new",
+                          {.shell = std::make_unique<TestShell>(),
+                           .core = std::make_unique<TestCore>(),
+                           .fsm = std::make_unique<TestFsm>()},
+                          {});
+  Transaction resource;
+  resource.add_resource("data", std::make_unique<SharedData<Number>>());
+  for (Transaction* second : {&component, &resource}) {
+    const auto refused = error_of(std::move(*second), kPatient);
+    ASSERT_TRUE(refused);
+    EXPECT_EQ(ErrorCode::duplicate_name, refused->code()) << refused->what();
+  }
+  latch.open();
+  const auto is_there = [&] {
+    deployer.describe();  // completes it
+    return architecture.find_component("new") != nullptr;
+  };
+  wait_until(is_there, "the change to be completed");
+}
+
 template <typename Kind>
 class Rule10Floor : public Rule10Commit {};
 using Kinds = ::testing::Types<SharedData<Number>, LatestValue<Number>, RingBuffer<Number>>;

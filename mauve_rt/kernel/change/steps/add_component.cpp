@@ -21,6 +21,7 @@ Parts parts_of(const Draft& draft, NewComponent& wanted) {
 
 constexpr StepKind steps::add_component{
     .name = "add_component",
+    .is_structural = true,
     .words =
         [](const TransactionStep& step) {
           const auto* wanted = std::get_if<NewComponent>(&step.value);

@@ -7,6 +7,7 @@ namespace mauve {
 constexpr StepKind steps::add_resource{
     .name = "add_resource",
     .target = StepTarget::resource,
+    .is_structural = true,
     .words =
         [](const TransactionStep& step) {
           const auto* wanted = std::get_if<NewResource>(&step.value);

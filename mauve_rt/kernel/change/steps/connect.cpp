@@ -31,7 +31,10 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
 }  // namespace
 
 constexpr StepKind steps::connect{
-    .name = "connect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "connect",
+    .is_structural = true,
+    .words = element_words,
+    .draft = [](Draft& draft, TransactionStep& step) {
       const auto& value = plain_value_of<std::string>(step);
       const std::size_t dot = value.find('.');
       const std::string service = dot != std::string::npos ? value.substr(dot + 1) : "";

@@ -6,7 +6,10 @@
 namespace mauve {
 
 constexpr StepKind steps::disconnect{
-    .name = "disconnect", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "disconnect",
+    .is_structural = true,
+    .words = element_words,
+    .draft = [](Draft& draft, TransactionStep& step) {
       DraftComponent& component = draft.change(step.target);
       if (component.wires.erase(step.name) != 0) {
         component.disconnected.insert_or_assign(step.name, draft.step());

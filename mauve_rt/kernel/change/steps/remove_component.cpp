@@ -5,7 +5,8 @@
 namespace mauve {
 
 constexpr StepKind steps::remove_component{
-    .name = "remove_component",
-    .draft = [](Draft& draft, TransactionStep& step) { draft.remove_component(step.target); }};
+    .name = "remove_component", .is_structural = true, .draft = [](Draft& draft, TransactionStep& step) {
+      draft.remove_component(step.target);
+    }};
 
 }  // namespace mauve

@@ -5,7 +5,10 @@
 namespace mauve {
 
 constexpr StepKind steps::replace_shell{
-    .name = "replace_shell", .words = part_words<Shell>, .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "replace_shell",
+    .is_structural = true,
+    .words = part_words<Shell>,
+    .draft = [](Draft& draft, TransactionStep& step) {
       std::unique_ptr<Shell> shell = brings<Shell>(step) ? take(value_of<std::unique_ptr<Shell>>(step))
                                                          : draft.registry().make_shell(step.name);
       DraftComponent& changed = replacing(draft, step.target);

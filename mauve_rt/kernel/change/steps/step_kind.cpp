@@ -42,6 +42,8 @@ const std::string& TransactionStep::component() const noexcept {
 
 bool TransactionStep::is_for_all() const noexcept { return kind_.target == StepTarget::all; }
 
+bool TransactionStep::is_structural() const noexcept { return kind_.is_structural; }
+
 void TransactionStep::draft(Draft& draft) { kind_.draft(draft, *this); }
 
 Transaction& Transaction::add(const StepKind& kind, std::string target, std::string name, StepValue value) {

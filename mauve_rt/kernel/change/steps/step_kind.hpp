@@ -20,6 +20,8 @@ enum class StepTarget : std::uint8_t { component, resource, all };
 struct StepKind {
   std::string_view name;
   StepTarget target{StepTarget::component};
+  /// Whether it may make a draft structural: Draft::is_structural().
+  bool is_structural{false};
   /// "mapping.scan lidar.read": what follows the kind where a step is told.
   std::string (*words)(const TransactionStep& step) = [](const TransactionStep& step) { return step.target; };
   /// Checks the step and enters its effect into the draft; uses up the parts it was given. Throws Error.

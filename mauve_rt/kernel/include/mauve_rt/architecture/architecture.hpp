@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <string>
 #include <vector>
 
@@ -48,15 +50,29 @@ struct ListChange {
   std::vector<Component*> changed{};
 };
 
+/// What a change finds of those before it.
+enum class EarlierChange : std::uint8_t {
+  none,       // nothing that it would have to wait for
+  under_way,  // another change is being prepared or made
+  late,       // one is made, and a component has not taken it yet
+};
+
+/// Each is claimed by one change at a time.
+struct ArchitectureClaims {
+  bool structure{false};  // to add or remove something, or wire ports
+  bool revision{false};  // to be the only change since the revision that it expects, of those that expect one
+};
+
 /// Components and resources by name. All functions [non-rt] unless told. Every change is a transaction of one step or more, carried out
-/// by the host that runs the architecture, or by itself while nobody does; they are made one at a time.
+/// by the host that runs the architecture, or by itself while nobody does. Changes of different components of a deployed
+/// architecture are prepared and made in parallel, unless both add or remove something or wire ports.
 ///
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
 /// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
 /// | numbered_                       | who changes it        | changes | list_mutex_                    |
 /// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
-/// | prepared_, open_                | changes               | changes | change_lock_                   |
+/// | prepared_, open_, claims_       | changes               | changes | change_lock_                   |
 /// | has_open_                       | changes               | anyone  | relaxed: a hint                |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
 /// | retired_, finals_               | who removes, drains, records | same | trace_mutex_             |
@@ -74,7 +90,7 @@ class Architecture final : public Configurable {
   /// Cleans up all, in reverse order. [non-rt] Throws Error (already_running) when a component is not parked.
   void cleanup() override;
 
-  /// Carries out a transaction; one at a time. [non-rt]
+  /// Carries out a transaction. Waits for those under way that are about the same components. [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.
   TransactionReport commit(Transaction transaction, const TransactionOptions& options = {});
   /// The same up to the commit: what the releases that follow tell can be asked for later, with report(). [non-rt]
@@ -184,9 +200,9 @@ class Architecture final : public Configurable {
 
   // ---- for hosts
 
-  /// Under it all changes are made. [non-rt]
+  /// Under it changes are drafted and retired. [non-rt]
   ChangeLock& change_lock() noexcept { return change_lock_; }
-  /// Commits pass it one at a time; taken after the change lock. [rt]
+  /// Its mutexes are taken after the change lock. [rt]
   CommitGate& commit_gate() MAUVE_RT { return commit_gate_; }
   /// Who runs it; nullptr: nobody. [non-rt]
   Runner* host() const;
@@ -204,10 +220,19 @@ class Architecture final : public Configurable {
   void settle_if_idle() noexcept;
   /// Keeps a change that a late component has not taken yet. [non-rt], the change lock held.
   void keep_open(std::shared_ptr<OpenChange> change);
+  /// Completes what can be completed and lets other threads have the change lock until the look finds nothing to wait for. A
+  /// change under way is waited for without limit, a late component for so long. [non-rt], the change lock held. Throws as
+  /// throw_late().
+  void wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look);
+  /// What changes under way have claimed beside components. [non-rt], the change lock held.
+  ArchitectureClaims& claims() noexcept { return claims_; }
+  /// Whether a change that is made and not completed has added a component or resource of that name. [non-rt], the change lock
+  /// held.
+  bool has_open_addition(const std::string& name) const noexcept;
   /// Throws Error (timeout) that names a component which has not taken an earlier change. [non-rt], change lock held.
   [[noreturn]] void throw_late(time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
-  Runner* use_host(std::unique_lock<std::mutex>& use) const;
+  Runner* use_host(std::shared_lock<std::shared_mutex>& use) const;
   /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
   void drop_stale_prepared() noexcept;
   /// [non-rt], the change lock held.
@@ -255,10 +280,12 @@ class Architecture final : public Configurable {
   void check_cleanup() const override;
   void cleanup_hook() override;
   bool end_threads() noexcept;
+  void note_restructured() noexcept;
 
   PluginRegistry* registry_;
   ChangeLock change_lock_;
   CommitGate commit_gate_;
+  ArchitectureClaims claims_;
   std::vector<OpenChange*> prepared_;
   std::vector<std::shared_ptr<OpenChange>> open_;
   std::atomic<bool> has_open_{false};

@@ -2,6 +2,8 @@
 // OpenChange: a change that is prepared and not committed, or committed and not completed, as its architecture sees it.
 #pragma once
 
+#include <string>
+
 namespace mauve {
 
 class Task;
@@ -17,6 +19,8 @@ class OpenChange {
   virtual void drop_if_stale() noexcept {}
   /// A component that has not taken it yet; nullptr: there is none. [non-rt]
   virtual const Task* find_late() const noexcept { return nullptr; }
+  /// Whether it has added a component or resource of that name, which is not listed before the change is completed. [non-rt]
+  virtual bool has_added(const std::string& name) const noexcept = 0;
 };
 
 }  // namespace mauve

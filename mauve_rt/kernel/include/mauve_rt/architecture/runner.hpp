@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <shared_mutex>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
@@ -18,7 +19,7 @@ class Task;
 /// | --------- | -------------------- | ------- | ------------------------------------------------------ |
 /// | deployed_ | deploy(), shutdown() | anyone  | seq_cst: a commit that shutdown() does not see, sees it |
 /// | deployments_ | deploy()          | anyone  | as deployed_                                           |
-/// | in_use_   | changes              | the end | -                                                      |
+/// | in_use_   | changes, shared      | the end | -                                                      |
 class Runner {
  public:
   Runner() = default;
@@ -39,8 +40,9 @@ class Runner {
   virtual void attach(Task& task) = 0;
   /// The reverse; false when its thread would not end in time. [non-rt]
   virtual bool detach(Task& task) noexcept = 0;
-  /// Held while a change uses the runner. [non-rt], the architecture's change lock held.
-  std::unique_lock<std::mutex> use() { return std::unique_lock(in_use_, std::try_to_lock); }
+  /// Held while a change uses the runner, which may end meanwhile where this owns nothing. [non-rt], the architecture's change
+  /// lock held.
+  std::shared_lock<std::shared_mutex> use() { return std::shared_lock(in_use_, std::try_to_lock); }
 
  protected:
   /// From here on nobody starts anything, and no change of a running architecture is made.
@@ -48,13 +50,13 @@ class Runner {
     if (deployed) deployments_.fetch_add(1, std::memory_order_seq_cst);
     deployed_.store(deployed, std::memory_order_seq_cst);
   }
-  /// Waits for a change that uses the runner; after shutdown(), at its end. [non-rt]
+  /// Waits for the changes that use the runner; after shutdown(), at its end. [non-rt]
   void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
 
  private:
   std::atomic<bool> deployed_{false};
   std::atomic<std::uint32_t> deployments_{0};
-  std::mutex in_use_;
+  std::shared_mutex in_use_;
 };
 
 }  // namespace mauve

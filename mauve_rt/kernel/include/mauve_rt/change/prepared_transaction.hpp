@@ -68,6 +68,7 @@ class PreparedTransaction final : private OpenChange {
 
   bool settle() noexcept override;
   void drop_if_stale() noexcept override;
+  bool has_added(const std::string& name) const noexcept override;
   void note_failure() noexcept;
   void let_go() noexcept;
 

@@ -67,6 +67,8 @@ class TransactionStep {
   const std::string& component() const noexcept;
   /// Whether it has a report of every component that it touched.
   bool is_for_all() const noexcept;
+  /// Whether it adds or removes something, wires a port, or replaces a shell.
+  bool is_structural() const noexcept;
   /// Enters its effect into the draft; uses up the parts it was given. Throws Error.
   void draft(Draft& draft);
 

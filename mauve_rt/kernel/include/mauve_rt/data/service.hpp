@@ -78,7 +78,7 @@ class WriteFloor {
   }
 
  private:
-  time_ns_t instant_ns_{0};
+  time_ns_t instant_ns_{INT64_MIN};
 };
 
 class Resource;

@@ -1,38 +1,55 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// ChangeLock: under it an architecture is changed, one change at a time.
+// ChangeLock: under it one thread at a time reads and changes what an architecture consists of.
 #pragma once
 
-#include <atomic>
+#include <condition_variable>
 #include <mutex>
-#include <thread>
 
 namespace mauve {
 
-/// Held from a change's draft to its retirement, hooks of parts included. Ordinary threads.
+/// A change holds it from its draft to its retirement, except in a Pause: there it prepares its parts and waits for its
+/// components, which it has claimed (ChangeMark), and other changes go on. Ordinary threads.
 ///
-/// | member  | written by      | read by | order                                                        |
-/// | ------- | --------------- | ------- | ------------------------------------------------------------ |
-/// | holder_ | who holds mutex_| anyone  | relaxed: a thread finds itself only where it has put itself  |
+/// | member  | written by       | read by | under  |
+/// | ------- | ---------------- | ------- | ------ |
+/// | paused_ | changes          | changes | mutex_ |
 class ChangeLock {
  public:
-  /// Waits for the change under way. [non-rt]
-  /// Throws Error (would_deadlock) from inside that change, by a hook of a part, and as check_caller().
+  /// Waits for the thread that holds it. [non-rt]
+  /// Throws Error (would_deadlock) from inside a change, by a hook of a part, and as check_caller().
   void lock();
-  /// Only where no change is under way, this thread's included; not on a component's own thread. [non-rt]
+  /// The same, and waits for the changes that are paused. [non-rt] Throws as lock().
+  void lock_alone();
+  /// Only where no thread holds it, and the calling thread is not inside a change; not on a component's own thread. [non-rt]
   bool try_lock() noexcept;
   void unlock() noexcept;
-  /// Whether the calling thread holds it: it is inside a change. [non-rt]
-  bool is_held_here() const noexcept {
-    return holder_.load(std::memory_order_relaxed) == std::this_thread::get_id();
-  }
-  /// Held by the calling thread when it was not yet, until what is returned goes. [non-rt] Throws as check_caller().
+  /// lock(), or lock_alone(), unless the calling thread is inside a change. [non-rt] Throws as check_caller().
   [[nodiscard]] std::unique_lock<ChangeLock> join();
+  [[nodiscard]] std::unique_lock<ChangeLock> join_alone();
+  /// Lets others have it until one of them gives it back, at most for 1 ms. [non-rt], held.
+  void wait_for_others();
   /// Throws Error (would_deadlock) on a component's own thread: a change waits for that one to come to a wait. [non-rt]
   static void check_caller();
 
+  /// While it lives other threads can have the lock, and the calling thread is inside its change still. [non-rt], held.
+  class Pause {
+   public:
+    explicit Pause(ChangeLock& lock);
+    ~Pause();
+    Pause(const Pause&) = delete;
+    Pause& operator=(const Pause&) = delete;
+
+   private:
+    ChangeLock& lock_;
+  };
+
  private:
+  void check_outside() const;
+  bool is_inside() const noexcept;
+
   std::mutex mutex_;
-  std::atomic<std::thread::id> holder_{};
+  std::condition_variable given_back_;
+  int paused_{0};
 };
 
 }  // namespace mauve

@@ -158,12 +158,19 @@ class Commit {
   void set_yields() noexcept { yields_ = true; }
   /// [rt]
   bool yields() const MAUVE_RT { return yields_; }
+  /// It adds or removes something, or wires ports; who carries it out holds CommitGate::structural. [setup]
+  void set_structural() noexcept { is_structural_ = true; }
+  /// [rt]
+  bool is_structural() const MAUVE_RT { return is_structural_; }
+  /// Whether the task takes part. [rt]
+  bool is_about(const Task& task) const MAUVE_RT;
+  Commit* next{nullptr};  // the gate's
 
   // ---- the requester
 
   /// Makes the change, or not, at most until the instant; then waits until all have passed, as long as they are not late
   /// beyond that instant: has_passed() says whether they have. Where a component's adopt or take does not end the component
-  /// is given up, which allocates. [rt] as far as the actions are. Ordinary threads and rules, under the gate's mutex.
+  /// is given up, which allocates. [rt] as far as the actions are. Ordinary threads and rules, which have claimed the components.
   Outcome carry_out(time_ns_t timeout_ns, CommitGate& gate) noexcept;
   /// Throws Error as the outcome demands, or what adopt threw; returns where adopt returned false. [non-rt], not made.
   void rethrow_refusal() const;
@@ -192,8 +199,9 @@ class Commit {
   CutWord raise(time_ns_t clock_ns) MAUVE_RT { return cut_.raise(clock_ns); }
   /// Runs the adopts of a participant; false when the change is refused, and called off. [rt] as far as the actions are.
   bool adopt(Participant& participant) noexcept;
-  /// The participant agrees, and has executed nothing beyond this clock. [rt]
-  void vote(Participant& participant, time_ns_t entered_ns) MAUVE_RT;
+  /// The participant agrees, and has executed nothing beyond this clock. True when it was the last: the caller wakes the
+  /// requester, after what is more urgent. [rt]
+  bool vote(Participant& participant, time_ns_t entered_ns) MAUVE_RT;
   /// Takes all actions of a participant; how long these and the adopts took beyond what they declared, else 0. [rt] as far as
   /// the actions are.
   time_ns_t take(Participant& participant) noexcept;
@@ -201,6 +209,10 @@ class Commit {
   void pass(Participant& participant) MAUVE_RT;
   /// False when the change is made already. Any thread that knows the commit to exist. [rt]
   bool call_off(Off why, const Task* by = nullptr) MAUVE_RT;
+  /// The same, and the requester sleeps on until wake_requester(). [rt]
+  bool call_off_quietly(Off why, const Task* by) MAUVE_RT;
+  /// Of a commit that is decided. [rt]
+  void wake_requester() MAUVE_RT;
 
  private:
   bool lock(time_ns_t until_ns) noexcept;
@@ -219,7 +231,6 @@ class Commit {
   void complete(time_ns_t until_ns) noexcept;
   bool give_up(const Participant& participant, const char* call) noexcept;
   void start_parked(time_ns_t until_ns) noexcept;
-  void decided() noexcept;
   [[noreturn]] void throw_unfit() const;
   [[noreturn]] void throw_timeout() const;
   [[noreturn]] void throw_off() const;
@@ -228,6 +239,7 @@ class Commit {
   std::vector<Participant*> order_;  // by the tasks' numbers: who commands two tasks takes them in this order
   std::vector<CommitAction*> actions_;
   bool yields_{false};
+  bool is_structural_{false};
   bool has_own_{false};
   time_ns_t timeout_ns_{0};
   const Task* unfit_{nullptr};

@@ -339,9 +339,11 @@ class Task final : public Waiter {
   void go_on_with(Participant& participant, bool was_started) noexcept;
   void trace_take(const Participant& participant) noexcept;
   void trace_refusal(Participant& participant, time_ns_t began_ns) noexcept;
+  void wake_if_decided(Commit& commit) noexcept;
   void pass(Participant& participant) noexcept;
   bool settle_slot(bool ends = false) noexcept;
   bool end_slot(Participant& participant) noexcept;
+  void release_withdrawn() noexcept;
   bool enter_slot() MAUVE_RT;
   void leave_slot(std::uint32_t to) MAUVE_RT;
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
@@ -404,9 +406,11 @@ class Task final : public Waiter {
   std::atomic<bool> fallen_back_{false};
 
   // the machine's own
-  QueuePlace queue_place_{};  // of a simulated one
-  bool in_resume_{false};     // its code is on some stack: what it calls must not resume it
-  bool place_kept_{false};    // the fsm that a commit has put in goes on in its place
+  QueuePlace queue_place_{};         // of a simulated one
+  bool in_resume_{false};            // its code is on some stack: what it calls must not resume it
+  bool has_decided_{false};  // by its vote, and the commit's requester sleeps still
+  Participant* withdrawn_{nullptr};  // its commit is called off, and its requester sleeps still
+  bool place_kept_{false};           // the fsm that a commit has put in goes on in its place
   time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared
 };
 
