@@ -563,7 +563,7 @@ class Architecture:
     def revision(self) -> int:
         """Grows with every committed change and every start, stop and fault; never 0."""
     def threads_left_behind(self) -> int:
-        """Threads of removed components that still execute what they were condemned for."""
+        """Threads of removed components that still run a timed-out execution."""
     def components(self) -> list[ComponentDescription]: ...
     def take_recent_maxima(self) -> list[RecentMaxima]:
         """Of every component, and counted anew from here on: for one caller only."""

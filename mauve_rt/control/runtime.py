@@ -235,7 +235,7 @@ class Runtime:
         return any(plugin is not None and plugin.is_python for plugin in plugins)
 
     def threads_left_behind(self) -> int:
-        """Threads of removed components that still execute what they were condemned for."""
+        """Threads of removed components that still run a timed-out execution."""
         architecture = self._architecture
         return architecture.threads_left_behind() if architecture is not None else 0
 

@@ -23,7 +23,7 @@ std::string text(const Component& component, int i) {
   return " | C" + std::to_string(i) + " " + kSteps[static_cast<int>(component.step)] + " clock " +
          std::to_string(component.clock) + " entered " + std::to_string(component.entered) + " slot " +
          kSlots[static_cast<int>(component.slot)] + flag(component.voted, "voted") +
-         flag(component.stop, "stop") + flag(component.condemned, "condemned") +
+         flag(component.stop, "stop") + flag(component.timed_out, "timed_out") +
          flag(component.has_new[0], "has0") + flag(component.has_new[1], "has1");
 }
 

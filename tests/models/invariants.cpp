@@ -71,7 +71,7 @@ void Model::check_closed(const State& state, int k) {
 }
 
 bool Model::is_lost(const Component& component) const {
-  return options_.lost && component.condemned && !component.has_come_to_rest();
+  return options_.lost && component.timed_out && !component.has_come_to_rest();
 }
 
 void Model::check_end(const State& state) {

@@ -26,7 +26,7 @@ enum class Twin {
   // Weakened requesters.
   kRetireAtClose,
   kSecondOverFirst,
-  kCondemnedCountsAsPassed,
+  kTimedOutCountsAsPassed,
   kFreeWithoutRetract,
   kNoWake,
   kClaimDoesNotRaise,
@@ -46,8 +46,8 @@ struct Options {
 
   bool stop{false};      // component 0 is asked to stop
   bool shutdown{false};  // all are asked to stop
-  bool hang{false};      // component 0 may hang in an execution or in its adopt, and is condemned then
-  bool lost{false};      // a condemned thread never comes back
+  bool hang{false};      // component 0 may hang in an execution or in its adopt, and times out then
+  bool lost{false};      // a thread that timed out never comes back
   bool refuse{false};    // each adopt may refuse
   bool event{false};     // the last component waits for events, not for instants
   bool skip{false};      // a late component may skip to the first instant that is not past

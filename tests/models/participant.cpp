@@ -248,10 +248,10 @@ void Model::call_off(State state, int i) {
   go(state, i, seen.is_closed() ? after_decision() : Step::kClearing);
 }
 
-/// A condemned thread may come back, or never.
+/// A thread that timed out may come back, or never.
 void Model::come_back(State state, int i) {
   Component& component = state.components[i];
-  const bool may_come_back = component.condemned && !options_.lost;
+  const bool may_come_back = component.timed_out && !options_.lost;
   if (component.step == Step::kHung) {
     check_parts(state, i);  // it still reads them
     if (may_come_back) go(state, i, Step::kParking);

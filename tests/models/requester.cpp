@@ -110,7 +110,7 @@ void Model::post(State state, int k) {
     return emit(state);
   }
   Component& component = state.components[change.at];
-  if (options_.remove && component.step == Step::kHung && component.condemned) {
+  if (options_.remove && component.step == Step::kHung && component.timed_out) {
     component.step = Step::kClaimed;
     change.step = is(Twin::kClaimDoesNotRaise) ? Request::kCountingFor : Request::kVotingFor;
     return emit(state);
@@ -189,7 +189,7 @@ void Model::retract(State state, int k) {
   Component& component = state.components[change.at];
   if (component.step == Step::kClaimed) component.step = Step::kHung;  // the claim is given up
   if (component.is_at(k) && component.slot == Slot::kBusy && !is(Twin::kFreeWithoutRetract)) {
-    if (component.step != Step::kAdoptHung || !component.condemned)
+    if (component.step != Step::kAdoptHung || !component.timed_out)
       return;  // a few instructions, or its adopt
     change.kept = true;
   } else if (component.is_at(k)) {
@@ -242,20 +242,20 @@ void Model::pass_for(State state, int k) {
 
 void Model::pass(State state, int k) {
   Change& change = state.changes[k];
-  bool is_condemned = false, is_referred_to = false;
+  bool has_timed_out = false, is_referred_to = false;
   for (int i = 0; i < options_.components; ++i) {
     const Component& component = state.components[i];
-    is_condemned |= takes_part(k, i) && component.condemned && !component.has_new[k];
+    has_timed_out |= takes_part(k, i) && component.timed_out && !component.has_new[k];
     is_referred_to |= component.is_at(k);
   }
   const bool was_made = change.cut().is_closed();
   const bool has_passed = was_made ? change.to_pass == 0 : !is_referred_to;
-  if (has_passed || (was_made && is_condemned && is(Twin::kCondemnedCountsAsPassed))) {
+  if (has_passed || (was_made && has_timed_out && is(Twin::kTimedOutCountsAsPassed))) {
     change.old_freed = was_made, change.record_freed = true;
     change.step = Request::kFreed;
     return emit(state);
   }
-  if (change.step == Request::kAnswered || !is_condemned) return;
+  if (change.step == Request::kAnswered || !has_timed_out) return;
   change.step = Request::kAnswered;  // made, but one has not passed: its record is kept
   emit(state);
 }

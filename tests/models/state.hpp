@@ -32,7 +32,7 @@ enum class Step : std::uint8_t {
   kLookingParked,  // has said so, looks at its slot once more
   kCallingOff,     // calls the change off, because it parks or because its adopt refused
   kParked,         // sleeps until it is started
-  kClaimed,        // hung, condemned, and voted for by the requester that removes it
+  kClaimed,        // hung, timed out, and voted for by the requester that removes it
   kEnded,          // was removed
 };
 /// Where a component's thread goes once it has emptied its slot.
@@ -61,7 +61,7 @@ enum class Request : std::uint8_t {
   kWaking,      // closed: wakes participant `at`, or takes in its place if it is parked
   kTakenFor,    // has taken for participant `at`
   kPassing,     // sleeps until all have taken
-  kAnswered,    // has answered; keeps the record for a condemned participant
+  kAnswered,    // has answered; keeps the record for a participant that timed out
   kFreed,       // has answered and freed everything
 };
 
@@ -75,7 +75,7 @@ struct Component {
   Slot slot;
   std::uint8_t slot_change;   // whose record, unless the slot is empty
   std::uint8_t mutex_holder;  // of the command mutex: 0, or 1 + change
-  bool voted, notified, stop, condemned, started;
+  bool voted, notified, stop, timed_out, started;
   bool has_new[kMostChanges];
 
   bool is_at(int change) const { return slot != Slot::kEmpty && slot_change == change; }

@@ -65,16 +65,16 @@ void Model::step_world(const State& from) {
     if (!from.components[i].stop && !from.components[i].started) emit(stopped);
   }
   const Component& first = from.components[0];
-  if ((first.step == Step::kHung || first.step == Step::kAdoptHung) && !first.condemned) {
-    State condemned = from;
-    condemned.components[0].condemned = true;
-    emit(condemned);
+  if ((first.step == Step::kHung || first.step == Step::kAdoptHung) && !first.timed_out) {
+    State timed_out = from;
+    timed_out.components[0].timed_out = true;
+    emit(timed_out);
   }
   for (int i = 0; options_.start && i < options_.components; ++i) {
     State started = from;
     Component& component = started.components[i];
     const bool is_locked = component.mutex_holder != 0 && !is(Twin::kStartDuringChange);
-    if (component.step != Step::kParked || component.started || component.condemned || is_locked) continue;
+    if (component.step != Step::kParked || component.started || component.timed_out || is_locked) continue;
     if (options_.remove && component.has_new[0]) continue;
     component.started = true, component.stop = false;
     component.clock = static_cast<std::uint8_t>(waits_for_events(i) ? 0 : next_instant(i, from.now + 1));

@@ -57,6 +57,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "one that finds another under way for 10 s is refused": (
         "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
     ),
+    "Threads of one program prepare and make changes of different components in parallel": (
+        "ParallelChanges.WaitForNoPreparationOfOthers",
+        "ParallelChanges.WaitForNoCommitOfOthers",
+        "ParallelChanges.ThatAddOrRemoveGoOneAfterTheOther",
+    ),
     "a faulted component gets a new core": (
         "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
@@ -651,13 +656,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "which sleeps until the next bound can be exceeded": (
         "Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",
     ),
-    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheCondemnedOneHolds",),
+    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheTimedOutOneHolds",),
     "repaired in place by a step `configure` or `replace_core`, then started": (
         "Rule11Repaired.AndStartedInOneTransaction",
         "Rule11Repaired.ByConfiguringItAnew",
     ),
     "is removed and added anew, in one transaction": (
-        "Rule11Watchdog.ACondemnedComponentIsReplacedWhileItsThreadRuns",
+        "Rule11Watchdog.ATimedOutComponentIsReplacedWhileItsThreadRuns",
     ),
     "the component's own thread puts that one in": (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",

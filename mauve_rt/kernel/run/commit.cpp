@@ -14,7 +14,7 @@ namespace mauve {
 
 namespace {
 
-/// How often a requester that sleeps looks whether a participant stopped, faulted or was condemned: no thread tells it.
+/// How often a requester that sleeps looks whether a participant stopped, faulted or timed out: no thread tells it.
 constexpr time_ns_t kLook = ms_to_ns(20);
 
 }  // namespace
@@ -268,7 +268,7 @@ void Commit::await_decision(time_ns_t until_ns) noexcept {
   }
 }
 
-/// A stop, a fault or a condemnation wins: what it does not get to do itself is done here.
+/// A stop, a fault or a time-out wins: what it does not get to do itself is done here.
 void Commit::call_off_if_one_left() noexcept {
   for (const Participant* participant : order_) {
     if (!participant->in_flight) continue;
@@ -336,12 +336,13 @@ bool Commit::wait_passed(time_ns_t until_ns) const noexcept {
   }
 }
 
-/// Condemns a component whose adopt or take lasts beyond all patience; false when it has ended, or has just begun.
+/// Times out a component whose adopt or take lasts beyond all patience; false when it has ended, or has just begun.
 bool Commit::give_up(const Participant& participant, const char* call) noexcept {
   const time_ns_t began = participant.visit_ns.load(std::memory_order_relaxed);
   Task& task = *participant.task;
   if (began == 0 || task.clock().now_ns() - began < kPatience) return false;
-  if (!task.condemn(std::string(call) + " of its new part does not end", task.clock().now_ns())) return false;
+  if (!task.time_out(std::string(call) + " of its new part does not end", task.clock().now_ns()))
+    return false;
   given_up_ = &task;
   return true;
 }

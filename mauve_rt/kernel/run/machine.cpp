@@ -112,12 +112,12 @@ Machine::Entered Machine::enter_next() {
   const State& state = *next_;
   if (&state == &fsm_->initial()) context_.instant_ns.store(clock_ns(), std::memory_order_relaxed);
   current_.store(state.trace_id, std::memory_order_relaxed);
-  if (!state.is_wait) return execute(state) ? Entered::execution : Entered::condemned;
+  if (!state.is_wait) return execute(state) ? Entered::execution : Entered::timed_out;
   enter_wait(state);
   return Entered::wait;
 }
 
-/// False when it was condemned before it began or ended.
+/// False when it timed out before it began or ended.
 bool Machine::execute(const State& state) {
   const time_ns_t began = boundary_ns_;
   if (state.max_execution_ns != 0 && !begin_execution(began, state.max_execution_ns)) return false;
@@ -129,11 +129,11 @@ bool Machine::execute(const State& state) {
   next_ = successor(state);
   clock_->spend(state.simulated_ns());
   boundary_ns_ = clock_->now_ns();
-  const bool was_condemned = state.max_execution_ns != 0 && !end_execution();
+  const bool had_timed_out = state.max_execution_ns != 0 && !end_execution();
   trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
   state.execution_time->record(boundary_ns_ - began);
   check_locks(held_before);
-  if (was_condemned) return false;
+  if (had_timed_out) return false;
   if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
     throw OverBound(state.max_execution_ns);
   return true;

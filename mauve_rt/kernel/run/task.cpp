@@ -334,7 +334,7 @@ bool Task::stop(time_ns_t timeout_ns, bool force) {
        seen = state_.load(std::memory_order_acquire)) {
     if (futex_wait_until(state_, seen, until)) continue;
     if (!is_going(state_.load(std::memory_order_acquire))) break;
-    if (force && condemn_unless_waiting()) return true;
+    if (force && time_out_unless_waiting()) return true;
     throw_state_running("the stop stays pending", timeout_ns,
                         force
                             ? "it takes effect when the component's thread gets to run"

@@ -82,7 +82,7 @@ bool Task::visit_posted() {
 }
 
 bool Task::settle_visit(Visit visit) {
-  if (visit == Visit::condemned) park_condemned();
+  if (visit == Visit::timed_out) park_timed_out();
   if (visit != Visit::goes_on) return false;
   const time_ns_t took = std::exchange(overlong_ns_, 0);
   if (!machine_.is_started()) return true;
@@ -108,7 +108,7 @@ Task::Visit Task::visit_slot() noexcept {
       leave_slot(kPosted);
       return Visit::goes_on;
     }
-    if (!vote(participant, began)) return Visit::condemned;
+    if (!vote(participant, began)) return Visit::timed_out;
   }
   return look_at_cut(participant, began);
 }
@@ -169,7 +169,7 @@ bool Task::fits_in_wait(Participant& participant) const noexcept {
   return false;
 }
 
-/// False when the thread was condemned meanwhile; the slot is left then.
+/// False when the thread timed out meanwhile; the slot is left then.
 bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
   Commit& commit = *participant.commit;
   if (!machine_.begin_execution(began_ns, kForever)) {  // the requester watches it
@@ -195,7 +195,7 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   if (!machine_.begin_execution(clock().now_ns(), kForever)) {
     wake_if_decided(commit);
     leave_slot(kPosted);
-    return Visit::condemned;
+    return Visit::timed_out;
   }
   const bool was_started = machine_.is_started();
   const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
@@ -209,25 +209,25 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   overlong_ns_ = commit.take(participant);
   machine_.change_at(commit.instant_ns());
   participant.visit_ns.store(0, std::memory_order_relaxed);
-  const bool is_condemned = !machine_.end_execution();
+  const bool has_timed_out = !machine_.end_execution();
   const bool stops = was_started && participant.afterwards == Afterwards::stop;
-  if (was_parked && !is_condemned) parked_.store(1, std::memory_order_seq_cst);
+  if (was_parked && !has_timed_out) parked_.store(1, std::memory_order_seq_cst);
   if (was_started) trace_take(participant);
-  if (is_condemned) {
+  if (has_timed_out) {
     participant.released.store(Participant::kSuperseded, std::memory_order_release);
   } else if (!stops) {
     go_on_with(participant, was_started);
   }
   participant.armed_ns = machine_.look_at_clock();
-  const bool goes_on = !is_condemned && !stops && machine_.is_started();
+  const bool goes_on = !has_timed_out && !stops && machine_.is_started();
   // In adopt and take: they are no overrun of the component. Counted by what lies between the pending instant and the release.
   const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, participant.armed_ns) : 0;
   participant.resumes_ns = due_ns();
   if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
-  if (stops && !is_condemned) park_stopped();
+  if (stops && !has_timed_out) park_stopped();
   wake_if_decided(commit);
   pass(participant);
-  if (is_condemned) return Visit::condemned;
+  if (has_timed_out) return Visit::timed_out;
   return stops ? Visit::parks : Visit::goes_on;
 }
 

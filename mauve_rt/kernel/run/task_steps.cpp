@@ -103,8 +103,8 @@ void Task::run_to_next_wait() {
         if (slot_.load(std::memory_order_relaxed) != kEmpty)
           control_.fetch_or(kCommit, std::memory_order_acq_rel);
         return;
-      case Machine::Entered::condemned:
-        return park_condemned();
+      case Machine::Entered::timed_out:
+        return park_timed_out();
     }
   }
 }
@@ -147,14 +147,14 @@ void Task::signal_awaited() noexcept {
 
 void Task::park_stopped() noexcept {
   settle_slot();
-  if (!machine_.leave()) return park_condemned();
+  if (!machine_.leave()) return park_timed_out();
   write_outputs(false);
   machine_.trace(TraceKind::stop, machine_.state_name(), machine_.clock_ns());
   park(ComponentState::stopped);
 }
 
 void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
-  if (!machine_.leave()) return park_condemned();
+  if (!machine_.leave()) return park_timed_out();
   if (bound_ns != 0) tell_over_declared();
   FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
                  .bound_ns = bound_ns,

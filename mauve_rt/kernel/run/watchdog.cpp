@@ -95,7 +95,7 @@ void Watchdog::run() noexcept {
   }
 }
 
-/// Condemns what is over its bound; returns when to look again.
+/// Times out what is over its bound; returns when to look again.
 time_ns_t Watchdog::look(time_ns_t now_ns) noexcept {
   looks_.fetch_add(1, std::memory_order_relaxed);
   wake_before_ns_.store(kForever, std::memory_order_seq_cst);
@@ -104,7 +104,7 @@ time_ns_t Watchdog::look(time_ns_t now_ns) noexcept {
   {
     const std::lock_guard lock(tasks_mutex_);
     for (Task* task : tasks_) {
-      task->condemn_if_over(now_ns);
+      task->time_out_if_over(now_ns);
       earliest_ns = std::min(earliest_ns, task->earliest_excess_ns());
     }
   }

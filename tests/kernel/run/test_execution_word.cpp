@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// One word decides each execution: it has ended, or it is condemned, never both and never neither.
+// One word decides each execution: it has ended, or it times out, never both and never neither.
 #include <random>
 
 #include "mauve_rt/run/execution_word.hpp"
@@ -9,7 +9,7 @@
 namespace mauve::testing {
 namespace {
 
-TEST(ExecutionWord, CondemnsOnlyTheExecutionThatWasLookedAt) {
+TEST(ExecutionWord, TimesOutOnlyTheExecutionThatWasLookedAt) {
   ExecutionWord word;
   EXPECT_FALSE(word.look());
   word.begin(100, 10);
@@ -20,35 +20,35 @@ TEST(ExecutionWord, CondemnsOnlyTheExecutionThatWasLookedAt) {
   EXPECT_TRUE(first->is_over(111));
   EXPECT_TRUE(word.end());
   word.begin(200, 10);
-  EXPECT_FALSE(word.condemn(*first)) << "it had ended";
-  EXPECT_TRUE(word.condemn(*word.look()));
+  EXPECT_FALSE(word.time_out(*first)) << "it had ended";
+  EXPECT_TRUE(word.time_out(*word.look()));
   EXPECT_FALSE(word.end());
-  EXPECT_FALSE(word.look()) << "nothing is left to condemn";
+  EXPECT_FALSE(word.look()) << "nothing is left to time out";
 }
 
 TEST(ExecutionWord, WhoRemovesAndWhoComesBackDecideByTheSameWord) {
   ExecutionWord word;
   word.begin(100, 10);
-  EXPECT_FALSE(word.claim()) << "it is not condemned";
-  EXPECT_TRUE(word.condemn(*word.look()));
-  word.sentence();
+  EXPECT_FALSE(word.claim()) << "it has not timed out";
+  EXPECT_TRUE(word.time_out(*word.look()));
+  word.set_demoted();
   EXPECT_TRUE(word.claim());
   word.give_up_claim();
   EXPECT_TRUE(word.come_back());
   EXPECT_FALSE(word.claim()) << "it has come back";
   word.begin(200, 10);
-  EXPECT_TRUE(word.condemn(*word.look()));
-  word.sentence();
+  EXPECT_TRUE(word.time_out(*word.look()));
+  word.set_demoted();
   EXPECT_TRUE(word.claim());
   word.abandon();
   EXPECT_FALSE(word.come_back());
 }
 
-/// A thread executes, another one condemns, a third one removes now and then; each at random phases.
+/// A thread executes, another one times it out, a third one removes now and then; each at random phases.
 TEST(ExecutionWord, EachExecutionHasOneEndWhateverThePhases) {
   constexpr int kExecutions = 20'000;
   ExecutionWord word;
-  std::atomic<int> condemned{0};
+  std::atomic<int> timed_out{0};
   std::atomic<bool> over{false};
   std::thread watchdog([&] {
     std::minstd_rand random(1);
@@ -56,10 +56,10 @@ TEST(ExecutionWord, EachExecutionHasOneEndWhateverThePhases) {
       const auto execution = word.look();
       for (std::uint_fast32_t spins = random() % 50; spins > 0; --spins)
         std::atomic_signal_fence(std::memory_order_seq_cst);
-      if (!execution || execution->began_ns % 7 != 0 || !word.condemn(*execution)) continue;
+      if (!execution || execution->began_ns % 7 != 0 || !word.time_out(*execution)) continue;
       EXPECT_EQ(2 * execution->began_ns, execution->limit_ns) << "of one and the same execution";
-      condemned.fetch_add(1);
-      word.sentence();
+      timed_out.fetch_add(1);
+      word.set_demoted();
     }
   });
   std::thread remover([&] {
@@ -75,16 +75,16 @@ TEST(ExecutionWord, EachExecutionHasOneEndWhateverThePhases) {
       std::atomic_signal_fence(std::memory_order_seq_cst);
     if (word.end()) continue;
     ++found_out;
-    EXPECT_EQ(0, i % 7) << "condemned though nobody looked at this one";
+    EXPECT_EQ(0, i % 7) << "timed out though nobody looked at this one";
     EXPECT_TRUE(word.come_back());
   }
   over = true;
   watchdog.join();
   remover.join();
-  EXPECT_EQ(condemned, found_out) << "every condemnation is found by the thread, and nothing else";
+  EXPECT_EQ(timed_out, found_out) << "every time-out is found by the thread, and nothing else";
 }
 
-TEST(ExecutionWord, ForceCondemnsWhateverIsBetweenEnteringAndLeaving) {
+TEST(ExecutionWord, ForceTimesOutWhateverIsBetweenEnteringAndLeaving) {
   ExecutionWord word;
   EXPECT_FALSE(word.look_at_any()) << "it is parked";
   word.enter();
@@ -92,17 +92,17 @@ TEST(ExecutionWord, ForceCondemnsWhateverIsBetweenEnteringAndLeaving) {
   const auto first = word.look_at_any();
   ASSERT_TRUE(first);
   EXPECT_TRUE(word.leave());
-  EXPECT_FALSE(word.condemn(*first)) << "it has left";
+  EXPECT_FALSE(word.time_out(*first)) << "it has left";
   word.enter();
-  EXPECT_FALSE(word.condemn(*first)) << "and has started anew";
+  EXPECT_FALSE(word.time_out(*first)) << "and has started anew";
   const auto before = word.look_at_any();
   word.begin(100, 10);
-  EXPECT_FALSE(word.condemn(*before)) << "a watched one has begun";
+  EXPECT_FALSE(word.time_out(*before)) << "a watched one has begun";
   EXPECT_TRUE(word.end());
-  EXPECT_TRUE(word.condemn(*word.look_at_any()));
+  EXPECT_TRUE(word.time_out(*word.look_at_any()));
   EXPECT_FALSE(word.begin(200, 10)) << "the thread finds out at the next one's begin";
   EXPECT_FALSE(word.leave()) << "or where it leaves";
-  word.sentence();
+  word.set_demoted();
   EXPECT_TRUE(word.come_back());
   EXPECT_FALSE(word.look_at_any()) << "it has left by then";
   word.enter();
@@ -111,11 +111,11 @@ TEST(ExecutionWord, ForceCondemnsWhateverIsBetweenEnteringAndLeaving) {
   EXPECT_FALSE(word.look());
 }
 
-/// A thread enters, now and then begins and ends, and leaves; another one condemns it by force at random phases.
-TEST(ExecutionWord, AThreadLeavesOrIsCondemnedWhateverThePhases) {
+/// A thread enters, now and then begins and ends, and leaves; another one times it out by force at random phases.
+TEST(ExecutionWord, AThreadLeavesOrTimesOutWhateverThePhases) {
   constexpr int kRounds = 20'000;
   ExecutionWord word;
-  std::atomic<int> condemned{0};
+  std::atomic<int> timed_out{0};
   std::atomic<bool> over{false};
   const auto spin = [](std::uint_fast32_t spins) {
     for (; spins > 0; --spins) std::atomic_signal_fence(std::memory_order_seq_cst);
@@ -125,9 +125,9 @@ TEST(ExecutionWord, AThreadLeavesOrIsCondemnedWhateverThePhases) {
     while (!over) {
       const auto execution = word.look_at_any();
       spin(random() % 300);
-      if (random() % 4 != 0 || !execution || !word.condemn(*execution)) continue;
-      condemned.fetch_add(1);
-      word.sentence();
+      if (random() % 4 != 0 || !execution || !word.time_out(*execution)) continue;
+      timed_out.fetch_add(1);
+      word.set_demoted();
     }
   });
   std::minstd_rand random(4);
@@ -145,7 +145,7 @@ TEST(ExecutionWord, AThreadLeavesOrIsCondemnedWhateverThePhases) {
   }
   over = true;
   forcer.join();
-  EXPECT_EQ(condemned, found_out) << "every condemnation is found by the thread, and nothing else";
+  EXPECT_EQ(timed_out, found_out) << "every time-out is found by the thread, and nothing else";
 }
 
 }  // namespace

@@ -132,7 +132,7 @@ TEST_F(Rule11Faults, AStateOverItsDeclaredTimeIsCaughtByTheWatchdog) {
   time_ns_t time = 0;
   ReaderState seen;
   out.read.read(value, time, seen);
-  EXPECT_EQ(0.0, value.value) << "what it wrote after it was condemned does not count";
+  EXPECT_EQ(0.0, value.value) << "what it wrote after it timed out does not count";
 }
 
 }  // namespace

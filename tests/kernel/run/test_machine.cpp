@@ -146,15 +146,15 @@ TEST_F(MachineByHand, ThrowsAtTheEndOfAStateOverItsBound) {
   }
 }
 
-TEST_F(MachineByHand, SaysWhenItsStateWasCondemned) {
+TEST_F(MachineByHand, SaysWhenItsStateTimedOut) {
   make_periodic(ms_to_ns(4));
   core.work = [this] {
     const auto execution = machine.execution().look();
     ASSERT_TRUE(execution);
-    EXPECT_TRUE(machine.execution().condemn(*execution));
+    EXPECT_TRUE(machine.execution().time_out(*execution));
   };
   machine.start(0);
-  EXPECT_EQ(Machine::Entered::condemned, step());
+  EXPECT_EQ(Machine::Entered::timed_out, step());
 }
 
 TEST_F(MachineByHand, SkipsTheInstantsThatPassedInAChange) {

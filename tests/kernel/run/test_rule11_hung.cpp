@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Rule 11: a state that lasts longer than `hung_after` is told while it lasts, not condemned.
+// Rule 11: a state that lasts longer than `hung_after` is told while it lasts, and does not time out.
 #include <unistd.h>
 
 #include "free_fsm.hpp"
@@ -39,7 +39,7 @@ TEST_F(Rule11Hung, AStateThatLoopsIsToldWhileItLastsAndNotAfter) {
   EXPECT_EQ(kHungAfter, age.hung_after_ns);
   EXPECT_GT(age.age_ns, kHungAfter);
   EXPECT_EQ(0, age.bound_ns);
-  EXPECT_EQ(ComponentState::running, component.task().state()) << "told, not condemned";
+  EXPECT_EQ(ComponentState::running, component.task().state()) << "told, and no time-out";
   EXPECT_EQ(0, component.task().statistics().overruns) << "nothing but the age shows it";
   EXPECT_GT(component.task().state_age().age_ns, age.age_ns) << "it grows";
   let_time_pass(neighbour);
@@ -112,7 +112,7 @@ TEST_F(Rule11Hung, AWaitForEventsIsNotHungHoweverLongItLasts) {
   EXPECT_TRUE(age.is_wait);
 }
 
-TEST_F(Rule11Hung, AStateThatIsCondemnedButStillExecutesIsToldToo) {
+TEST_F(Rule11Hung, AStateThatTimedOutButStillExecutesIsToldToo) {
   std::atomic<bool> go_on{false};
   const ComponentsEndFirst ended(deployer);
   Component& component =

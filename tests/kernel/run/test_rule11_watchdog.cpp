@@ -148,7 +148,7 @@ struct Locked : Resource {
   Write write{*this};
 };
 
-TEST_F(Rule11Watchdog, WaitsForNoLockThatTheCondemnedOneHolds) {
+TEST_F(Rule11Watchdog, WaitsForNoLockThatTheTimedOutOneHolds) {
   auto& locked = architecture.add_resource<Locked>("locked");
   auto& free = architecture.add_resource<SharedData<Number>>("free");
   Component& component = add_bounded("c");
@@ -179,7 +179,7 @@ TEST_F(Rule11Watchdog, WaitsForNoLockThatTheCondemnedOneHolds) {
   EXPECT_GT(locked.writes, 0);
 }
 
-TEST_F(Rule11Watchdog, ACondemnedComponentIsReplacedWhileItsThreadRuns) {
+TEST_F(Rule11Watchdog, ATimedOutComponentIsReplacedWhileItsThreadRuns) {
   architecture.add_resource<LatestValue<Number>>("value");
   Component& component = add_bounded("c");
   architecture.connect("c", "output", "value", "write");
@@ -213,7 +213,7 @@ TEST_F(Rule11Watchdog, ACondemnedComponentIsReplacedWhileItsThreadRuns) {
   EXPECT_EQ(1, old.use_count());
 }
 
-TEST_F(Rule11Watchdog, ARefusedRemovalLeavesTheCondemnedOneAsItWas) {
+TEST_F(Rule11Watchdog, ARefusedRemovalLeavesTheTimedOutOneAsItWas) {
   Component& component = add_bounded("c");
   add("other", 1);
   hang(component);
@@ -232,7 +232,7 @@ TEST_F(Rule11Watchdog, ARefusedRemovalLeavesTheCondemnedOneAsItWas) {
   EXPECT_EQ(ComponentState::faulted, component.task().state());
 }
 
-TEST_F(Rule11Watchdog, ACondemnedComponentThatStillExecutesCannotBeRepairedInPlace) {
+TEST_F(Rule11Watchdog, ATimedOutComponentThatStillExecutesCannotBeRepairedInPlace) {
   Component& component = add_bounded("c");
   hang(component);
   deploy();
@@ -248,7 +248,7 @@ TEST_F(Rule11Watchdog, ACondemnedComponentThatStillExecutesCannotBeRepairedInPla
   }
 }
 
-TEST_F(Rule11Watchdog, CondemnsWhateverExecutionIsUnderWayOnDemand) {
+TEST_F(Rule11Watchdog, TimesOutWhateverExecutionIsUnderWayOnDemand) {
   Component& component = add_bounded("c");
   TestCore& waiting = core(component);
   waiting.work = [this] {
@@ -257,12 +257,12 @@ TEST_F(Rule11Watchdog, CondemnsWhateverExecutionIsUnderWayOnDemand) {
   };
   deploy();
   wait_until([&] { return is_hanging.load(); }, "the execution");
-  EXPECT_TRUE(component.task().condemn("asked for", monotonic_now_ns()) ||
+  EXPECT_TRUE(component.task().time_out("asked for", monotonic_now_ns()) ||
               component.task().state() == ComponentState::faulted);
-  EXPECT_FALSE(component.task().condemn("asked for", monotonic_now_ns())) << "it is condemned already";
+  EXPECT_FALSE(component.task().time_out("asked for", monotonic_now_ns())) << "it has timed out already";
   go_on = true;
   wait_parked(component);
-  EXPECT_FALSE(component.task().condemn("asked for", monotonic_now_ns())) << "nothing is under way";
+  EXPECT_FALSE(component.task().time_out("asked for", monotonic_now_ns())) << "nothing is under way";
 }
 
 /// An architecture that goes while a thread still executes leaves that thread what it uses.

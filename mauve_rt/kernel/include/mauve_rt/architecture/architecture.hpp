@@ -162,7 +162,7 @@ class Architecture final : public Configurable {
   PluginRegistry& require_registry() const;
   PluginRegistry* registry() const noexcept { return registry_; }
 
-  /// Threads of removed components that still execute what they were condemned for. [non-rt]
+  /// Threads of removed components that still run a timed-out execution. [non-rt]
   std::size_t threads_left_behind() const;
 
   ChangeSignal& changes() noexcept { return changes_; }

@@ -72,7 +72,7 @@ struct Participant {
   std::vector<CommitAction*> actions{};  // those of its own component, in the order of the change
   bool in_flight{false};                 // it was not parked when the change was posted
   bool is_own{false};  // its own thread votes and takes; else the requester does, the component being parked
-  bool left_behind{false};  // to be removed, while its thread still executes what it was condemned for
+  bool left_behind{false};  // to be removed, while its thread still runs a timed-out execution
   bool has_voted{false};
 
   std::atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in

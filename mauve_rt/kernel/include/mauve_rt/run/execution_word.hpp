@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Who ends an execution: the thread that runs it, or who condemns it. One atomic word decides.
+// Who ends an execution: the thread that runs it, or who times it out. One atomic word decides.
 #pragma once
 
 #include <atomic>
@@ -14,12 +14,12 @@ namespace mauve {
 /// The executions of one component, one after another. A watched one has a number of its own and a bound.
 ///
 /// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound,
-/// and an adopt or take of a commit. Whoever finds a watched execution over its bound condemns exactly that one; whoever
-/// stops the component by force condemns whatever the thread does between entering and leaving. All change the word by
+/// and an adopt or take of a commit. Whoever finds a watched execution over its bound times out exactly that one; whoever
+/// stops the component by force times out whatever the thread does between entering and leaving. All change the word by
 /// compare-and-exchange: who comes first has decided, and the other one finds so. The thread finds out where it ends the
-/// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who condemns
-/// one has ordered a stop before, which the thread sees when the state ends, and then it leaves. A condemned execution's
-/// thread waits, on coming back, until the condemnation is complete; who removes its component meanwhile abandons it.
+/// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who times it
+/// out has ordered a stop before, which the thread sees when the state ends, and then it leaves. The thread of an execution
+/// that timed out waits, on coming back, until the time-out is complete; who removes its component meanwhile abandons it.
 ///
 /// The word is the phase, whether the thread is in its fsm (kEntered), and a number that grows with every entry and begin.
 ///
@@ -29,19 +29,19 @@ namespace mauve {
 /// | idle, entered    | idle             | the thread: it parks                                                    |
 /// | idle             | running, + 1     | the thread                                                              |
 /// | running          | idle             | the thread: it ended                                                    |
-/// | running          | condemned        | the watchdog, who requests a commit, who stops by force                 |
-/// | idle, entered    | condemned        | who stops by force                                                      |
-/// | condemned        | sentenced        | the same, when FAULTED is told, the thread demoted, the outputs written |
-/// | sentenced        | idle             | the thread: it came back                                                |
-/// | sentenced        | claimed          | who is about to remove the component                                    |
-/// | claimed          | sentenced        | the same, when the removal was refused                                  |
+/// | running          | timed out        | the watchdog, who requests a commit, who stops by force                 |
+/// | idle, entered    | timed out        | who stops by force                                                      |
+/// | timed out        | demoted          | the same, when FAULTED is told, the thread demoted, the outputs written |
+/// | demoted          | idle             | the thread: it came back                                                |
+/// | demoted          | claimed          | who is about to remove the component                                    |
+/// | claimed          | demoted          | the same, when the removal was refused                                  |
 /// | claimed          | abandoned        | the same, when it was made                                              |
 ///
 /// | member    | order                                                                                               |
 /// | --------- | --------------------------------------------------------------------------------------------------- |
 /// | word_     | begin: seq_cst, so that whoever looks sees the execution or the thread sees when the watchdog looks  |
 /// |           | (Watchdog::wake_before_); else acq_rel: who changes it sees what the one before did                  |
-/// | began_ns_ | release: who sees the new one, sees the end of the execution before, and then condemns nothing       |
+/// | began_ns_ | release: who sees the new one, sees the end of the execution before, and then times out nothing       |
 /// | limit_ns_ | likewise                                                                                             |
 class ExecutionWord {
  public:
@@ -66,16 +66,16 @@ class ExecutionWord {
   void enter() MAUVE_RT {
     const std::uint32_t before = word_.load(std::memory_order_relaxed);
     if ((before & kEntered) != 0) return;  // it restarts
-    // A plain store: until it has entered nobody else changes an idle word. release: who condemns sees the start.
+    // A plain store: until it has entered nobody else changes an idle word. release: who times it out sees the start.
     word_.store((before + kNext) | kEntered, std::memory_order_release);
   }
-  /// It has left, and ended what was under way; false when that was condemned before. [rt]
+  /// It has left, and ended what was under way; false when that timed out before. [rt]
   bool leave() MAUVE_RT {
     std::uint32_t word = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
     return (word & kPhase) <= kRunning &&
            word_.compare_exchange_strong(word, word & ~(kPhase | kEntered), std::memory_order_acq_rel);
   }
-  /// False when the thread is condemned. [rt]
+  /// False when the thread has timed out. [rt]
   bool begin(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
     began_ns_.store(began_ns, std::memory_order_release);
     limit_ns_.store(limit_ns, std::memory_order_release);
@@ -83,14 +83,14 @@ class ExecutionWord {
     return (before & kPhase) == kIdle &&
            word_.compare_exchange_strong(before, (before + kNext) | kRunning, std::memory_order_seq_cst);
   }
-  /// False when it was condemned before it ended; true also when none was under way. [rt]
+  /// False when it timed out before it ended; true also when none was under way. [rt]
   bool end() MAUVE_RT {
     std::uint32_t word = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
     if ((word & kPhase) == kIdle) return true;
     return (word & kPhase) == kRunning &&
            word_.compare_exchange_strong(word, (word & ~kPhase) | kIdle, std::memory_order_acq_rel);
   }
-  /// After a condemned one: waits until the condemnation is complete; false when the component was removed meanwhile,
+  /// After one that timed out: waits until the time-out is complete; false when the component was removed meanwhile,
   /// and the thread is to end without another trace. [rt]
   bool come_back() MAUVE_RT {
     for (;;) {
@@ -98,7 +98,7 @@ class ExecutionWord {
       const std::uint32_t phase = word & kPhase;
       if (phase == kAbandoned) return false;
       if (phase == kIdle) return true;
-      if (phase != kSentenced) {
+      if (phase != kDemoted) {
         futex_wait_until(word_, word, kForever);
       } else if (word_.compare_exchange_strong(word, word & ~(kPhase | kEntered),
                                                std::memory_order_acq_rel)) {
@@ -107,7 +107,7 @@ class ExecutionWord {
     }
   }
 
-  // ---- who condemns
+  // ---- who times it out
 
   /// The watched execution under way, or nothing. [rt]
   std::optional<Look> look() const MAUVE_RT {
@@ -122,22 +122,22 @@ class ExecutionWord {
     return Look{word, 0, kForever};
   }
   /// False when it has ended, or another one was first. [rt]
-  bool condemn(const Look& execution) MAUVE_RT {
+  bool time_out(const Look& execution) MAUVE_RT {
     std::uint32_t word = execution.word;
-    return word_.compare_exchange_strong(word, (word & ~kPhase) | kCondemned, std::memory_order_acq_rel);
+    return word_.compare_exchange_strong(word, (word & ~kPhase) | kTimedOut, std::memory_order_acq_rel);
   }
-  /// The condemnation is complete. [rt]
-  void sentence() MAUVE_RT { exchange_phase(kCondemned, kSentenced); }
+  /// The time-out is complete. [rt]
+  void set_demoted() MAUVE_RT { exchange_phase(kTimedOut, kDemoted); }
 
   // ---- who removes the component
 
-  /// From now on the thread does not come back; false when it has, or was not condemned. [rt]
+  /// From now on the thread does not come back; false when it has, or did not time out. [rt]
   bool claim() MAUVE_RT {
     for (;;) {
       std::uint32_t word = word_.load(std::memory_order_acquire);
-      if ((word & kPhase) == kCondemned) {
+      if ((word & kPhase) == kTimedOut) {
         futex_wait_until(word_, word, kForever);
-      } else if ((word & kPhase) != kSentenced) {
+      } else if ((word & kPhase) != kDemoted) {
         return false;
       } else if (word_.compare_exchange_strong(word, (word & ~kPhase) | kClaimed,
                                                std::memory_order_acq_rel)) {
@@ -146,14 +146,14 @@ class ExecutionWord {
     }
   }
   /// [rt]
-  void give_up_claim() MAUVE_RT { exchange_phase(kClaimed, kSentenced); }
+  void give_up_claim() MAUVE_RT { exchange_phase(kClaimed, kDemoted); }
   void abandon() MAUVE_RT { exchange_phase(kClaimed, kAbandoned); }
-  /// Whether its thread still runs a condemned execution. [rt]
-  bool is_condemned() const MAUVE_RT { return phase() >= kCondemned; }
+  /// Whether its thread still runs an execution that timed out. [rt]
+  bool has_timed_out() const MAUVE_RT { return phase() >= kTimedOut; }
   bool is_abandoned() const MAUVE_RT { return phase() == kAbandoned; }
 
  private:
-  static constexpr std::uint32_t kIdle = 0, kRunning = 1, kCondemned = 2, kSentenced = 3, kClaimed = 4,
+  static constexpr std::uint32_t kIdle = 0, kRunning = 1, kTimedOut = 2, kDemoted = 3, kClaimed = 4,
                                  kAbandoned = 5, kPhase = 7;
   static constexpr std::uint32_t kEntered = 8;
   static constexpr std::uint32_t kNext = 16;  // the number above both

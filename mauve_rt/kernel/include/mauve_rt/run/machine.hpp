@@ -62,7 +62,7 @@ struct KeptWait {
 /// | entered_ns_             |                                           |            |                                 |
 /// | listening_              | ordinary threads                          | who runs it| its own: task_listener.hpp      |
 /// | present_                | who runs it                               | anyone     | its own: present_state.hpp      |
-/// | execution_              | who runs it, who condemns, who removes    | all of them| its own: execution_word.hpp     |
+/// | execution_              | who runs it, who times it out, who removes | all of them| its own: execution_word.hpp     |
 /// | waiting_ ...            | who runs it                               | who runs it| its own                         |
 class Machine {
  public:
@@ -70,7 +70,7 @@ class Machine {
   enum class Entered : std::uint8_t {
     execution,  // and left again: the next state is to be entered
     wait,       // until due_ns(), or an event
-    condemned,  // an execution, and it was condemned before it began or ended
+    timed_out,  // an execution, and it timed out before it began or ended
   };
 
   /// The settings are whoever runs it's, and may change while it is parked. [setup]
@@ -138,11 +138,11 @@ class Machine {
 
   // ---- its part in a change that is made in its wait
 
-  /// What begins now is to last no longer than this; false when who runs it is condemned. [rt]
+  /// What begins now is to last no longer than this; false when who runs it has timed out. [rt]
   bool begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT;
-  /// It has ended; false when it was condemned before. [rt]
+  /// It has ended; false when it timed out before. [rt]
   bool end_execution() MAUVE_RT { return execution_.end(); }
-  /// It is about to park, and nothing is under way any more; false when it was condemned before. [rt]
+  /// It is about to park, and nothing is under way any more; false when it timed out before. [rt]
   bool leave() MAUVE_RT { return execution_.leave(); }
   /// Reads the clock for what follows. [rt]
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
@@ -153,7 +153,7 @@ class Machine {
   /// Executes at no clock before this one any more: T of a change that it has taken. [rt]
   void change_at(time_ns_t instant_ns) MAUVE_RT;
   /// The last clock at which it began to execute, or T - 1 of its last change if that is later. [rt]; other threads once it
-  /// is parked or condemned.
+  /// is parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return entered_ns_.load(std::memory_order_relaxed); }
   /// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
   /// instants come closer together. Returns by how much: less than a period. [rt]
@@ -195,7 +195,7 @@ class Machine {
   /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: it wakes
   /// the watchdog itself. [rt]
   time_ns_t earliest_excess_ns() const MAUVE_RT;
-  /// For who condemns it. [rt]
+  /// For who times it out. [rt]
   ExecutionWord& execution() MAUVE_RT { return execution_; }
   const ExecutionWord& execution() const MAUVE_RT { return execution_; }
 

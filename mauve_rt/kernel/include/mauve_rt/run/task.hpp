@@ -62,7 +62,7 @@ struct ChangeSignal {
 /// Runs one component.
 ///
 /// The machine goes from wait to wait; the task is what lies around it: the thread, which sleeps in between, the commands,
-/// its votes and takes in commits, the condemnation of what lasts too long. resume() takes up commands and steps the machine; in
+/// its votes and takes in commits, the time-out of what lasts too long. resume() takes up commands and steps the machine; in
 /// simulated time whoever simulates calls it.
 ///
 /// "machine" is here whoever runs it: the component's thread, or a simulation.
@@ -78,12 +78,12 @@ struct ChangeSignal {
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
-/// | outputs_ (futex)       | who condemns, writer, machine         | all of these | acq_rel: one at a time writes them |
-/// | demoted_, verdict_     | who condemns, machine                 | machine      | execution_                         |
+/// | outputs_ (futex)       | who times it out, writer, machine     | all of these | acq_rel: one at a time writes them |
+/// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
 /// | shell_, core_          | commanders, machine parked; its takes | machine      | parking                            |
-/// | fault_                 | machine; who condemned                | anyone       | under fault_mutex_ (PI), a copy    |
+/// | fault_                 | machine; who timed it out                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
-/// |                        |                                       | condemns     |                                    |
+/// |                        |                                       | times out    |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
@@ -166,7 +166,7 @@ class Task final : public Waiter {
   /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other
   /// component.
   /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
-  /// By force: a component that still executes a state, or a guard, at the time-out is condemned: it is FAULTED, its outputs
+  /// By force: a component that still executes a state, or a guard, when the time is over is given up: it is FAULTED, its outputs
   /// are written as on a stop, its thread is demoted and left behind until the state ends. True when that was done.
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
   bool stop(time_ns_t timeout_ns = s_to_ns(1), bool force = false);
@@ -189,7 +189,7 @@ class Task final : public Waiter {
   /// Takes a commit that is made, for a parked component, and starts it if the commit does. [rt] as far as the actions are,
   /// command mutex held.
   void take_parked(Participant& participant) noexcept;
-  /// Machine::entered_ns() [rt], parked or condemned.
+  /// Machine::entered_ns() [rt], parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return machine_.entered_ns(); }
   /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
   void leave_behind(std::shared_ptr<void> used);
@@ -224,11 +224,12 @@ class Task final : public Waiter {
 
   // ---- watched executions (rule 11, execution_word.hpp)
 
-  /// Condemns the watched execution under way, whatever its bound - a state that declares one, or an adopt or take: tells FAULTED, takes the thread's priority away, then
-  /// writes what outputs can be written without waiting. False when none is under way. [non-rt], it allocates.
-  bool condemn(std::string what, time_ns_t now_ns);
+  /// Times out the watched execution under way, whatever its bound (of a state that declares one, an adopt or a take): tells
+  /// FAULTED, takes the thread's priority away, then writes what outputs can be written without waiting. False when none is
+  /// under way. [non-rt], it allocates.
+  bool time_out(std::string what, time_ns_t now_ns);
   /// The same where it is over its bound. [rt]
-  bool condemn_if_over(time_ns_t now_ns) MAUVE_RT;
+  bool time_out_if_over(time_ns_t now_ns) MAUVE_RT;
   /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
   /// thread wakes the watchdog itself. [rt]
   time_ns_t earliest_excess_ns() const MAUVE_RT { return machine_.earliest_excess_ns(); }
@@ -237,14 +238,15 @@ class Task final : public Waiter {
   bool take_outputs_left() noexcept;
   bool write_outputs_left() noexcept;
 
-  /// A condemned execution's thread is not to come back from now on; false when it has. [rt], who removes the component.
+  /// The thread of an execution that timed out is not to come back from now on; false when it has. [rt], who removes the
+  /// component.
   bool claim() MAUVE_RT { return machine_.execution().claim(); }
   /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
   void give_up_claim() MAUVE_RT { machine_.execution().give_up_claim(); }
   void abandon() MAUVE_RT;
   bool is_abandoned() const MAUVE_RT { return machine_.execution().is_abandoned(); }
-  /// Whether its thread still executes what it was condemned for. [rt]
-  bool is_left_behind() const MAUVE_RT { return machine_.execution().is_condemned(); }
+  /// Whether its thread still runs a timed-out execution. [rt]
+  bool is_left_behind() const MAUVE_RT { return machine_.execution().has_timed_out(); }
   /// What a person can do about a component whose thread does not come back. [rt]
   static constexpr const char* kLeftBehindRemedy =
       "its thread still executes: remove the component and add it anew, in one transaction";
@@ -327,7 +329,7 @@ class Task final : public Waiter {
   void run_guarded(Steps&& steps) noexcept;
 
   // its part in a commit
-  enum class Visit : std::uint8_t { goes_on, parks, condemned };
+  enum class Visit : std::uint8_t { goes_on, parks, timed_out };
   bool visit_posted();
   bool visit_before_release();
   bool settle_visit(Visit visit);
@@ -349,12 +351,12 @@ class Task final : public Waiter {
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
-  void park_condemned() noexcept;
+  void park_timed_out() noexcept;
   void end_in_fault() noexcept;
   void park(ComponentState state) noexcept;
-  bool condemn(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns);
-  bool condemn_unless_waiting();
-  void carry_out_sentence() MAUVE_RT;
+  bool time_out(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns);
+  bool time_out_unless_waiting();
+  void carry_out_time_out() MAUVE_RT;
   void take_back_outputs() noexcept;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
@@ -383,7 +385,7 @@ class Task final : public Waiter {
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
   FaultNote fault_;
-  FaultNote verdict_;  // of a condemned execution, then the fault before it; empty while none is condemned
+  FaultNote time_out_note_;  // of an execution that timed out, then the fault before it; empty while none has
   std::vector<std::shared_ptr<void>> left_behind_;
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
   const std::atomic<int>* locks_held_{nullptr};
@@ -408,7 +410,7 @@ class Task final : public Waiter {
   // the machine's own
   QueuePlace queue_place_{};         // of a simulated one
   bool in_resume_{false};            // its code is on some stack: what it calls must not resume it
-  bool has_decided_{false};  // by its vote, and the commit's requester sleeps still
+  bool has_decided_{false};          // by its vote, and the commit's requester sleeps still
   Participant* withdrawn_{nullptr};  // its commit is called off, and its requester sleeps still
   bool place_kept_{false};           // the fsm that a commit has put in goes on in its place
   time_ns_t overlong_ns_{0};  // what adopt and take of its core took, when that was more than they declared

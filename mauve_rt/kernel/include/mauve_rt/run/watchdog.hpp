@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The watchdog: condemns states that last longer than they declared, while they last. It does not poll.
+// The watchdog: finds states that last longer than they declared, while they last. It does not poll.
 #pragma once
 
 #include <atomic>
@@ -53,7 +53,7 @@ class Watchdog {
     if (end_ns < wake_before_ns_.load(std::memory_order_seq_cst)) [[unlikely]]
       wake();
   }
-  /// Has the outputs written that a condemned component lacks because of a lock. [rt]
+  /// Has the outputs written that a component that timed out lacks because of a lock. [rt]
   void write_what_is_left() MAUVE_RT;
   /// How often it has looked. [non-rt]
   std::uint64_t looks() const noexcept { return looks_.load(std::memory_order_relaxed); }

@@ -7,44 +7,44 @@
 
 namespace mauve {
 
-bool Task::condemn_if_over(time_ns_t now_ns) noexcept {
+bool Task::time_out_if_over(time_ns_t now_ns) noexcept {
   const auto execution = machine_.execution().look();
-  if (!execution || !execution->is_over(now_ns) || !machine_.execution().condemn(*execution)) return false;
-  verdict_.bound_ns = execution->limit_ns;
-  verdict_.when_ns = now_ns;
-  carry_out_sentence();
+  if (!execution || !execution->is_over(now_ns) || !machine_.execution().time_out(*execution)) return false;
+  time_out_note_.bound_ns = execution->limit_ns;
+  time_out_note_.when_ns = now_ns;
+  carry_out_time_out();
   return true;
 }
 
-bool Task::condemn(std::string what, time_ns_t now_ns) {
+bool Task::time_out(std::string what, time_ns_t now_ns) {
   const auto execution = machine_.execution().look();
-  return execution && condemn(*execution, std::move(what), now_ns);
+  return execution && time_out(*execution, std::move(what), now_ns);
 }
 
 /// A stop has been ordered by then, so that the thread finds its way out when what it does ends.
-bool Task::condemn_unless_waiting() {
+bool Task::time_out_unless_waiting() {
   const auto execution = machine_.execution().look_at_any();
   // After that look: one that began an adopt in between has another number, one that came to a wait is not harmed here.
   const std::optional<PresentState::Fact> fact = machine_.present().look();
   if (!execution || !fact || fact->is_wait || fact->since_ns == 0) return false;
   const std::string state = TraceNames::word(fact->name);
-  return condemn(*execution, "stopped by force while state " + state + " was executing", clock().now_ns());
+  return time_out(*execution, "stopped by force while state " + state + " was executing", clock().now_ns());
 }
 
-bool Task::condemn(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns) {
+bool Task::time_out(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns) {
   auto text = std::make_shared<const std::string>(std::move(what));
-  if (!machine_.execution().condemn(execution)) return false;
-  verdict_.what = std::move(text);
-  verdict_.when_ns = now_ns;
-  carry_out_sentence();
+  if (!machine_.execution().time_out(execution)) return false;
+  time_out_note_.what = std::move(text);
+  time_out_note_.when_ns = now_ns;
+  carry_out_time_out();
   return true;
 }
 
 /// FAULTED first, so that whoever has to act can; then the processor for the others; then the outputs.
-void Task::carry_out_sentence() noexcept {
-  verdict_.where = machine_.state_name();
-  if (verdict_.bound_ns != 0) tell_over_declared();
-  swap_fault(verdict_);  // the fault before this one stays there: a watchdog frees nothing
+void Task::carry_out_time_out() noexcept {
+  time_out_note_.where = machine_.state_name();
+  if (time_out_note_.bound_ns != 0) tell_over_declared();
+  swap_fault(time_out_note_);  // the fault before this one stays there: a watchdog frees nothing
   publish_state(ComponentState::faulted);
   if (has_thread_.load(std::memory_order_acquire)) {
     const sched_param ordinary{};
@@ -58,7 +58,7 @@ void Task::carry_out_sentence() noexcept {
     outputs_.store(kLeft, std::memory_order_release);
     if (watchdog_ != nullptr) watchdog_->write_what_is_left();
   }
-  machine_.execution().sentence();
+  machine_.execution().set_demoted();
 }
 
 bool Task::take_outputs_left() noexcept {
@@ -84,10 +84,10 @@ void Task::abandon() noexcept {
   machine_.execution().abandon();
 }
 
-/// The thread's way out of a condemned execution.
-void Task::park_condemned() noexcept {
+/// The thread's way out of an execution that timed out.
+void Task::park_timed_out() noexcept {
   if (machine_.execution().come_back()) {
-    verdict_ = {};
+    time_out_note_ = {};
     take_back_outputs();
     return end_in_fault();
   }
