@@ -55,19 +55,34 @@ def describe() -> Machine:
     )
 
 
-class StealMeter:
-    """How much of the CPUs' time the host gave to others since this was made."""
+class _ShareMeter:
+    """Some columns' share of the CPUs' time since this was made."""
+
+    _columns: tuple[int, ...]
 
     def __init__(self) -> None:
         self._before = _cpu_times()
 
     def percent(self) -> float:
-        """Stolen share so far."""
+        """The share so far."""
         spent = [now - before for before, now in zip(self._before, _cpu_times(), strict=True)]
-        return 100 * spent[_STEAL] / max(1, sum(spent))
+        return 100 * sum(spent[column] for column in self._columns) / max(1, sum(spent))
 
 
-_STEAL = 7  # the column of /proc/stat; guest times after it are contained in user times
+_IDLE, _IO_WAIT = 3, 4
+_STEAL = 7  # columns of /proc/stat; guest times after the last one are contained in user times
+
+
+class StealMeter(_ShareMeter):
+    """The CPU time that the host gave to others."""
+
+    _columns = (_STEAL,)
+
+
+class IdleMeter(_ShareMeter):
+    """The CPU time that no process used."""
+
+    _columns = (_IDLE, _IO_WAIT)
 
 
 def _cpu_times() -> list[int]:

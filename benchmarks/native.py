@@ -2,7 +2,8 @@
 
 import json
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,17 +25,40 @@ def run(program: str, *, timeout_s: float = 300, **options: float | str) -> dict
     Raises:
         BenchmarkError: it is not built, failed, or printed something else.
     """
-    words = [str(_BUILT / program)]
-    for name, value in options.items():
-        words += [f"--{name.replace('_', '-')}", str(value)]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=timeout_s, check=False)
+        done = subprocess.run(
+            _words(program, options), capture_output=True, text=True, timeout=timeout_s, check=False
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BenchmarkError(f"{program}: {error}") from None
     if done.returncode:
         raise BenchmarkError(done.stderr.strip() or f"{program}: exit status {done.returncode}")
     result: dict[str, Any] = json.loads(done.stdout)
     return result
+
+
+@contextmanager
+def running(program: str, **options: float | str) -> Iterator[subprocess.Popen[str]]:
+    """Inside, a program runs, from its first line of output to the end of its input.
+
+    Raises:
+        BenchmarkError: it is not built, or printed nothing.
+    """
+    try:
+        process = subprocess.Popen(
+            _words(program, options), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+    except OSError as error:
+        raise BenchmarkError(f"{program}: {error}") from None
+    with process:  # waits for its end
+        assert process.stdin is not None  # noqa: S101 - both are pipes
+        assert process.stdout is not None  # noqa: S101
+        try:
+            if not process.stdout.readline():
+                raise BenchmarkError(f"{program} ended too soon")
+            yield process
+        finally:
+            process.stdin.close()
 
 
 def interleaved(rounds: int, *measures: Callable[[int], Result]) -> list[list[Result]]:
@@ -57,3 +81,10 @@ def both(program: str, rounds: int, **options: int) -> list[list[dict[str, Any]]
         return lambda number: run(program, who=who, seed=number, **options)
 
     return interleaved(rounds, side("component"), side("bare"))
+
+
+def _words(program: str, options: Mapping[str, float | str]) -> list[str]:
+    words = [str(_BUILT / program)]
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    return words

@@ -34,7 +34,7 @@ from reflex import reflex_rows
 from rows import Row, markdown, not_available
 from safe_stop import safe_stop_rows
 from scale import idle_rows, scale_rows, simulation_rows
-from service_calls import service_rows, service_stop_rows
+from service_calls import service_blackout_rows, service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
 from start import start_rows
 from topics import topic_rows
@@ -65,6 +65,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "safe-stop": safe_stop_rows,
     "soak": soak_rows,
     "service": service_rows,
+    "service-blackout": service_blackout_rows,
     "service-stop": service_stop_rows,
     "topics": topic_rows,
     "start": start_rows,

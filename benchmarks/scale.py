@@ -8,6 +8,7 @@ from rows import Row, alone, compared, exactly_zero
 from settings import Settings
 
 _COUNTS = (1, 8, 64, 500)
+_SIMULATED = 3000
 _KIB = 1024
 _LINEAR = 1.5
 """A component of the most costs at most so many times one of the middle count, or it is not linear."""
@@ -65,7 +66,7 @@ def idle_rows(settings: Settings) -> Iterator[Row]:
 
 
 def simulation_rows(settings: Settings) -> Iterator[Row]:
-    """A thousand components in virtual time, all due at once or one after the other."""
+    """Virtual time with a thousand components; one transaction over three thousand."""
     rounds = native.interleaved(
         settings.rounds,
         *[lambda _, spread=spread: native.run("bench_simulation", spread=spread) for spread in (0, 1)],
@@ -75,6 +76,14 @@ def simulation_rows(settings: Settings) -> Iterator[Row]:
         each = [found[place]["real_ns"] / found[place]["releases"] for found in rounds]
         note = f"{sorted(each)[len(each) // 2]:.0f} ns a release; no trace"
         yield alone(f"1000 components at 10 Hz, due {how}: virtual time", passed, unit="s/s", note=note)
+    changes = [
+        native.run("bench_simulation", measure="transaction", components=_SIMULATED, trace=1)
+        for _ in range(settings.rounds)
+    ]
+    took_ms = [one["real_ns"] / 1e6 for one in changes]
+    what = f"simulated transaction, a new core for each of {_SIMULATED} components: real time of the commit"
+    note = "from the preparation to the report; with a trace"
+    yield alone(what, took_ms, unit="ms", limit=1000, note=note)
 
 
 def _measure(count: int, duration_s: float) -> native.Measure:

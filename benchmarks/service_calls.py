@@ -1,15 +1,17 @@
-"""An executor's services: replace_core beside a bare Trigger call, and stop beside a preparation."""
+"""An executor's services: how long calls take, and the blackout of replace_core on a busy machine."""
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
+import machine
 import native
 import numpy as np
 import rclpy
+import stress
 from busy_executor import ARCHITECTURE, COMPONENT
 from executor_process import ExecutorProcess
 from native import BenchmarkError
@@ -21,11 +23,13 @@ from settings import Settings
 from std_srvs.srv import Trigger
 from talkers import Talkers, plugin_prefix
 
+from mauve_msgs.msg import StepReport
 from mauve_msgs.srv import ReplaceCore, Start, Stop
 
 _CORES = ("mauve_examples/Accelerando", "mauve_examples/Metronome")
 _REPLY_S = 10.0
 _DISCOVERY_S = 20.0
+_PAUSE_S = 0.002  # longest pause between calls: a random pause reaches every phase of the 1 ms period
 _UNDER_WAY_S = 0.02  # after which a preparation, which takes 0.1 s, is under way
 
 
@@ -42,8 +46,7 @@ def service_rows(settings: Settings) -> Iterator[Row]:
         replace = calls.client(ReplaceCore, f"{executor.namespace}/executor/replace_core")
 
         def replacements(number: int) -> list[float]:
-            cores = (_CORES[(number + index) % 2] for index in range(settings.service_calls))
-            requests = (ReplaceCore.Request(component=COMPONENT, core=core) for core in cores)
+            requests = _replacements(number, settings.service_calls)
             return [calls.duration_ns(replace, request) for request in requests]
 
         def triggers(_: int) -> list[float]:
@@ -54,7 +57,53 @@ def service_rows(settings: Settings) -> Iterator[Row]:
         "replace_core of a 1 kHz component over its service",
         rounds,
         beside="a bare std_srvs/Trigger call",
-        ratio_limit=1.5,
+        ratio_limits={50: 1.5, 99: 1.5},
+    )
+
+
+def service_blackout_rows(settings: Settings) -> Iterator[Row]:
+    """Rounds of replacements of a 1 kHz component's core: another process computes on each CPU, or none."""
+    with ExitStack() as stack:
+        processes = stack.enter_context(Processes())
+        executor = ExecutorProcess(processes, ARCHITECTURE)
+        calls = stack.enter_context(_SpunClient())
+        replace = calls.client(ReplaceCore, f"{executor.namespace}/executor/replace_core")
+
+        def blackout_ns(request: ReplaceCore.Request) -> float:
+            future = replace.call_async(request)
+            calls.result(replace, future)
+            (step,) = future.result().report
+            if step.blackout_ns == StepReport.NOT_MEASURED:
+                raise BenchmarkError(f"no blackout in the report of {step.step}: {COMPONENT} does not run")
+            return float(step.blackout_ns)
+
+        def blackouts(number: int) -> list[float]:
+            random = np.random.default_rng(number)
+            found = []
+            for request in _replacements(number, settings.service_calls):
+                time.sleep(random.uniform(0, _PAUSE_S))
+                found.append(blackout_ns(request))
+            return found
+
+        def busy(number: int) -> list[float]:
+            with stress.computing():
+                return blackouts(number)
+
+        idle_percents = []
+
+        def idle(number: int) -> list[float]:
+            meter = machine.IdleMeter()
+            found = blackouts(number)
+            idle_percents.append(meter.percent())
+            return found
+
+        rounds = native.interleaved(settings.rounds, busy, idle)
+    yield from _compared(
+        "replace_core of a 1 kHz component over its service, an ordinary thread busy on each CPU, blackout",
+        rounds,
+        beside="the same, machine idle",
+        ratio_limits={50: 1.2, 99: None},
+        note=f"the CPUs were idle for {np.median(idle_percents):.0f} % of the time of the idle side (median)",
     )
 
 
@@ -97,12 +146,26 @@ def service_stop_rows(settings: Settings) -> Iterator[Row]:
         "stop of a 1 kHz component over its service while another one's new core is prepared",
         rounds,
         beside="the same alone",
-        ratio_limit=2.0,
+        ratio_limits={50: 2.0, 99: 2.0},
     )
 
 
-def _compared(what: str, rounds: Sequence[Any], *, beside: str, ratio_limit: float) -> Iterator[Row]:
-    for percent in (50, 99):
+def _replacements(number: int, count: int) -> Iterator[ReplaceCore.Request]:
+    """The requests of a round: the two cores in turn."""
+    for index in range(count):
+        yield ReplaceCore.Request(component=COMPONENT, core=_CORES[(number + index) % 2])
+
+
+def _compared(
+    what: str,
+    rounds: Sequence[Any],
+    *,
+    beside: str,
+    ratio_limits: Mapping[int, float | None],
+    note: str = "",
+) -> Iterator[Row]:
+    """One row for each percentile that has an entry in `ratio_limits`; None: no limit."""
+    for percent, ratio_limit in ratio_limits.items():
         pairs = [tuple(float(np.percentile(part, percent)) / 1e3 for part in found) for found in rounds]
         yield compared(
             f"{what}, p{percent}",
@@ -110,6 +173,7 @@ def _compared(what: str, rounds: Sequence[Any], *, beside: str, ratio_limit: flo
             unit="us",
             beside=beside,
             ratio_limit=ratio_limit,
+            note=note,
         )
 
 

@@ -1,4 +1,4 @@
-"""The machine kept busy by stress-ng: computing, memory and file system, all at normal priority."""
+"""The machine kept busy at normal priority: by stress-ng, or by one computing thread on each CPU."""
 
 import os
 import subprocess
@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import native
 import packages
 from native import BenchmarkError
 
@@ -41,3 +42,18 @@ def stressed() -> Iterator[None]:
         finally:
             process.terminate()  # ends its stressors too
             process.communicate()
+
+
+@contextmanager
+def computing() -> Iterator[None]:
+    """Inside, an ordinary thread of another process never rests on each CPU.
+
+    Raises:
+        BenchmarkError: the program does not run, or ended too soon.
+    """
+    cpus = len(os.sched_getaffinity(0))
+    with native.running("bench_busy", cpus=cpus) as process:
+        time.sleep(_RAMP_S)
+        yield
+        if process.poll() is not None:
+            raise BenchmarkError("bench_busy ended too soon")
