@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import native
 import rclpy
@@ -70,7 +70,7 @@ class _Beats:
         self._heard: list[tuple[float, int]] = []
         self._node.create_subscription(Float64, topic, self._hear, 1000)
 
-    def __enter__(self) -> "_Beats":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

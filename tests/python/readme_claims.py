@@ -54,6 +54,16 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
         "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
+    "neither Python, nor a request, nor a console that nobody reads delays that": (
+        "ros/executor/test_safe_stop.py::test_a_signal_waits_for_no_lock_of_the_interpreter",
+        "ros/executor/test_safe_stop.py::test_a_console_that_nobody_reads_holds_up_nothing",
+        "ros/executor/test_safe_stop.py::test_a_rules_file_that_is_a_pipe_is_refused_at_once",
+    ),
+    "SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and SIGUSR2 end the process in order": (
+        "ros/executor/test_process.py::test_signal_seals_the_bag",
+        "Signals/EndSignal.MakesOutputsSafe/0",
+    ),
+    "A component that hangs is given up after 0.5 s": ("ProcessEnd.AComponentThatHangsIsGivenUp",),
     "one that finds another under way for 10 s is refused": (
         "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
     ),
