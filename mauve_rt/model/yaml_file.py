@@ -64,7 +64,8 @@ class YamlFile:
 
     def _read(self) -> str:
         try:
-            with self.path.open("rb", opener=None if self._waits else _open_at_once) as file:
+            opener = None if self._waits else _open_at_once
+            with open(self.path, "rb", opener=opener) as file:
                 if not self._waits and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                     what, remedy = "not a regular file", "copy its contents into one"
                     raise self.error(what, expected="a regular file", code="io", remedy=remedy)

@@ -2,7 +2,6 @@
 #include "console.hpp"
 
 #include <rcutils/logging.h>
-#include <rcutils/time.h>
 
 #include <array>
 #include <chrono>
@@ -24,13 +23,13 @@ constexpr std::size_t kMostBytes = std::size_t{1} << 20U;  // of these lines
 constexpr std::size_t kLongest = std::size_t{64} * 1024;   // characters of one line
 
 struct ConsoleLine {
-  std::string function;
-  std::string file;
+  std::string function{};
+  std::string file{};
   std::size_t number{0};
   int severity{0};
-  std::string name;
+  std::string name{};
   rcutils_time_point_value_t time_ns{0};
-  std::string text;
+  std::string text{};
 
   std::size_t bytes() const noexcept { return function.size() + file.size() + name.size() + text.size(); }
 };
@@ -111,8 +110,7 @@ class ConsoleQueue {
 
  private:
   static ConsoleLine report(std::uint64_t dropped) {
-    ConsoleLine line{.severity = RCUTILS_LOG_SEVERITY_WARN, .name = "console", .text = {}};
-    rcutils_system_time_now(&line.time_ns);
+    ConsoleLine line{.severity = RCUTILS_LOG_SEVERITY_WARN, .name = "console", .time_ns = realtime_now_ns()};
     line.text = std::to_string(dropped) + (dropped == 1 ? " line was" : " lines were") +
                 " left out: the terminal or pipe was not read for a while";
     return line;
@@ -139,7 +137,7 @@ void log_line(const rcutils_log_location_t* location, int severity, const char* 
   va_list again;
   va_copy(again, *arguments);
   other_handlers(location, severity, name, time_ns, format, arguments);
-  ConsoleLine line{.severity = severity, .name = name != nullptr ? name : "", .time_ns = time_ns, .text = {}};
+  ConsoleLine line{.severity = severity, .name = name != nullptr ? name : "", .time_ns = time_ns};
   if (location != nullptr) {
     line.function = location->function_name != nullptr ? location->function_name : "";
     line.file = location->file_name != nullptr ? location->file_name : "";
