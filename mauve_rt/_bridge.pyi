@@ -15,6 +15,19 @@ def flush_console(timeout_ns: int) -> bool:
 def console_dropped() -> int:
     """Lines that were left out, because too many waited to be written."""
 
+class NodeWatch:
+    """Reports, without Python, that Python is silent: an ERROR in the log, no WATCHDOG=1 for systemd."""
+
+    def __init__(self, logger: str, *, silent_after_ns: int) -> None:
+        """Watch from now on."""
+    def beat(self) -> None:
+        """Say that Python works."""
+    def stop(self) -> None:
+        """End the watch; may be called again."""
+    @staticmethod
+    def notify(state: str) -> None:
+        """Report a state, such as READY=1, to the service manager that NOTIFY_SOCKET names, if it does."""
+
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""
 

@@ -757,9 +757,9 @@ END_SIGNALS: set[int]
 def wait_end_signal(*, grace_ns: int, dump_signal: int = 0) -> int:
     """Sleep until one of END_SIGNALS comes, which all threads have to block; returns it.
 
-    Before it returns, every deployer of the process is shut down for good: outputs are safe. None of that needs
-    the interpreter's lock. The process ends `grace_ns` after the signal at the latest, with status 1; it raises
-    `dump_signal` then, for a handler that shows where the threads are.
+    Before it returns, every deployer of the process is shut down for good: outputs are safe. None of that
+    needs the interpreter's lock. The process ends `grace_ns` after the signal at the latest, with status 1;
+    it raises `dump_signal` then, for a handler that shows where the threads are.
     """
 
 # ---- rules: the engine that the supervisor, virtual time and tools share; instants are the caller's

@@ -5,8 +5,9 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -140,9 +141,11 @@ def start_executor(
     """start_executor("-p", "architecture:=FILE", ...): ended with the test, by force if need be."""
     started: list[ExecutorProcess] = []
 
-    def start(*arguments: str, **options: Any) -> ExecutorProcess:
-        environment = {"ROS_DOMAIN_ID": str(domain)}
-        started.append(ExecutorProcess(tmp_path, environment, arguments, **options))
+    def start(
+        *arguments: str, environment: Mapping[str, str] = MappingProxyType({}), **options: Any
+    ) -> ExecutorProcess:
+        variables = {"ROS_DOMAIN_ID": str(domain), **environment}
+        started.append(ExecutorProcess(tmp_path, variables, arguments, **options))
         return started[-1]
 
     yield start

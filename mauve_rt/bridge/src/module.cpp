@@ -7,6 +7,7 @@
 
 #include "bridge.hpp"
 #include "console.hpp"
+#include "node_watch.hpp"
 
 namespace py = pybind11;
 
@@ -58,6 +59,11 @@ PYBIND11_MODULE(_bridge, module) {
   module.def("start_console", &Console::start);
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked());
   module.def("console_dropped", &Console::dropped);
+  py::class_<NodeWatch>(module, "NodeWatch")
+      .def(py::init<std::string, time_ns_t>(), py::arg("logger"), py::kw_only(), py::arg("silent_after_ns"))
+      .def("beat", &NodeWatch::beat)
+      .def("stop", &NodeWatch::stop, Unlocked())
+      .def_static("notify", &NodeWatch::notify, py::arg("state"));
   py::class_<rmw_qos_profile_t>(module, "Qos")
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,

@@ -9,6 +9,7 @@ from typing import Any
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.node.shared.watch import Watch
 
+MOST_WAITING = 1000  # events; more come only where each waits for a release that is slow to come
 _LOOK_NS = 50_000_000  # how long a hurried end may have to wait for a look at a report
 
 
@@ -33,6 +34,7 @@ class Events:
     | `_waiting`         | add(), the thread              | `_changed`          |
     | `answered` of each | tell()                         | `_changed`          |
     | `_hurried`         | flush(): how many ask          | `_changed`          |
+    | `_left_out`        | add(), the thread              | `_changed`          |
     | `_ending`          | close()                        | `_changed`          |
     | `_thread`          | add()                          | `_changed`          |
     | `_ended`           | the thread                     | itself              |
@@ -45,13 +47,20 @@ class Events:
         self._changed = threading.Condition()
         self._waiting: deque[Event] = deque()
         self._hurried = 0
+        self._left_out = 0
         self._ending = False
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
 
     def add(self, event: Event) -> None:
-        """Take it down, after those before it; it is told after tell(). From any thread."""
+        """Take it down, after those before it; it is told after tell(). From any thread.
+
+        With too many before it, it is left out, which is logged.
+        """
         with self._changed:
+            if len(self._waiting) >= MOST_WAITING:
+                self._left_out += 1
+                return
             self._waiting.append(event)
             if self._thread is None:
                 self._thread = self._watch.thread("events", self._tell_next, ending=self._ended)
@@ -92,7 +101,10 @@ class Events:
         finally:  # the next ones are to be told in any case
             with self._changed:
                 self._waiting.popleft()
+                left_out, self._left_out = self._left_out, 0
                 self._changed.notify_all()
+        if left_out:
+            self._watch.report(f"{left_out} events were left out: they came faster than they can be reported")
 
     def _next(self) -> Event | None:
         def is_due() -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from mauve_rt._bridge import NodeWatch
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
@@ -28,6 +29,7 @@ from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.errors import TraceError
 
 NODE_NAME = "executor"
+_HEALTH_S = 1.0
 
 
 class ExecutorNode(LifecycleNode):
@@ -70,6 +72,7 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
         )
         self._state.rules = self._rules.names
+        self._node_watch: NodeWatch | None = None
 
     def open(self) -> None:
         """Offer services and diagnostics. Once, before anything spins the node.
@@ -115,7 +118,11 @@ class ExecutorNode(LifecycleNode):
             control_group=self.control_group,
             query_group=query_group,
         )
-        self.create_timer(1.0, self._tell_health, callback_group=query_group)
+        silent_after_ns = round(self._settings["node_silent_after_s"] * 1e9)
+        self._node_watch = NodeWatch(super().get_logger().name, silent_after_ns=silent_after_ns)
+        self.create_timer(_HEALTH_S, self._tell_health, callback_group=query_group)
+        if self._runtime.active:
+            NodeWatch.notify("READY=1")
 
     def get_logger(self) -> Console:
         """As rclpy's, but quick."""
@@ -196,6 +203,8 @@ class ExecutorNode(LifecycleNode):
             self._bound.start()
             self._rules.start()  # first, so that ~/state names them from the first time on
             self._state.start(self._runtime.host)
+            if self._node_watch is not None:  # else it is not open yet
+                NodeWatch.notify("READY=1")
         self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
 
     def _clean_up(self) -> None:
@@ -260,6 +269,7 @@ class ExecutorNode(LifecycleNode):
 
         A component whose state still executes keeps its memory until the process ends.
         """
+        NodeWatch.notify("STOPPING=1")
         try:
             self.quiesce()
             try:
@@ -270,6 +280,8 @@ class ExecutorNode(LifecycleNode):
                 self._rules.close()
                 self._bound.close()
         finally:
+            if self._node_watch is not None:
+                self._node_watch.stop()
             self._state.close()
             self.destroy_node()
 
@@ -302,6 +314,8 @@ class ExecutorNode(LifecycleNode):
             return load_reply(self._rules, path)
 
     def _tell_health(self) -> None:
+        if self._node_watch is not None:
+            self._node_watch.beat()
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
         self._topic_watch.look(self._bound.topics(), self._bound.other_types())

@@ -45,6 +45,9 @@ PARAMETERS: dict[str, Setting] = {
         minimum=0,
         maximum=MAX_PHASE_TIMEOUT_S,
     ),
+    "node_silent_after_s": Setting(
+        5.0, "the executor reports that its Python side has been silent for so long", minimum=2
+    ),
     "max_request_bytes": Setting(
         _LIMITS.max_request_bytes, "size of one request, all its texts together", minimum=1
     ),

@@ -43,6 +43,10 @@ class Watch:
         lines = "".join(traceback.format_tb(error.__traceback__)).rstrip()
         self._write(f"{where} failed and goes on: {text}\n{valid_text(lines)}".rstrip())
 
+    def report(self, text: str) -> None:
+        """Log a line about what was not done."""
+        self._write(text)
+
     def thread(self, name: str, step: Callable[[], None], *, ending: threading.Event) -> threading.Thread:
         """A thread, not started yet, that does `step` again and again until `ending` is set."""
         return threading.Thread(target=self._run, args=(name, step, ending), name=name, daemon=True)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.node.executor.events import Event, Events
+from mauve_rt.node.executor.events import MOST_WAITING, Event, Events
 from mauve_rt.node.shared.watch import Watch
 
 PATIENCE_S = 100.0
@@ -101,3 +101,20 @@ def test_an_event_that_cannot_be_told_keeps_no_other_one_back(ear: Ear) -> None:
     assert ear.messages(1) == ["good"]
     assert complaints[0].startswith("thread 'events' failed and goes on: ValueError: not that one")
     events.close()
+
+
+def test_too_many_events_are_left_out_and_counted(ear: Ear) -> None:
+    logged: list[str] = []
+    events, release = Events(ear, Watch(logged.append)), Release()
+    slow = event("of a change", release)
+    events.add(slow)
+    events.tell(slow)
+    assert release.asked.wait(PATIENCE_S)
+    for number in range(MOST_WAITING + 4):
+        each = event(str(number))
+        events.add(each)
+        events.tell(each)
+    release.came.set()
+    events.close()
+    assert ear.messages(MOST_WAITING)[-1] == str(MOST_WAITING - 2)
+    assert logged == ["5 events were left out: they came faster than they can be reported"]

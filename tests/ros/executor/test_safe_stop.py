@@ -1,9 +1,12 @@
 """Safe outputs wait for nothing: no interpreter's lock, no console that nobody reads, no request."""
 
+import contextlib
 import fcntl
 import os
 import signal
+import socket
 import tempfile
+import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -63,16 +66,11 @@ def test_a_console_that_nobody_reads_holds_up_nothing(
 
 
 def test_a_signal_waits_for_no_lock_of_the_interpreter(
-    architecture: Path, start_executor: Callable[..., Any], graph: Any
+    architecture: Path, start_executor: Callable[..., Any], graph: Any, kept: Callable[[Any], Path]
 ) -> None:
-    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
-    before, after = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/", "PyKeeping,"
-    text = text.replace(f"{before}Counter,", f"{before}{after}", 1)
-    architecture.write_text(text, encoding="utf-8")
     executor = start_executor("-p", f"architecture:={architecture}")
     counts = counts_of(graph)
-    keeping = Path(tempfile.gettempdir()) / f"mauve_keeping_{executor.process.pid}"
-    keeping.touch()
+    keeping = kept(executor)
     try:
         graph.spin_until(lambda: keeping.read_text("utf-8") == "keeping", "the interpreter to be kept")
         executor.process.send_signal(signal.SIGTERM)
@@ -81,6 +79,77 @@ def test_a_signal_waits_for_no_lock_of_the_interpreter(
         executor.wait()
     finally:
         keeping.unlink()
+
+
+@pytest.fixture
+def kept(architecture: Path) -> Callable[[Any], Path]:
+    """`kept(executor)` lets its component sleepy keep the interpreter for 5 s; returns the file that says so."""
+    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
+    before, after = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/", "PyKeeping,"
+    architecture.write_text(text.replace(f"{before}Counter,", f"{before}{after}", 1), encoding="utf-8")
+
+    def keep(executor: Any) -> Path:
+        file = Path(tempfile.gettempdir()) / f"mauve_keeping_{executor.process.pid}"
+        file.touch()
+        return file
+
+    return keep
+
+
+class Manager:
+    """A service manager, as systemd is one to a service of type notify: it hears what a process says."""
+
+    def __init__(self, folder: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(str(folder / "notify"))
+        self._socket.setblocking(False)
+        self.heard: list[tuple[float, str]] = []
+        self.environment = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "1000000"}
+
+    def hear(self, state: str) -> int:
+        """How often a state was reported by now."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.heard.append((time.monotonic(), self._socket.recv(1000).decode()))
+        return [said for _, said in self.heard].count(state)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def manager(tmp_path: Path) -> Iterator[Manager]:
+    manager = Manager(tmp_path)
+    yield manager
+    manager.close()
+
+
+def test_a_node_whose_python_is_silent_says_so(
+    architecture: Path,
+    start_executor: Callable[..., Any],
+    graph: Any,
+    kept: Callable[[Any], Path],
+    manager: Manager,
+) -> None:
+    words = ("-p", f"architecture:={architecture}", "-p", "node_silent_after_s:=2.0")
+    executor = start_executor(*words, environment=manager.environment)
+    counts_of(graph)
+    graph.spin_until(lambda: manager.hear("READY=1") == 1, "that it is ready")
+    graph.spin_until(lambda: manager.hear("WATCHDOG=1") > 1, "that it works")
+    assert "silent" not in executor.output
+    file = kept(executor)
+    try:
+        graph.spin_until(lambda: file.read_text("utf-8") == "keeping", "the interpreter to be kept")
+        graph.spin_until(lambda: "node: Python has been silent" in executor.output, "that it is silent")
+        manager.hear("WATCHDOG=1")
+        manager.heard.clear()
+        graph.spin_until(lambda: file.read_text("utf-8") == "over", "the interpreter")
+        graph.spin_until(lambda: "node: Python works again" in executor.output, "that it works again")
+        graph.spin_until(lambda: manager.hear("WATCHDOG=1") > 0, "that it works again")
+    finally:
+        file.unlink()
+    assert executor.end(signal.SIGTERM)[0] == 0
+    assert manager.hear("STOPPING=1") == 1
 
 
 def test_a_rules_file_that_is_a_pipe_is_refused_at_once(
