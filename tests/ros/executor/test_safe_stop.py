@@ -83,7 +83,7 @@ def test_a_signal_waits_for_no_lock_of_the_interpreter(
 
 @pytest.fixture
 def kept(architecture: Path) -> Callable[[Any], Path]:
-    """`kept(executor)` lets its component sleepy keep the interpreter for 5 s; returns the file that says so."""
+    """`kept(executor)` lets a component keep the interpreter for 5 s; returns the file that says so."""
     text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
     before, after = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/", "PyKeeping,"
     architecture.write_text(text.replace(f"{before}Counter,", f"{before}{after}", 1), encoding="utf-8")
