@@ -1023,6 +1023,8 @@ class Reflex:
     def wake(self) -> None:
         """End that wait, now and from now on."""
     def facts(self) -> list[RuleFacts]: ...
+    def beat(self) -> None:
+        """Say that the executor's Python side works, for conditions `node_silent`."""
     def lost(self) -> int:
         """Decisions that were left out, because those before them were not taken in time."""
     def advance(self) -> int:

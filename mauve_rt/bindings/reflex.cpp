@@ -101,6 +101,7 @@ void bind_reflex(py::module_& module) {
           "wake", [](PyReflex& self) { self.reflex().wake(); }, Unlocked())
       .def(
           "facts", [](PyReflex& self) { return self.reflex().facts(); }, Unlocked())
+      .def("beat", [](PyReflex& self) { self.reflex().beat(); })
       .def("lost", [](PyReflex& self) { return self.reflex().lost(); })
       .def("advance", [](PyReflex& self) { return self.reflex().advance(); }, Unlocked());
   // Called before the hosts' own: what is registered last is called first.

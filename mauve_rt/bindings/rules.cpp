@@ -12,7 +12,7 @@ using Unlocked = py::call_guard<py::gil_scoped_release>;
 
 constexpr auto kSignalNames =
     std::to_array<std::string_view>({"message", "write", "field", "overruns", "late", "release", "state",
-                                     "over_declared", "peer", "diagnostic", "change"});
+                                     "over_declared", "peer", "diagnostic", "change", "node"});
 constexpr auto kEndings =
     std::to_array<std::string_view>({"done", "refused", "stale", "withdrawn", "timed_out"});
 

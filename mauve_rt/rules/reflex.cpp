@@ -101,6 +101,7 @@ void Reflex::stop() noexcept {
 }
 
 time_ns_t Reflex::advance() {
+  beat();
   for (;;) {
     tend();
     const time_ns_t next_ns = step();

@@ -33,6 +33,7 @@ _WORDS: Mapping[str, Words] = {
     "peer": Words("executor {executor}: {is}", "executor {executor}: no longer {is}"),
     "diagnostic": Words("diagnostic '{status}' says {level} or worse", "diagnostic '{status}' is better"),
     "since_change": Words("{of} unchanged for {measured:.2f} s", "{of} has changed"),
+    "node_silent": Words("Python silent for {measured:.2f} s", "Python works"),
 }
 
 

@@ -12,6 +12,7 @@ _INSIDE: Mapping[str, str] = {
     "late": "it is heard how late {target} is",
     "release": "releases of {target} are heard",
     "over_declared": "it is heard how long {target} executes",
+    "node": "it is heard whether Python works",
 }
 
 

@@ -33,6 +33,7 @@ _NEVER: Mapping[str, str] = {
     "write": "writes of resource {}",
     "over_declared": "which executions of {} lasted longer than declared",
     "peer": "what was known of executor {}",
+    "node": "whether Python worked{}",
 }
 
 

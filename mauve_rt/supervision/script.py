@@ -9,8 +9,8 @@
 
 Each line tells of one thing: messages of a topic, named as in the rules; writes to a resource; overruns,
 late wake-ups or responses, executions longer than declared, releases, the state or changes of a component
-(changes of '': of the architecture); the state of a peer; the level of a diagnostic. `value` is that of
-the field at which a condition looks; counts grow by one with each. What is not said does not happen.
+(changes of '': of the architecture); the state of a peer; the level of a diagnostic; that the executor's
+Python side works (node: ''). `value` is that of the field at which a condition looks; counts grow by one with each. What is not said does not happen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +43,7 @@ _SIGNALS: Mapping[str, tuple[str, ...]] = {
     "peer": ("peer",),
     "diagnostic": ("diagnostic",),
     "change": ("change",),
+    "node": ("node",),
 }
 _COUNTED = ("overruns", "late", "over_declared")
 # The words for values, with their numbers.
@@ -66,6 +67,7 @@ class Heard(Section):
     peer: str | None = setting(Text(), default=None)
     diagnostic: str | None = setting(Text(), default=None)
     change: str | None = setting(Text(), default=None)
+    node: str | None = setting(Text(), default=None)
     word: str | None = setting(
         Choice(*dict.fromkeys(each for words in _WORDS.values() for each in words)), default=None, key="is"
     )

@@ -316,6 +316,7 @@ class ExecutorNode(LifecycleNode):
     def _tell_health(self) -> None:
         if self._node_watch is not None:
             self._node_watch.beat()
+        self._rules.beat()
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
         self._topic_watch.look(self._bound.topics(), self._bound.other_types())

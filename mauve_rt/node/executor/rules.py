@@ -162,6 +162,11 @@ class OwnRules:
         """Of the rules that are at work."""
         return self._at_work
 
+    def beat(self) -> None:
+        """Say that the executor's Python side works."""
+        if (reflex := self._reflex) is not None:
+            reflex.beat()
+
     def facts(self) -> list[RuleFacts]:
         """How each of them fares."""
         reflex = self._reflex

@@ -25,7 +25,8 @@
   X(peer)                        \
   X(diagnostic)                  \
   X(boolean)                     \
-  X(since_change)
+  X(since_change)                \
+  X(node_silent)
 
 namespace mauve::rules {
 

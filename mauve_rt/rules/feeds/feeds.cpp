@@ -59,6 +59,9 @@ void Feeds::open(const SignalSpec& spec, Signal& signal) {
         return;
       }
       break;
+    case SignalKind::node:
+      node_.push_back(&signal);
+      return;
     case SignalKind::peer:
       refuse("of another executor (" + spec.target + ")");
     case SignalKind::diagnostic:
@@ -106,6 +109,10 @@ const std::string& Feeds::resource_of(const std::string& topic) const {
                  .remedy = "bind one to it (subscribe: in its section), or give the rule `in: supervisor`"});
   }
   return found->second;
+}
+
+void Feeds::beat() noexcept {
+  for (Signal* signal : node_) signal->tell(place_.clock.now_ns());
 }
 
 void Feeds::follow() {

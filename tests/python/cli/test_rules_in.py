@@ -32,6 +32,7 @@ HEARD = {  # by the executor itself
     "over_declared": "over_declared: {component: eager}",
     "boolean": "boolean: {topic: set_point, type: std_msgs/msg/Float64}",
     "since_change": "since_change: {component: eager, longer_than_s: 5}",
+    "node_silent": "node_silent: {longer_than_s: 5}",
 }
 OUTSIDE = {
     "peer": "^peer: {executor: robot_2}",

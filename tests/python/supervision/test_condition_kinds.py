@@ -43,6 +43,7 @@ GOOD = {
         "since_change: {longer_than_s: 5}",
         "since_change: {component: control, longer_than_s: 5}",
     ],
+    "node_silent": ["node_silent: {}", "node_silent: {longer_than_s: 2}"],
 }
 
 BAD = [

@@ -24,6 +24,7 @@ from mauve_rt.yaml.text import read_yaml
         ("boolean: {topic: armed}", "boolean: {topic: armed, is: false}"),
         ("since_change: {longer_than_s: 5}", "not: {since_change: {longer_than_s: 4}}"),
         ("silence: {resource: in, longer_than_s: 5}", "not: {silence: {resource: in, longer_than_s: 5}}"),
+        ("node_silent: {longer_than_s: 5}", "not: {node_silent: {longer_than_s: 4}}"),
         (
             "value: {topic: in, field: x, above: 5}",
             "not: {value: {topic: in, type: std_msgs/msg/Header, field: x, above: 4}}",

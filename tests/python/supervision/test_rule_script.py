@@ -24,6 +24,7 @@ TOLD = [
     ("diagnostic: {status: gps}", {"diagnostic": "gps", "is": "ERROR"}, [2.0]),
     ("since_change: {longer_than_s: 1}", {"change": ""}, [0.0]),
     ("since_change: {component: one, longer_than_s: 1}", {"change": "one"}, [0.0]),
+    ("node_silent: {longer_than_s: 2}", {"node": "", "every_s": 1.0}, [0.0, 0.0, 0.0]),
 ]
 
 

@@ -152,6 +152,39 @@ def test_a_node_whose_python_is_silent_says_so(
     assert manager.hear("STOPPING=1") == 1
 
 
+RULES = """\
+mauve: 1
+rules:
+  - name: stuck
+    in: executor
+    when: {node_silent: {longer_than_s: 2.0}}
+    do: [{kind: replace_core, target: counter, name: executor_tests/Backwards}]
+"""
+
+
+def test_a_rule_acts_on_a_silent_python(
+    architecture: Path,
+    start_executor: Callable[..., Any],
+    graph: Any,
+    kept: Callable[[Any], Path],
+    tmp_path: Path,
+) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text(RULES, encoding="utf-8")
+    executor = start_executor("-p", f"architecture:={architecture}", "-p", f"rules:={rules}")
+    counts = counts_of(graph)
+    graph.spin_until(lambda: "stuck: armed" in executor.output, "the rule")
+    file = kept(executor)
+    try:
+        graph.spin_until(lambda: file.read_text("utf-8") == "keeping", "the interpreter to be kept")
+        graph.spin_until(lambda: counts[-1].data < counts[-2].data, "the core that counts backwards")
+        assert file.read_text("utf-8") == "keeping", "the rule has acted while the interpreter is kept"
+        graph.spin_until(lambda: "stuck: done" in executor.output, "that it is reported")
+    finally:
+        file.unlink()
+    assert executor.end(signal.SIGTERM)[0] == 0
+
+
 def test_a_rules_file_that_is_a_pipe_is_refused_at_once(
     architecture: Path, start_executor: Callable[..., Any], graph: Any, tmp_path: Path
 ) -> None:

@@ -48,6 +48,8 @@ class Feeds {
   void open(const SignalSpec& spec, Signal& signal);
   /// As Feed's, of all of them. [non-rt], one thread
   void follow();
+  /// The executor's Python side works. [rt], one thread
+  void beat() MAUVE_RT;
 
  private:
   void open_component(const SignalSpec& spec, Signal& signal);
@@ -55,6 +57,7 @@ class Feeds {
 
   FeedPlace place_;
   std::vector<std::unique_ptr<Feed>> feeds_;
+  std::vector<Signal*> node_;
   std::map<std::string, ComponentFeed*> components_;  // of feeds_
 };
 

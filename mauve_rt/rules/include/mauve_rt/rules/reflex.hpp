@@ -86,6 +86,8 @@ class Reflex {
   void wake();
   /// [non-rt]
   std::vector<RuleFacts> facts() const;
+  /// The executor's Python side works: conditions node_silent receive that. [rt], one thread. In virtual time advance() does it.
+  void beat() MAUVE_RT { feeds_.beat(); }
   /// How many decisions were left out, because those before them were not taken in time. [non-rt]
   std::uint64_t lost() const;
 

@@ -27,6 +27,7 @@ enum class SignalKind : std::uint8_t {
   peer,           // of an executor: a PeerState
   diagnostic,     // of a status by its name: its level
   change,         // of a component, or with no target of the architecture: it was changed
+  node,           // of the executor itself: its Python side works; the value means nothing
 };
 
 /// What is known of another executor.

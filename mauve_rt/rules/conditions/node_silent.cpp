@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "conditions/kinds.hpp"
+
+namespace mauve::rules {
+
+ConditionKind node_silent_kind() {
+  return {
+      .name = "node_silent",
+      .summary = "the executor's Python side, which answers requests, has not worked for longer than a time",
+      .parameters = {{.name = "longer_than_s", .type = "float", .unit = "s", .minimum = 2, .initial = 5.0}},
+      .hears = [](const Parameters& /*told*/) { return std::vector{SignalSpec{SignalKind::node}}; },
+      .make = [](const Parameters& parameters,
+                 std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
+        return std::make_unique<Age>(*signals[0], nanoseconds(told<double>(parameters, "longer_than_s")));
+      }};
+}
+
+}  // namespace mauve::rules
