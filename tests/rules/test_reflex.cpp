@@ -310,6 +310,41 @@ TYPED_TEST(ReflexTest, HearsAValueAndItsComingBack) {
   EXPECT_EQ("t/Core", this->present());
 }
 
+TYPED_TEST(ReflexTest, HearsThatTheNodeIsSilent) {
+  this->add_rule(leaf("node_silent", {{"longer_than_s", 2.0}}));
+  this->deploy();
+  this->begin();
+  if (TestFixture::is_virtual) {  // whoever advances time is at work
+    this->live(s_to_ns(3));
+    EXPECT_THAT(this->words, ElementsAre("armed"));
+    return;
+  }
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  this->reflex->beat();
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+/// A value that flaps faster than its decisions are reported: memory stays bounded, and no outcome is lost.
+TYPED_TEST(ReflexTest, LeavesOutDecisionsThatNobodyTakes) {
+  this->rules.push_back({.name = "flapping", .when = too_high(), .for_ns = s_to_ns(3600), .about = {"c"}});
+  this->actions.push_back({.do_steps = core("t/Counting")});
+  this->deploy();
+  this->begin();
+  const auto flap = [&] {
+    for (const double value : {4.0, 2.0}) {
+      this->beat.write.write({.value = value}, 1);
+      if constexpr (TestFixture::is_virtual) this->reflex->advance();
+      this->way.run_for(us_to_ns(100));
+    }
+    return this->reflex->lost() > 0;
+  };
+  const time_ns_t until = monotonic_now_ns() + s_to_ns(60);
+  while (!flap()) ASSERT_LT(monotonic_now_ns(), until);
+  EXPECT_EQ(1000U, this->reflex->wait_told(0).size());
+}
+
 TYPED_TEST(ReflexTest, HearsAFault) {
   this->add_rule(leaf("fault", {{"component", "w"}}));
   this->deploy();
