@@ -39,8 +39,8 @@ class Stop(threading.Event):
 def run_until_signalled(work: Callable[[Stop], int]) -> int:
     """Run `work(stop)` on a thread of its own and return its exit status; a signal sets `stop`.
 
-    Signals are SIGINT, SIGTERM and, unless the parent process had them ignored, SIGHUP, SIGQUIT, SIGUSR1 and
-    SIGUSR2. Every thread blocks them, and the main one waits for them in C++: none is lost, none is late,
+    Signals are SIGINT, SIGTERM, SIGQUIT, SIGUSR1, SIGUSR2 and, unless the parent process has it ignored (nohup),
+    SIGHUP. Every thread blocks them, and the main one waits for them in C++: none is lost, none is late,
     whatever the work is doing. There the outputs of all components are made safe, before anything takes the
     interpreter's lock. One before `stop.begin()`, while modules load, ends the process at once: status 0.
     Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of
@@ -83,9 +83,8 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
 
 
 def _end_signals() -> set[signal.Signals]:
-    ignored_stays = (signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)  # as nohup asks
-    kept = {number for number in ignored_stays if signal.getsignal(number) != signal.SIG_IGN}
-    return {signal.SIGINT, signal.SIGTERM, *kept}
+    always = {signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2}
+    return always if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else {*always, signal.SIGHUP}
 
 
 def leave_now(status: int) -> NoReturn:
