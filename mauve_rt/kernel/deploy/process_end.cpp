@@ -17,12 +17,12 @@ namespace {
 /// For the handler of the dump signal.
 constexpr std::chrono::milliseconds kDump{100};
 
-/// Whether the parent process has it ignored, as nohup and shells do. SIGINT is not left ignored, as it is in the background of
-/// a script: who starts an executor there ends it by that signal.
+/// As nohup asks. A script has SIGINT and SIGQUIT ignored for what it starts in the background: they end the process all the
+/// same.
 bool stays_ignored(int signal) noexcept {
   struct sigaction present{};
   sigaction(signal, nullptr, &present);
-  return signal != SIGINT && signal != SIGTERM && present.sa_handler == SIG_IGN;
+  return signal == SIGHUP && present.sa_handler == SIG_IGN;
 }
 
 sigset_t end_signals() noexcept {

@@ -39,8 +39,8 @@ class Stop(threading.Event):
 def run_until_signalled(work: Callable[[Stop], int]) -> int:
     """Run `work(stop)` on a thread of its own and return its exit status; a signal sets `stop`.
 
-    Signals are SIGINT, SIGTERM, SIGQUIT, SIGUSR1, SIGUSR2 and, unless the parent process has it ignored (nohup),
-    SIGHUP. Every thread blocks them, and the main one waits for them in C++: none is lost, none is late,
+    Signals are SIGINT, SIGTERM, SIGQUIT, SIGUSR1, SIGUSR2 and, unless the parent process has it ignored (as
+    nohup), SIGHUP. Every thread blocks them, and the main one waits for them in C++: none is lost or late,
     whatever the work is doing. There the outputs of all components are made safe, before anything takes the
     interpreter's lock. One before `stop.begin()`, while modules load, ends the process at once: status 0.
     Work that has not returned 2.7 s after a later one ends with the process, with status 1 and the stack of

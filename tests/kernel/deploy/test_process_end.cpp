@@ -65,6 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Signals, EndSignal, ::testing::ValuesIn(kEndSignals));
 
 TEST_P(EndSignal, MakesOutputsSafe) {
   const auto live = [&] {
+    std::signal(GetParam(), SIG_DFL);  // whatever the parent process ignores
     Robot robot;
     std::thread sender = Robot::send(GetParam());
     const int signal = wait_end_signal();
@@ -101,7 +102,7 @@ TEST_F(ProcessEnd, AComponentThatHangsIsGivenUp) {
 TEST_F(ProcessEnd, NothingIsDeployedAfterIt) {
   const auto live = [] {
     Robot robot;
-    std::thread sender = Robot::send(SIGHUP);
+    std::thread sender = Robot::send(SIGTERM);
     wait_end_signal();
     sender.join();
     Architecture other;

@@ -49,7 +49,12 @@ class Console:
 
         self._graph.spin_until(found, f"{parts} on /rosout; {executor.output}")
         (line,) = found()
-        assert len([printed for printed in executor.output.splitlines() if line in printed]) == 1
+
+        def printed() -> list[str]:
+            return [each for each in executor.output.splitlines() if line in each]
+
+        self._graph.spin_until(lambda: bool(printed()), f"{line} on the console")
+        assert len(printed()) == 1
         return line
 
 

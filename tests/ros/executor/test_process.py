@@ -128,7 +128,9 @@ def test_signal_seals_the_bag(
     number: signal.Signals, architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
 ) -> None:
     bag = tmp_path / "bag"
+    ignored = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the executor inherits that
     executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
+    signal.signal(signal.SIGHUP, ignored)
     counts = graph.hear(Float64, "/robot_1/count")
     graph.spin_until(lambda: len(counts) > 10, "counts")
     status, seconds = executor.end(number)

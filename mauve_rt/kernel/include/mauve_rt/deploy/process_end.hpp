@@ -9,8 +9,8 @@
 
 namespace mauve {
 
-/// Signals that end a process in order. Each would end it at once otherwise, its outputs as they are. Where the parent process
-/// has one ignored that is neither SIGINT nor SIGTERM (nohup), it stays so.
+/// Signals that end a process in order. Each would end it at once otherwise, its outputs as they are. SIGHUP stays ignored where
+/// the parent process has it so (nohup).
 inline constexpr std::array kEndSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2};
 
 struct EndOptions {
