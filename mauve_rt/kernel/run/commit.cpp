@@ -39,18 +39,22 @@ void Commit::assign_actions() {
   order_.clear();
   for (Participant& participant : participants_) {
     participant.actions.clear();
-    for (CommitAction* action : actions_) {
-      if (action->task == participant.task) participant.actions.push_back(action);
-    }
     order_.push_back(&participant);
   }
   std::sort(order_.begin(), order_.end(),
             [](const Participant* a, const Participant* b) { return a->task->number() < b->task->number(); });
+  for (CommitAction* action : actions_) {
+    Participant* const own = action->task != nullptr ? find(*action->task) : nullptr;
+    if (own != nullptr) own->actions.push_back(action);  // else a check, or of an added one that does not run
+  }
 }
 
-bool Commit::is_about(const Task& task) const noexcept {
-  return std::any_of(order_.begin(), order_.end(),
-                     [&task](const Participant* participant) { return participant->task == &task; });
+Participant* Commit::find(const Task& task) const noexcept {
+  const auto place = std::lower_bound(order_.begin(), order_.end(), task.number(),
+                                      [](const Participant* participant, std::uint16_t number) {
+                                        return participant->task->number() < number;
+                                      });
+  return place != order_.end() && (*place)->task == &task ? *place : nullptr;
 }
 
 // ---- participants

@@ -163,7 +163,7 @@ class Commit {
   /// [rt]
   bool is_structural() const MAUVE_RT { return is_structural_; }
   /// Whether the task takes part. [rt]
-  bool is_about(const Task& task) const MAUVE_RT;
+  bool is_about(const Task& task) const MAUVE_RT { return find(task) != nullptr; }
   Commit* next{nullptr};  // the gate's
 
   // ---- the requester
@@ -215,6 +215,7 @@ class Commit {
   void wake_requester() MAUVE_RT;
 
  private:
+  Participant* find(const Task& task) const MAUVE_RT;
   bool lock(time_ns_t until_ns) noexcept;
   void unlock() noexcept;
   const Task* find_unfit() const noexcept;
