@@ -127,6 +127,7 @@ void Reflex::run_steps() noexcept {
 time_ns_t Reflex::step() noexcept {
   const time_ns_t now_ns = host_.clock().now_ns();
   hear_ends(now_ns);
+  if (!host_.is_deployed()) return kForever;  // its components stop: what is heard of that is no cause to act
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     apply_found(i, now_ns);
     for (const Act act : kActs) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());

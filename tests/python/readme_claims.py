@@ -61,7 +61,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and SIGUSR2 end the process in order": (
         "ros/executor/test_process.py::test_signal_seals_the_bag",
-        "Signals/EndSignal.MakesOutputsSafe/0",
+        "EndSignal.MakesOutputsSafe",
     ),
     "A component that hangs is given up after 0.5 s": ("ProcessEnd.AComponentThatHangsIsGivenUp",),
     "one that finds another under way for 10 s is refused": (

@@ -105,6 +105,7 @@ BAD = [
     ("over_declared: {component: control, at_least: ^1001}", "at most 1000: found 1001"),
     ("late: {component: control, longer_than_s: 1, within_s: ^0}", "greater than or equal to 1e-09"),
     ("no_release: {component: control, periods: ^0.5}", "greater than or equal to 1.0: found 0.5"),
+    ("node_silent: {longer_than_s: ^1}", "greater than or equal to 2.0"),
     ("since_change: {longer_than_s: ^-5}", "greater than or equal to 1e-09"),
 ]
 
