@@ -21,12 +21,17 @@ constexpr time_ns_t kBetweenLooks = ms_to_ns(200);
 /// A look so late: the process itself stood still, and the node with it.
 constexpr time_ns_t kStoodStill = s_to_ns(1);
 
+/// Of the environment; 0: it is not there, or no number.
+std::int64_t number_of(const char* variable) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? 0 : std::strtoll(text, nullptr, 10);
+}
+
 /// WATCHDOG_USEC, unless it is another process's.
 time_ns_t watchdog_period() {
-  const char* const microseconds = std::getenv("WATCHDOG_USEC");
-  const char* const process = std::getenv("WATCHDOG_PID");
-  if (microseconds == nullptr || (process != nullptr && std::atoll(process) != getpid())) return 0;
-  return std::max<time_ns_t>(0, us_to_ns(std::atoll(microseconds)));
+  const std::int64_t process = number_of("WATCHDOG_PID");
+  if (process != 0 && process != getpid()) return 0;
+  return std::max<time_ns_t>(0, us_to_ns(number_of("WATCHDOG_USEC")));
 }
 
 }  // namespace
