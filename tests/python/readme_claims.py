@@ -63,6 +63,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_process.py::test_signal_seals_the_bag",
         "EndSignal.MakesOutputsSafe",
     ),
+    "When an executor's Python side is silent for `node_silent_after_s` (5 s), its C++ side logs an error": (
+        "ros/executor/test_safe_stop.py::test_a_node_whose_python_is_silent_says_so",
+    ),
+    "a rule (`node_silent`) can act on that": (
+        "ros/executor/test_safe_stop.py::test_a_rule_acts_on_a_silent_python",
+    ),
     "A component that hangs is given up after 0.5 s": ("ProcessEnd.AComponentThatHangsIsGivenUp",),
     "one that finds another under way for 10 s is refused": (
         "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",

@@ -21,6 +21,7 @@ from mauve_rt.trace.reading.statistics import component_statistics
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
+ROOM = 30_000  # bytes: some records, and room for some more
 
 
 @pytest.fixture
@@ -143,8 +144,11 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     executor: ExecutorProcess, graph: Any, tmp_path: Path
 ):
     assert start(graph, bag="bag").success
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    graph.spin_until(lambda: file.stat().st_size > ROOM, "records on the disk")
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.prlimit(executor.process.pid, resource.RLIMIT_FSIZE, (30_000, hard))
+    limit = file.stat().st_size + ROOM
+    resource.prlimit(executor.process.pid, resource.RLIMIT_FSIZE, (limit, hard))
     told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
 
     def failed() -> bool:
