@@ -180,7 +180,7 @@ def shared_map(name: str) -> Path:
 
 @pytest.mark.parametrize("name", ["depot.yaml", "tb3_sandbox.yaml"])
 def test_maps_of_others_work_as_they_are(start: Starter, name: str):
-    demo = start("--map", str(shared_map(name)), *SHORT)
+    demo = start("--simulated-time", "--map", str(shared_map(name)), *SHORT)
     assert demo.finish() == 0, demo.lines[-8:]
 
 
