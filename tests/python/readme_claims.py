@@ -820,6 +820,16 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: stop of a 1 kHz component while ",
         "bench: a transaction over it waits for a component in a 100 ms state",
     ),
+    "| from SIGTERM to safe outputs of a 1 kHz component": (
+        "bench: SIGTERM to safe outputs of a 1 kHz component",
+        "bench: , while requests keep the interpreter busy",
+    ),
+    "| a core replaced over its service: blackout": (
+        (
+            "bench: replace_core of a 1 kHz component over its service, "
+            "an ordinary thread busy on each CPU, blackout"
+        ),
+    ),
     "| page faults of a component's thread after its core was replaced": (
         "bench: page faults of a component's thread after its core was replaced by one with 8 MiB",
     ),
