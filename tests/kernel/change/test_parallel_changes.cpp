@@ -48,6 +48,13 @@ class ParallelChanges : public Hosted<OnThreads> {
     EXPECT_EQ(PropertyValue(4.0), gain_of("a"));
     EXPECT_EQ("t/Counting", architecture.component("a").core_implementation());
   }
+  /// Changes of other components are made while this one hangs, and it is made when the doors open.
+  void expect_others_change_during(std::future<void> change) {
+    change_others();
+    EXPECT_FALSE(is_over(change));
+    doors->open = true;
+    change.get();
+  }
   PropertyValue gain_of(const std::string& name) {
     return architecture.component(name).shell().find_property("gain")->boxed();
   }
@@ -59,27 +66,15 @@ class ParallelChanges : public Hosted<OnThreads> {
 };
 
 TEST_F(ParallelChanges, WaitForNoPreparationOfOthers) {
-  auto change = hang_in_preparation("b");
-  change_others();
-  EXPECT_FALSE(is_over(change));
-  doors->open = true;
-  change.get();
+  expect_others_change_during(hang_in_preparation("b"));
 }
 
 TEST_F(ParallelChanges, WaitForNoDryRunOfOthers) {
-  auto change = hang_in_preparation("b", {.dry_run = true});
-  change_others();
-  EXPECT_FALSE(is_over(change));
-  doors->open = true;
-  change.get();
+  expect_others_change_during(hang_in_preparation("b", {.dry_run = true}));
 }
 
 TEST_F(ParallelChanges, WaitForNoCommitOfOthers) {
-  auto change = hang_in_commit("b");
-  change_others();
-  EXPECT_FALSE(is_over(change));
-  doors->open = true;
-  change.get();
+  expect_others_change_during(hang_in_commit("b"));
   EXPECT_EQ(PropertyValue(2.0), gain_of("b"));
 }
 

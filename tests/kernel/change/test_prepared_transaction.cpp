@@ -214,7 +214,16 @@ TYPED_TEST(Prepared, ItsCommitAllocatesNothing) {
 
 // ---- on threads
 
-class PreparedBeside : public Prepared<OnThreads> {};
+class PreparedBeside : public Prepared<OnThreads> {
+ protected:
+  /// The component b is in a long state until the doors open.
+  std::shared_ptr<Doors> keep_b_busy() {
+    auto doors = std::make_shared<Doors>();
+    commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
+    wait_until([&] { return doors->entered.load(); }, "the long state");
+    return doors;
+  }
+};
 
 TEST_F(PreparedBeside, ItWaitsForNoPreparation) {
   const auto doors = std::make_shared<Doors>();
@@ -249,9 +258,7 @@ TEST_F(PreparedBeside, AnOrdinaryChangeOfWhatItChangedMeanwhileIsRefused) {
 }
 
 TEST_F(PreparedBeside, AnOrdinaryCommitInItsWayIsCalledOff) {
-  const auto doors = std::make_shared<Doors>();
-  commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
-  wait_until([&] { return doors->entered.load(); }, "the long state");
+  const auto doors = keep_b_busy();
   auto prepared = prepare(Transaction().replace_shell("a", "t/WideShell"));
   auto change = std::async(std::launch::async, [&] {
     return refusal([&] { commit(Transaction().replace_shell("b", "t/WideShell")); });
@@ -267,9 +274,7 @@ TEST_F(PreparedBeside, AnOrdinaryCommitInItsWayIsCalledOff) {
 }
 
 TEST_F(PreparedBeside, AnOrdinaryCommitOfOtherComponentsGoesOn) {
-  const auto doors = std::make_shared<Doors>();
-  commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
-  wait_until([&] { return doors->entered.load(); }, "the long state");
+  const auto doors = keep_b_busy();
   auto prepared = gain("a", 3.0);
   auto change = std::async(std::launch::async, [&] { commit(Transaction().set_property("b", "gain", 2.0)); });
   std::this_thread::sleep_for(
@@ -283,9 +288,7 @@ TEST_F(PreparedBeside, AnOrdinaryCommitOfOtherComponentsGoesOn) {
 }
 
 TEST_F(PreparedBeside, ItTimesOutBesideALongState) {
-  const auto doors = std::make_shared<Doors>();
-  commit(Transaction().replace_core("b", std::make_unique<BusyCore>(doors)));
-  wait_until([&] { return doors->entered.load(); }, "the long state");
+  const auto doors = keep_b_busy();
   auto prepared = gain("b", 3.0);
   EXPECT_EQ(PreparedOutcome::timed_out, prepared->commit(ms_to_ns(20)));
   EXPECT_EQ(ErrorCode::timeout, failure(*prepared).code());
