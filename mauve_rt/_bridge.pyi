@@ -10,10 +10,7 @@ def start_console() -> None:
     """
 
 def flush_console(timeout_ns: int) -> bool:
-    """Wait until all lines are written; False: nobody reads them."""
-
-def console_dropped() -> int:
-    """Lines that were left out, because too many waited to be written."""
+    """Wait until all lines are written; False: the console is not read."""
 
 class NodeWatch:
     """Reports, without Python, that Python is silent: an ERROR in the log, no WATCHDOG=1 for systemd."""

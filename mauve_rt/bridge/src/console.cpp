@@ -81,10 +81,6 @@ class ConsoleQueue {
     return changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
                              [this] { return lines_.empty() && !is_writing_; });
   }
-  std::uint64_t dropped() {
-    const std::lock_guard lock(mutex_);
-    return dropped_;
-  }
   [[noreturn]] void write_all() {
     std::unique_lock lock(mutex_);
     std::uint64_t reported = 0;
@@ -130,7 +126,7 @@ ConsoleQueue& console_queue() {
   return *all;
 }
 
-rcutils_logging_output_handler_t other_handlers = nullptr;  // who else is given each line; set by start()
+rcutils_logging_output_handler_t other_handlers = nullptr;  // they get each line as well; set by start()
 
 void log_line(const rcutils_log_location_t* location, int severity, const char* name,
               rcutils_time_point_value_t time_ns, const char* format, va_list* arguments) {
@@ -158,7 +154,5 @@ void Console::start() {
 }
 
 bool Console::flush(time_ns_t timeout_ns) noexcept { return console_queue().flush(timeout_ns); }
-
-std::uint64_t Console::dropped() noexcept { return console_queue().dropped(); }
 
 }  // namespace mauve::bridge

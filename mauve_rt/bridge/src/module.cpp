@@ -58,7 +58,6 @@ PYBIND11_MODULE(_bridge, module) {
   using Unlocked = py::call_guard<py::gil_scoped_release>;
   module.def("start_console", &Console::start);
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked());
-  module.def("console_dropped", &Console::dropped);
   py::class_<NodeWatch>(module, "NodeWatch")
       .def(py::init<std::string, time_ns_t>(), py::arg("logger"), py::kw_only(), py::arg("silent_after_ns"))
       .def("beat", &NodeWatch::beat)

@@ -1,4 +1,4 @@
-"""Log lines on the console, written by a thread of their own: a terminal that nobody reads blocks nothing."""
+"""Log lines on the console, written by a thread of their own: a terminal that is not read blocks nothing."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,5 +20,5 @@ def init_logging_apart(arguments: Sequence[str], **options: Any) -> None:
 
 
 def last_lines() -> bool:
-    """Wait until all lines are on the console, for a moment; False: nobody reads them."""
+    """Wait until all lines are on the console, for a moment; False: the console is not read."""
     return flush_console(_LAST_LINES_NS)
