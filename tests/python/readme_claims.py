@@ -54,7 +54,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
         "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
-    "neither Python, nor a request, nor a console that nobody reads delays that": (
+    "neither Python, nor a request, nor a console that is not read delays that": (
         "ros/executor/test_safe_stop.py::test_a_signal_waits_for_no_lock_of_the_interpreter",
         "ros/executor/test_safe_stop.py::test_a_console_that_nobody_reads_holds_up_nothing",
         "ros/executor/test_safe_stop.py::test_a_rules_file_that_is_a_pipe_is_refused_at_once",

@@ -64,7 +64,7 @@ struct ArchitectureClaims {
 };
 
 /// Components and resources by name. All functions [non-rt] unless told. Every change is a transaction of one step or more, carried out
-/// by the host that runs the architecture, or by itself while nobody does. Changes of different components of a deployed
+/// by the host that runs the architecture, or by itself while no host does. Changes of different components of a deployed
 /// architecture are prepared and made in parallel, unless both add or remove something or wire ports.
 ///
 /// | member                          | written by            | read by | under                          |

@@ -28,7 +28,7 @@ struct UrgentCommit {
 /// | ---------- | ------------------------- | ------- | --------------------------------------------------- |
 /// | mutex      | who looks at marks or the structure to rely on it, or changes them; for a moment | - | - |
 /// | structural | a structural commit while it is carried out; before mutex | - | -                       |
-/// | structure_ | commits, under both mutexes | anyone | release/acquire: a hint; whoever relies on it holds one of them |
+/// | structure_ | commits, under both mutexes | anyone | release/acquire: a hint; to rely on it, hold one of them |
 /// | under_way_ ... | commits, prepared commits, hosts | same | under_way_mutex_                             |
 class CommitGate {
  public:

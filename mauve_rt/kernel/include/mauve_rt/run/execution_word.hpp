@@ -14,8 +14,8 @@ namespace mauve {
 /// The executions of one component, one after another. A watched one has a number of its own and a bound.
 ///
 /// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound,
-/// and an adopt or take of a commit. Whoever finds a watched execution over its bound times out exactly that one; whoever
-/// stops the component by force times out whatever the thread does between entering and leaving. All change the word by
+/// and an adopt or take of a commit. The watchdog, or a commit's requester, times out exactly the watched execution that is over
+/// its bound; a stop by force times out all that the thread does between entering and leaving. All change the word by
 /// compare-and-exchange: who comes first has decided, and the other one finds so. The thread finds out where it ends the
 /// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who times it
 /// out has ordered a stop before, which the thread sees when the state ends, and then it leaves. The thread of an execution
