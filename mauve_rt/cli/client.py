@@ -85,9 +85,10 @@ class Client:
 
     def _is_hopeless(self, service: str, waited_s: float) -> bool:
         """Whether all that is there is known, and has no such service."""
-        if not self._discovery.is_complete() or service in self._discovery.offered():
+        offered = self._discovery.offered()  # before the next look, which sees whether anything came since
+        if not self._discovery.is_complete() or service in offered:
             return False  # in the second case its endpoints are being matched
-        return bool(self.seen_executors()) or waited_s >= STARTING_S
+        return bool(_executors(offered)) or waited_s >= STARTING_S
 
     def _unanswered(self, service: str) -> str:
         said = f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; "
@@ -105,7 +106,10 @@ class Client:
 
         asked, _, name = service.rpartition("/")
         domain = f"ROS_DOMAIN_ID {self._discovery.domain}"
-        seen = self.seen_executors()
+        offered = self._discovery.offered()
+        seen = _executors(offered)
+        if service in offered:
+            return f"{service} is seen in {domain}, but not reached; does the network carry both directions?"
         if not seen:
             return f"no executor {asked}: none is seen at all in {domain}; is it started, in this domain?"
         if asked in seen:
@@ -114,9 +118,7 @@ class Client:
 
     def seen_executors(self) -> list[str]:
         """Executors discovered so far."""
-        suffix = "/list_components"
-        offered = self._discovery.offered()
-        return sorted(name.removesuffix(suffix) for name, types in offered.items() if _LIST_SERVICE in types)
+        return _executors(self._discovery.offered())
 
     def find_executors(self, *, wait_s: float = ANNOUNCED_S) -> list[str]:
         """Executors, as soon as all that is there is known; after `wait_s` where that cannot be told."""
@@ -136,6 +138,11 @@ class Client:
         self._discovery.hurry()
         time.sleep(_LOOK_S)
         _raise_interrupts()
+
+
+def _executors(offered: dict[str, list[str]]) -> list[str]:
+    suffix = "/list_components"
+    return sorted(name.removesuffix(suffix) for name, types in offered.items() if _LIST_SERVICE in types)
 
 
 def _spin_once(participant: Participant) -> None:

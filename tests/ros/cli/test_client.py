@@ -17,6 +17,7 @@ from std_msgs.msg import Float64
 from mauve_msgs.srv import ListComponents, Stop
 from mauve_rt.cli import client as client_module
 from mauve_rt.cli.client import NoExecutorError, connected
+from mauve_rt.cli.discovery import Discovery
 
 
 class Peer:
@@ -109,6 +110,29 @@ def test_a_wrong_name_is_told_as_soon_as_all_that_is_there_is_known(
         client.call(ListComponents, "/robot_2/executor/list_components", ListComponents.Request())
     expected = f"no executor /robot_2/executor in ROS_DOMAIN_ID {domain}; did you mean /robot_1/executor?"
     assert str(error.value) == expected
+
+
+def test_an_executor_that_is_seen_between_two_looks_is_no_wrong_name(
+    peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    peer.start()
+    look = Discovery.offered
+    looks: list[bool] = []
+
+    def look_and_then_begin(discovery: Discovery) -> Any:
+        seen = look(discovery)
+        if discovery.is_complete() and not looks:
+            looks.append(True)
+            _list(peer, "/late/executor")
+            while "/late/executor/list_components" not in look(discovery):
+                time.sleep(0.01)
+        return seen
+
+    monkeypatch.setattr(Discovery, "offered", look_and_then_begin)
+    with connected() as client:
+        client.call(ListComponents, "/late/executor/list_components", ListComponents.Request())
+    assert looks
 
 
 def test_executors_are_told_as_soon_as_all_are_known(
