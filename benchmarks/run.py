@@ -30,8 +30,8 @@ from reconfiguration import (
 )
 from recording import recording_rows
 from recording_killed import kill_rows
-from reflex import reflex_rows
 from rows import Row, markdown, not_available
+from rules import rule_rows
 from safe_stop import safe_stop_rows
 from scale import idle_rows, scale_rows, simulation_rows
 from service_calls import service_blackout_rows, service_rows, service_stop_rows
@@ -53,7 +53,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "prefault": prefault_rows,
     "transaction": transaction_rows,
     "refused": refused_rows,
-    "reflex": reflex_rows,
+    "rule-reaction": rule_rows,
     "shared-data": shared_data_rows,
     "latest-value": latest_value_rows,
     "activation": activation_rows,

@@ -848,7 +848,7 @@ class SignalSpec:
     def detail(self) -> str: ...
 
 @final
-class Wish:
+class PendingAction:
     """What an engine wants done now. act: 'do' or 'undo'; cause_ns: since when the condition is as it is."""
 
     @property
@@ -895,7 +895,7 @@ class RuleStatus:
     @property
     def in_effect(self) -> bool: ...
     @property
-    def left_alone(self) -> bool: ...
+    def changed_by_another(self) -> bool: ...
     @property
     def since_ns(self) -> int: ...
     @property
@@ -933,9 +933,9 @@ class RuleEngine:
     def step(self, now_ns: int) -> int:
         """Look at all conditions; the instant at which to step again at the latest."""
     @property
-    def wish(self) -> Wish | None: ...
+    def pending(self) -> PendingAction | None: ...
     def begun(self, now_ns: int) -> None:
-        """The wish is being carried out."""
+        """The pending action is being carried out."""
     def ended(self, how: str, now_ns: int) -> None:
         """How: done, refused, stale, withdrawn or timed_out."""
     def take(self) -> RuleDecision | None:
@@ -983,7 +983,7 @@ class ToldDecision:
 
 @final
 class RuleFacts:
-    """How one rule of a Reflex fares."""
+    """How one rule of a RuleRunner fares."""
 
     @property
     def name(self) -> str: ...
@@ -1000,7 +1000,7 @@ class RuleFacts:
         """What is kept prepared."""
 
 @final
-class Reflex:
+class RuleRunner:
     """Rules at work beside the components of a host, on native threads: they need no Python to act.
 
     Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.

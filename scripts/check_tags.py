@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Check that public headers of kernel and rules say where each function may be called, also to compilers.
+"""Check that public headers say where each function may be called, also to compilers.
 
 The tags [rt], [non-rt] and [setup] are defined in mauve_rt/base/rt.hpp. A function has the tag of its own
 comment, or of the function right above it, whose comment it shares, or of its class ("All functions [rt].").
@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-HEADERS = ("mauve_rt/kernel/include/mauve_rt", "mauve_rt/rules/include/mauve_rt")
+HEADERS = "mauve_rt/*/include/mauve_rt"
 MACRO = re.compile(r"\bMAUVE_RT\b")
 
 TAG = re.compile(r"\[(?:rt|non-rt|setup)\](?:,? (?:as far as|but for))?")
@@ -224,8 +224,7 @@ def violations(root: Path) -> list[str]:
     """Return one line per function whose tag is missing or at odds with its declaration."""
     return [
         f"{path.relative_to(root)}:{function.line}: {fault}"
-        for folder in HEADERS
-        for path in sorted((root / folder).rglob("*.hpp"))
+        for path in sorted(root.glob(f"{HEADERS}/**/*.hpp"))
         for function in Header(path.read_text(encoding="utf-8")).functions()
         for fault in faults(function)
     ]

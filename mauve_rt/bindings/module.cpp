@@ -16,7 +16,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);
-  bind_reflex(module);
+  bind_rule_runner(module);
   bind_process_end(module);
   module.attr("__version__") = MAUVE_VERSION;
   module.attr("NOT_MEASURED") = mauve::kNotMeasured;

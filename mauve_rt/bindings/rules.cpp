@@ -98,11 +98,11 @@ void bind_rules_of_an_engine(py::module_& module) {
 }
 
 void bind_answers(py::module_& module) {
-  py::class_<rules::Wish>(module, "Wish")
-      .def_readonly("rule", &rules::Wish::rule)
-      .def_property_readonly("act", [](const rules::Wish& self) { return name_of_act(self.act); })
-      .def_readonly("cause_ns", &rules::Wish::cause_ns)
-      .def_readonly("measured", &rules::Wish::measured);
+  py::class_<rules::PendingAction>(module, "PendingAction")
+      .def_readonly("rule", &rules::PendingAction::rule)
+      .def_property_readonly("act", [](const rules::PendingAction& self) { return name_of_act(self.act); })
+      .def_readonly("cause_ns", &rules::PendingAction::cause_ns)
+      .def_readonly("measured", &rules::PendingAction::measured);
   py::class_<rules::Decision>(module, "RuleDecision")
       .def_readonly("stamp_ns", &rules::Decision::stamp_ns)
       .def_readonly("rule", &rules::Decision::rule)
@@ -121,7 +121,7 @@ void bind_answers(py::module_& module) {
       .def_readonly("armed", &rules::RuleStatus::armed)
       .def_readonly("holds", &rules::RuleStatus::holds)
       .def_readonly("in_effect", &rules::RuleStatus::in_effect)
-      .def_readonly("left_alone", &rules::RuleStatus::left_alone)
+      .def_readonly("changed_by_another", &rules::RuleStatus::changed_by_another)
       .def_readonly("since_ns", &rules::RuleStatus::since_ns)
       .def_readonly("measured", &rules::RuleStatus::measured)
       .def_property_readonly("next",
@@ -187,7 +187,7 @@ void bind_engine(py::module_& module) {
       .def(
           "step", [](PyRuleEngine& self, time_ns_t now_ns) { return self.engine.step(now_ns); },
           py::arg("now_ns"))
-      .def_property_readonly("wish", [](const PyRuleEngine& self) { return self.engine.wish(); })
+      .def_property_readonly("pending", [](const PyRuleEngine& self) { return self.engine.pending(); })
       .def(
           "begun", [](PyRuleEngine& self, time_ns_t now_ns) { self.engine.begun(now_ns); }, py::arg("now_ns"))
       .def(

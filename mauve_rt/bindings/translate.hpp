@@ -37,7 +37,7 @@ void bind_python_fsm(py::module_& module);
 /// Registers the table of conditions and the engine of rules.
 void bind_rules(py::module_& module);
 /// Registers what lets rules act beside the components of a host; after Host and the engine of rules.
-void bind_reflex(py::module_& module);
+void bind_rule_runner(py::module_& module);
 void bind_process_end(py::module_& module);
 /// Registers Simulation and its hosts; after Host.
 void bind_simulation(py::module_& module);

@@ -25,7 +25,7 @@ class Done(NamedTuple):
 
 
 class DecisionMessages:
-    """Of the rules of one Reflex. One thread at a time."""
+    """Of the rules of one RuleRunner. One thread at a time."""
 
     TYPE = DECISION_TYPE
 
@@ -98,7 +98,7 @@ def rule_info(facts: RuleFacts, now_ns: int) -> Any:
         armed=status.armed,
         holds=status.holds,
         in_effect=status.in_effect,
-        left_alone=status.left_alone,
+        changed_by_another=status.changed_by_another,
         ready=facts.ready,
         next=status.next or "",
         next_in_s=UNKNOWN_S if next_ns is None else max(next_ns - now_ns, 0) / 1e9,

@@ -64,7 +64,7 @@ Transaction make_transaction(const ActionSteps& steps) {
 Action::Action(ActionSteps steps, const TransactionOptions& options)
     : steps_(std::move(steps)), options_(options), is_preparable_(can_be_prepared(steps_)) {}
 
-// ---- the tender
+// ---- the preparation thread
 
 bool Action::is_wanting(std::uint64_t revision) const {
   const Stage stage = stage_.load(std::memory_order_acquire);
@@ -102,7 +102,7 @@ void Action::try_after(const ActionSteps& before, Host& host, std::uint64_t revi
 
 bool Action::put_away() {
   Stage ready = Stage::ready;
-  // acq_rel: one that the stepper has taken meanwhile is its
+  // acq_rel: one that the decision thread has taken meanwhile is its
   if (!stage_.compare_exchange_strong(ready, Stage::idle, std::memory_order_acq_rel)) return false;
   prepared_.reset();
   tried_at_ = 0;
@@ -155,7 +155,7 @@ std::optional<ActionReport> Action::report() {
   return std::exchange(report_, std::nullopt);
 }
 
-// ---- the stepper
+// ---- the decision thread
 
 bool Action::begin() noexcept {
   Stage ready = Stage::ready;

@@ -46,7 +46,7 @@ struct Engine::Life {
   Look last{};
   bool armed{false};
   bool in_effect{false};
-  bool left_alone{false};
+  bool changed_by_another{false};
   std::array<std::optional<bool>, 2> in_place{};  // by Act; empty: nobody knows
   std::array<bool, 2> ready{true, true};
   time_ns_t not_before_ns{INT64_MIN};
@@ -126,8 +126,8 @@ void Engine::set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t no
   const bool is_undone = act == Act::do_ && !in_place && life.in_effect && !under_way_;
   if (!is_undone) return;
   life.in_effect = false;
-  life.left_alone = true;
-  suppress(life, Act::do_, Why::other_hand, now_ns);
+  life.changed_by_another = true;
+  suppress(life, Act::do_, Why::changed_by_another, now_ns);
 }
 
 void Engine::set_ready(std::size_t rule, Act act, bool ready) noexcept {
@@ -148,10 +148,10 @@ void Engine::forget() noexcept {
 }
 
 void Engine::forget(std::size_t rule) noexcept {
-  if (wish_ && wish_->rule == rule) wish_.reset();
+  if (pending_ && pending_->rule == rule) pending_.reset();
   if (under_way_ && under_way_->rule == rule) under_way_.reset();
   Life& life = *lives_[rule];
-  life.armed = life.in_effect = life.left_alone = false;
+  life.armed = life.in_effect = life.changed_by_another = false;
   life.in_place = {};
   life.ready = {true, true};
   life.not_before_ns = INT64_MIN;
@@ -163,7 +163,7 @@ void Engine::forget(std::size_t rule) noexcept {
 // ---- deciding
 
 time_ns_t Engine::step(time_ns_t now_ns) noexcept {
-  wish_.reset();
+  pending_.reset();
   for (const auto& life : lives_) {
     if (life->armed) look(*life, now_ns);
   }
@@ -193,19 +193,19 @@ void Engine::look(Life& life, time_ns_t now_ns) noexcept {
 std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
   const bool is_due = now_ns >= life.due_ns();
   if (life.last.holds) {
-    if (is_due && !life.in_effect && !life.left_alone) return Act::do_;
+    if (is_due && !life.in_effect && !life.changed_by_another) return Act::do_;
     return std::nullopt;
   }
   if (!is_due) return std::nullopt;
-  life.left_alone = false;
+  life.changed_by_another = false;
   if (life.in_effect && !life.rule.undoes) life.in_effect = false;
   if (life.in_effect) return Act::undo;
   return std::nullopt;
 }
 
 time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
-  const bool may_want =
-      life.last.holds ? !life.in_effect && !life.left_alone : life.in_effect || life.left_alone;
+  const bool may_want = life.last.holds ? !life.in_effect && !life.changed_by_another
+                                        : life.in_effect || life.changed_by_another;
   if (!may_want) return life.last.next_ns;
   if (life.due_ns() > now_ns) return std::min(life.last.next_ns, life.due_ns());
   if (life.unready_since_ns && !life.excused)
@@ -229,8 +229,8 @@ bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
     if (life.failures == 0) suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
     return false;
   }
-  if (under_way_ || wish_) {
-    suppress(life, act, Why::in_flight, now_ns, lives_[under_way_ ? under_way_->rule : wish_->rule].get());
+  if (under_way_ || pending_) {
+    suppress(life, act, Why::in_flight, now_ns, lives_[under_way_ ? under_way_->rule : pending_->rule].get());
     return false;
   }
   if (!life.ready[index_of(act)]) {
@@ -238,7 +238,7 @@ bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
     if (now_ns >= later_by(*life.unready_since_ns, kMakingReady)) suppress(life, act, Why::not_ready, now_ns);
     return false;
   }
-  wish_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
+  pending_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
   return true;
 }
 
@@ -249,15 +249,15 @@ const Engine::Life* Engine::outranking(const Life& life) const noexcept {
     if (other == &life) return nullptr;
     if (!other->armed || !life.contends[other->index]) continue;
     const bool begins = under_way_ && under_way_->rule == other->index && under_way_->act == Act::do_;
-    const bool wishes = wish_ && wish_->rule == other->index && wish_->act == Act::do_;
-    if (other->in_effect || begins || wishes) return other;
+    const bool wants = pending_ && pending_->rule == other->index && pending_->act == Act::do_;
+    if (other->in_effect || begins || wants) return other;
   }
   return nullptr;
 }
 
 void Engine::begun(time_ns_t now_ns) noexcept {
-  under_way_ = wish_;
-  wish_.reset();
+  under_way_ = pending_;
+  pending_.reset();
   if (!under_way_) return;
   const Act act = under_way_->act;
   tell(*lives_[under_way_->rule],
@@ -342,11 +342,11 @@ RuleStatus Engine::status(std::size_t rule) const noexcept {
   RuleStatus status{.armed = life.armed,
                     .holds = life.last.holds,
                     .in_effect = life.in_effect,
-                    .left_alone = life.left_alone,
+                    .changed_by_another = life.changed_by_another,
                     .since_ns = life.last.since_ns,
                     .measured = life.last.measured};
   if (!life.armed) return status;
-  if (life.last.holds && !life.in_effect && !life.left_alone) {
+  if (life.last.holds && !life.in_effect && !life.changed_by_another) {
     status.next = Act::do_;
     status.next_ns = std::max(life.due_ns(), life.not_before_ns);
   } else if (!life.last.holds && life.in_effect && life.rule.undoes) {

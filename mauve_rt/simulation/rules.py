@@ -5,7 +5,7 @@ from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from mauve_rt._kernel import Reflex, Simulation
+from mauve_rt._kernel import RuleRunner, Simulation
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.told_decisions import DecisionMessages, Done
 from mauve_rt.simulation.topics import resolved, stamp
@@ -46,14 +46,14 @@ class SimulatedRules:
         self._messages = DecisionMessages(
             rules, runtime, who=name, name=lambda topic: resolved(topic, namespace)
         )
-        self._reflex = Reflex(runtime.host, rule_specs(rules), rule_actions(file, runtime), topics)
+        self._runner = RuleRunner(runtime.host, rule_specs(rules), rule_actions(file, runtime), topics)
         self._due_ns = 0
         self.look()
 
     def look(self) -> None:
         """Something was heard: do what is due, and come back when something else is."""
-        next_ns = self._reflex.advance()
-        for told in self._reflex.wait_told(0):
+        next_ns = self._runner.advance()
+        for told in self._runner.wait_told(0):
             self._tell(*self._messages.message(told, stamp(told.decision.stamp_ns)))
         now_ns = self._simulation.now_ns()
         if next_ns < self._due_ns or self._due_ns <= now_ns:

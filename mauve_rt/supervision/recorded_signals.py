@@ -62,7 +62,7 @@ class RecordedSignals:
 
     def missing(self, rule: Rule) -> list[str]:
         """What a rule hears, or is about, that is not in the bag."""
-        found = [self._unheard(leaf, signal) for leaf in rule.when.leaves() for signal in heard(leaf)]
+        found = [self._unobservable(leaf, signal) for leaf in rule.when.leaves() for signal in heard(leaf)]
         found += [f"component {name}" for name in sorted(rule.targets()) if name not in self._trace.records]
         return [one for one in dict.fromkeys(found) if one]
 
@@ -101,7 +101,7 @@ class RecordedSignals:
                 found.append((at, present))
         return found
 
-    def _unheard(self, leaf: When, signal: SignalSpec) -> str:
+    def _unobservable(self, leaf: When, signal: SignalSpec) -> str:
         if signal.kind in _NEVER:
             return _NEVER[signal.kind].format(signal.target)
         topic = self._topic(signal)

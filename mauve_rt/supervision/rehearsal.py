@@ -14,7 +14,7 @@ from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.steps import Change, Step, place_of_step
 from mauve_rt.model.yaml_file import YamlFile
-from mauve_rt.supervision.rule_hearing import own_leaves, unheard
+from mauve_rt.supervision.rule_hearing import own_leaves, unobservable
 from mauve_rt.supervision.rule_names import full_name, leaf_findings
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.when import When
@@ -36,9 +36,9 @@ class Rehearsal:
         self._runtime = runtime
         self._control = Control(runtime, outside=_NoRos())
 
-    def unheard(self, file: RulesFile, leaf: When, topics: Mapping[str, str]) -> Problem | None:
-        """As rule_hearing.unheard(), of this executor."""
-        return unheard(file, leaf, self._runtime.host, topics)
+    def unobservable(self, file: RulesFile, leaf: When, topics: Mapping[str, str]) -> Problem | None:
+        """As rule_hearing.unobservable(), of this executor."""
+        return unobservable(file, leaf, self._runtime.host, topics)
 
     def periods_s(self) -> Mapping[str, float]:
         """Of every component."""
@@ -123,7 +123,7 @@ def rehearsal_problems(
     """
     with rehearsal(model) as executor:
         periods_s = executor.periods_s()
-        found = list(_unheard(executor, file, model))
+        found = list(_unobservable(executor, file, model))
     for index in range(len(file.rules.rules)):
         try:
             try_rule(file, index, model)
@@ -132,7 +132,7 @@ def rehearsal_problems(
     return found, periods_s
 
 
-def _unheard(executor: Rehearsal, file: RulesFile, model: ArchitectureModel) -> Iterator[Problem]:
+def _unobservable(executor: Rehearsal, file: RulesFile, model: ArchitectureModel) -> Iterator[Problem]:
     """Of conditions whose names are as they should be."""
     topics = {
         full_name(each.topic.name, model.namespace): name
@@ -144,7 +144,7 @@ def _unheard(executor: Rehearsal, file: RulesFile, model: ArchitectureModel) -> 
             continue
         topic = str(leaf.parameters.get("topic") or "")
         resource = topics.get(full_name(topic, model.namespace))
-        problem = executor.unheard(file, leaf, {topic: resource} if resource else {})
+        problem = executor.unobservable(file, leaf, {topic: resource} if resource else {})
         if problem is not None:
             yield problem
 

@@ -9,7 +9,7 @@ thread. What the rules want goes to three callables. One action at a time is in 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from mauve_rt._kernel import RuleEngine, RuleStatus, Wish
+from mauve_rt._kernel import PendingAction, RuleEngine, RuleStatus
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.supervision.arming import Arming
 from mauve_rt.supervision.decision_words import Name
@@ -62,7 +62,7 @@ class RemoteRules:
         self._engine = RuleEngine(rule_specs(rules))
         self.signals = self._engine.signals
         self._watched = [
-            WatchedRule(number, rule, deaf="" if hears_all else _deaf(rule))
+            WatchedRule(number, rule, unobservable="" if hears_all else _unobservable(rule))
             for number, rule in enumerate(rules)
         ]
         self._act = act
@@ -96,8 +96,8 @@ class RemoteRules:
             return self._due_ns
         self._check_flight(now_ns)
         next_ns = self._engine.step(now_ns)
-        while (wish := self._engine.wish) is not None:
-            self._send(wish, now_ns)
+        while (pending := self._engine.pending) is not None:
+            self._send(pending, now_ns)
             next_ns = self._engine.step(now_ns)
         self._tell()
         self._arming.tick(now_ns)
@@ -170,10 +170,10 @@ class RemoteRules:
                 self._say(each, "suppressed", _LEFT, now_ns)
             return
         each.left = False
-        if each.deaf:
-            if not each.told_deaf:
-                each.told_deaf = True
-                self._say(each, "suppressed", each.deaf, now_ns)
+        if each.unobservable:
+            if not each.told_unobservable:
+                each.told_unobservable = True
+                self._say(each, "suppressed", each.unobservable, now_ns)
             return
         if absent := each.absent(view):
             each.standing = f"{absent} is {view.state_of(absent)}: watching again once it runs"
@@ -199,18 +199,18 @@ class RemoteRules:
 
     # ---- acting
 
-    def _send(self, wish: Wish, now_ns: int) -> None:
-        each = self._watched[wish.rule]
+    def _send(self, pending: PendingAction, now_ns: int) -> None:
+        each = self._watched[pending.rule]
         self._engine.begun(now_ns)
         cause = f"{each.rule.name}: {self._tell()}"
         request = Request(
             request_id=next(self._ids),
-            steps=tuple(each.rule.steps(wish.act)),
+            steps=tuple(each.rule.steps(pending.act)),
             expected_revision=self._revision(),
             cause=cause,
         )
         each.untouched = False
-        self._flight = _Flight(each, wish.act, request, now_ns + ANSWER_TIMEOUT_NS)
+        self._flight = _Flight(each, pending.act, request, now_ns + ANSWER_TIMEOUT_NS)
         self._act(request)
 
     def _check_flight(self, now_ns: int) -> None:
@@ -290,7 +290,7 @@ class RemoteRules:
         return self._view.revision if self._view is not None else 0
 
 
-def _deaf(rule: Rule) -> str:
+def _unobservable(rule: Rule) -> str:
     """Why a rule cannot be run outside of its executor; mostly nothing."""
-    unheard = next(filter(None, map(inside_only, rule.when.leaves())), "")
-    return f"the executor does not run it, and only there {unheard}" if unheard else ""
+    unobservable = next(filter(None, map(inside_only, rule.when.leaves())), "")
+    return f"the executor does not run it, and only there {unobservable}" if unobservable else ""

@@ -147,14 +147,14 @@ def _stepped(engine: RuleEngine, rules: list[Rule], now_ns: int, found: list[Act
     """Decide at an instant until nothing more is wanted."""
     while True:
         next_ns = engine.step(now_ns)
-        wish = engine.wish
-        if wish is not None:
-            found.append(Acted(now_ns, rules[wish.rule].name, wish.act))
+        pending = engine.pending
+        if pending is not None:
+            found.append(Acted(now_ns, rules[pending.rule].name, pending.act))
             engine.begun(now_ns)
             engine.ended("done", now_ns)
         while engine.take() is not None:
             pass  # what it tells of them is of no interest
-        if wish is None:
+        if pending is None:
             return next_ns
 
 

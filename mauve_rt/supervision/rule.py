@@ -64,16 +64,16 @@ class WatchedRule:
 
     number: int
     rule: Rule
-    deaf: str = ""  # why it cannot be heard outside of the executor
+    unobservable: str = ""  # why it cannot be heard outside of the executor
     left: bool = False  # to the executor, which runs it itself
-    told_deaf: bool = False
+    told_unobservable: bool = False
     checked: bool = False  # the executor was asked about it, or is being asked
     untouched: bool = True  # nothing was done for it yet since the executor's start
     standing: str = ""  # of what it is about, in words
 
     def forget(self) -> None:
         """The executor was started anew, or runs the rule itself: nothing of before counts."""
-        self.left = self.told_deaf = self.checked = False
+        self.left = self.told_unobservable = self.checked = False
         self.untouched = True
 
     def absent(self, view: ArchitectureView) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from mauve_rt._kernel import Host, MauveError, Reflex, RuleActions, RuleSpec
+from mauve_rt._kernel import Host, MauveError, RuleActions, RuleRunner, RuleSpec
 from mauve_rt.errors import Problem
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.when import When
@@ -24,7 +24,7 @@ def only_outside(file: RulesFile) -> Iterator[Problem]:
                 yield file.problem((*leaf.place, leaf.kind), what, remedy=REMEDY)
 
 
-def unheard(file: RulesFile, leaf: When, host: Host, topics: Mapping[str, str]) -> Problem | None:
+def unobservable(file: RulesFile, leaf: When, host: Host, topics: Mapping[str, str]) -> Problem | None:
     """Why this host, at which no rule is at work yet, cannot hear a condition for another reason.
 
     `topics`: the resource that is bound to each topic, named as in the rules.
@@ -55,7 +55,7 @@ def own_leaves(file: RulesFile) -> Iterator[When]:
 def _refusal(leaf: When, host: Host, topics: Mapping[str, str]) -> MauveError | None:
     """Of the executor itself: it would listen to the condition just so."""
     try:
-        Reflex(host, [RuleSpec("one", when_spec(leaf))], [RuleActions([])], dict(topics))
+        RuleRunner(host, [RuleSpec("one", when_spec(leaf))], [RuleActions([])], dict(topics))
     except MauveError as error:
         return error
     return None

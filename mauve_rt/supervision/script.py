@@ -146,7 +146,7 @@ def load_script(path: Path, rules: Sequence[Rule]) -> Script:
         raise form_error(file, faults)
     signals = [signal for rule in rules for leaf in rule.when.leaves() for signal in heard(leaf)]
     problems = [
-        _unheard(file, index, told, signals)
+        _unobservable(file, index, told, signals)
         for index, told in enumerate(script.heard)
         if not any(told.tells(signal) for signal in signals)
     ]
@@ -155,7 +155,7 @@ def load_script(path: Path, rules: Sequence[Rule]) -> Script:
     return script
 
 
-def _unheard(file: YamlFile, index: int, told: Heard, signals: Sequence[SignalSpec]) -> Problem:
+def _unobservable(file: YamlFile, index: int, told: Heard, signals: Sequence[SignalSpec]) -> Problem:
     known = {signal.target for signal in signals if signal.kind in _SIGNALS[told.what]}
     what = f"no rule listens to {told.what} {told.of}"
     return file.problem(("heard", index, told.what), what, remedy=did_you_mean(told.of, known))

@@ -298,8 +298,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "what a rule does is prepared while the rule is armed": (
         "bench: , later than 1 period + 1 ms",
-        "ReflexTest.PreparesNothingWhenItIsTime",
-        "ReflexTest.ActsWhileNothingCanBePrepared",
+        "RuleRunnerTest.PreparesNothingWhenItIsTime",
+        "RuleRunnerTest.ActsWhileNothingCanBePrepared",
         "ros/executor/test_rules.py::test_what_cannot_be_made_ready_is_an_error_at_once",
     ),
     "`mauve rules list` shows how those of an executor fare": (

@@ -36,11 +36,11 @@ struct Tried {
     words.clear();
   }
   Signal& signal(std::size_t i = 0) { return *engine.signals().at(i).signal; }
-  /// Steps at each instant that the engine asks for, until then; what it wishes is done at once.
+  /// Steps at each instant that the engine asks for, until then; what it wants is done at once.
   void run_to(time_ns_t until_ns) {
     for (;;) {
       due_ns = engine.step(now_ns);
-      while (engine.wish() && acts) {
+      while (engine.pending() && acts) {
         engine.begun(now_ns);
         engine.ended(ending, now_ns);
         due_ns = engine.step(now_ns);
@@ -341,16 +341,16 @@ TEST(Rules, OneActionAtATimeAndTheNextOneComesAfterIt) {
   Tried tried({rule("a", silence(1.0)), rule("b", silence(1.0))});
   tried.acts = false;
   tried.run_to(ms(1001));
-  ASSERT_TRUE(tried.engine.wish());
-  EXPECT_EQ(0U, tried.engine.wish()->rule);
+  ASSERT_TRUE(tried.engine.pending());
+  EXPECT_EQ(0U, tried.engine.pending()->rule);
   tried.engine.begun(tried.now_ns);
   tried.run_to(ms(1100));
-  EXPECT_FALSE(tried.engine.wish());
+  EXPECT_FALSE(tried.engine.pending());
   EXPECT_THAT(tried.words, ::testing::Contains("1000 b suppressed the action of another rule is under way"));
   tried.engine.ended(Ended::done, tried.now_ns);
   tried.run_to(ms(1101));
-  ASSERT_TRUE(tried.engine.wish());
-  EXPECT_EQ(1U, tried.engine.wish()->rule);
+  ASSERT_TRUE(tried.engine.pending());
+  EXPECT_EQ(1U, tried.engine.pending()->rule);
 }
 
 TEST(Rules, WhatFailedIsTriedAgainLaterEachTime) {
@@ -372,7 +372,7 @@ TEST(Rules, ItNeverFightsAPerson) {
   tried.run_to(ms(1500));
   tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);
   tried.run_to(ms(1600));
-  EXPECT_TRUE(tried.engine.status(0).left_alone);
+  EXPECT_TRUE(tried.engine.status(0).changed_by_another);
   EXPECT_THAT(tried.words.back(), HasSubstr("by another hand"));
   tried.tell(0);
   tried.run_to(ms(3000));

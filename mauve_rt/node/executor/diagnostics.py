@@ -246,6 +246,6 @@ def _standing(facts: RuleFacts) -> str:
         return "not armed: what it is about does not run"
     if status.in_effect:
         return "in effect"
-    if status.left_alone:
+    if status.changed_by_another:
         return "left alone: its work was changed by another hand"
     return "its condition holds" if status.holds else "watching"

@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import SupervisorDecision
-from mauve_rt._kernel import Reflex, RuleFacts, ToldDecision, monotonic_ns
+from mauve_rt._kernel import RuleFacts, RuleRunner, ToldDecision, monotonic_ns
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
@@ -31,7 +31,7 @@ class OwnRules:
     | member     | written by                          | read by   | guarded by          |
     | ---------- | ----------------------------------- | --------- | ------------------- |
     | `_loaded`  | configure(), load(), close()        | the same  | `_lock`             |
-    | `_reflex`, | start(), stop(), load(), close()    | any       | `_lock` to write; each |
+    | `_runner`, | start(), stop(), load(), close()    | any       | `_lock` to write; each |
     | `_at_work` |                                     |           | is exchanged whole  |
     """
 
@@ -61,7 +61,7 @@ class OwnRules:
         self._decisions = node.create_publisher(SupervisorDecision, "~/decisions", self._qos)
         self._lock = threading.RLock()
         self._loaded: LoadedRules | None = None
-        self._reflex: Reflex | None = None
+        self._runner: RuleRunner | None = None
         self._at_work: list[str] = []
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -109,7 +109,7 @@ class OwnRules:
             if not path and before is None:
                 raise ParameterError("no rules were loaded yet: name a file")
             loaded = self._load(Path(path) if path or before is None else before.path)
-            if self._reflex is not None or self._runtime.active:
+            if self._runner is not None or self._runtime.active:
                 self._end()
                 try:
                     if loaded.rules:
@@ -124,8 +124,8 @@ class OwnRules:
     def _load(self, path: Path) -> "LoadedRules":
         from mauve_rt.node.executor.rules_file import LoadedRules  # noqa: PLC0415
 
-        # Of rules at work the reflex's own error tells of the first trouble, without the place.
-        topics = self._topics_of if self._reflex is None else None
+        # Of rules at work the runner's own error tells of the first trouble, without the place.
+        topics = self._topics_of if self._runner is None else None
         return LoadedRules.read(path, self._runtime, topics=topics)
 
     def _topics_of(self, rules: Sequence["Rule"]) -> dict[str, str]:
@@ -137,21 +137,21 @@ class OwnRules:
 
     def _begin(self, loaded: "LoadedRules") -> None:
         topics = self._topics_of(loaded.rules)
-        reflex = loaded.reflex(self._runtime.host, topics)
-        reflex.start()
-        self._reflex, self._at_work = reflex, [rule.name for rule in loaded.rules]
+        runner = loaded.runner(self._runtime.host, topics)
+        runner.start()
+        self._runner, self._at_work = runner, [rule.name for rule in loaded.rules]
         self._ending.clear()
-        tell = self._teller(reflex, loaded)
+        tell = self._teller(runner, loaded)
         self._thread = self._watch.thread("rules", tell, ending=self._ending)
         self._thread.start()
 
     def _end(self) -> None:
-        reflex, self._reflex, self._at_work = self._reflex, None, []
-        if reflex is None:
+        runner, self._runner, self._at_work = self._runner, None, []
+        if runner is None:
             return
-        reflex.stop()
+        runner.stop()
         self._ending.set()
-        reflex.wake()
+        runner.wake()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -164,13 +164,13 @@ class OwnRules:
 
     def beat(self) -> None:
         """Say that the executor's Python side works."""
-        if (reflex := self._reflex) is not None:
-            reflex.beat()
+        if (runner := self._runner) is not None:
+            runner.beat()
 
     def facts(self) -> list[RuleFacts]:
         """How each of them fares."""
-        reflex = self._reflex
-        return reflex.facts() if reflex is not None else []
+        runner = self._runner
+        return runner.facts() if runner is not None else []
 
     def infos(self) -> list[Any]:
         """RuleInfo of each of them."""
@@ -179,7 +179,7 @@ class OwnRules:
 
     # ---- telling
 
-    def _teller(self, reflex: Reflex, loaded: "LoadedRules") -> Callable[[], None]:
+    def _teller(self, runner: RuleRunner, loaded: "LoadedRules") -> Callable[[], None]:
         name = self._node.resolve_topic_name
         who = self._node.get_fully_qualified_name()
         messages = loaded.messages(self._runtime, who=who, name=name)
@@ -189,9 +189,9 @@ class OwnRules:
 
         def tell() -> None:
             nonlocal reported
-            for told in reflex.wait_told(_WAIT_NS):
+            for told in runner.wait_told(_WAIT_NS):
                 tell_one(messages, told)
-            if (lost := reflex.lost()) != reported:
+            if (lost := runner.lost()) != reported:
                 text = f"{lost - reported} decisions were left out: they came faster than they are reported"
                 self._node.get_logger().warning(text)
                 reported = lost

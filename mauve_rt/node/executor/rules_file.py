@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from mauve_rt._kernel import Host, Reflex, RuleActions, RuleFacts, monotonic_ns
+from mauve_rt._kernel import Host, RuleActions, RuleFacts, RuleRunner, monotonic_ns
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.told_decisions import DecisionMessages, rule_info
 from mauve_rt.supervision.engine_rules import rule_specs
 from mauve_rt.supervision.rule_actions import own_rules, rule_actions
-from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unheard
+from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unobservable
 from mauve_rt.supervision.rules import Rule, RulesFile
 
 
@@ -34,18 +34,18 @@ class LoadedRules:
         """
         file = RulesFile(path, waits=False)  # requests wait for the one that reads it
         rules = own_rules(file)
-        unheard_of = [*only_outside(file)]
+        found_unobservable = [*only_outside(file)]
         if topics is not None:
             bound = topics(rules)
-            found = (unheard(file, leaf, runtime.host, bound) for leaf in own_leaves(file))
-            unheard_of += filter(None, found)
-        if unheard_of:
-            raise ArchitectureFileError(file.path, unheard_of)
+            found = (unobservable(file, leaf, runtime.host, bound) for leaf in own_leaves(file))
+            found_unobservable += filter(None, found)
+        if found_unobservable:
+            raise ArchitectureFileError(file.path, found_unobservable)
         return cls(path, rules, rule_actions(file, runtime))
 
-    def reflex(self, host: Host, topics: Mapping[str, str]) -> Reflex:
+    def runner(self, host: Host, topics: Mapping[str, str]) -> RuleRunner:
         """What runs them, not started yet."""
-        return Reflex(host, rule_specs(self.rules), self.actions, topics)
+        return RuleRunner(host, rule_specs(self.rules), self.actions, topics)
 
     def messages(self, runtime: Runtime, *, who: str, name: Callable[[str], str]) -> DecisionMessages:
         """What makes messages of their decisions."""

@@ -35,10 +35,10 @@ def test_a_rule_does_and_undoes() -> None:
     engine.arm(0)
     due = engine.step(0)
     assert due == 1000 * MS + 1
-    assert engine.wish is None
+    assert engine.pending is None
     engine.step(due)
-    assert engine.wish is not None
-    assert (engine.wish.act, engine.wish.cause_ns) == ("do", 1000 * MS)
+    assert engine.pending is not None
+    assert (engine.pending.act, engine.pending.cause_ns) == ("do", 1000 * MS)
     engine.begun(due)
     engine.ended("done", due)
     engine.tell(0, 1500 * MS)
@@ -46,8 +46,8 @@ def test_a_rule_does_and_undoes() -> None:
     status = engine.status(0)
     assert (status.holds, status.in_effect, status.next, status.next_ns) == (False, True, "undo", 1800 * MS)
     engine.step(1800 * MS)
-    assert engine.wish is not None
-    assert engine.wish.act == "undo"
+    assert engine.pending is not None
+    assert engine.pending.act == "undo"
     assert [word for _, word, _ in _taken(engine)] == [
         "armed",
         "condition_true",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Actions: what a rule does or undoes, kept ready while it may be wished.
+// Actions: what a rule does or undoes, kept ready while it may be wanted.
 #pragma once
 
 #include <atomic>
@@ -41,15 +41,15 @@ struct ActionReport {
 
 /// One transaction of a rule, prepared anew for each time that it is carried out.
 ///
-/// "tender": the ordinary thread that prepares; "stepper": the one that decides, and commits what is prepared. Steps that
-/// cannot be prepared (configure, resynchronise) are tried beforehand, and carried out by the tender.
+/// "preparation thread": the ordinary thread that prepares; "decision thread": the one that decides, and commits what is prepared. Steps that
+/// cannot be prepared (configure, resynchronise) are tried beforehand, and carried out by the preparation thread.
 ///
 /// | member    | written by                                                               | read by | order     |
 /// | --------- | ------------------------------------------------------------------------ | ------- | --------- |
-/// | stage_    | tender: idle <-> ready, begun -> over, heard -> idle; stepper: the others | both   | acq_rel: whose turn it is, and hands over prepared_ and how_ |
-/// | prepared_ | tender; the stepper commits it from ready on                             | both    | by stage_ |
-/// | how_      | who carries it out                                                       | stepper | by stage_ |
-/// | the rest  | tender                                                                   | tender  | -         |
+/// | stage_    | preparation thread: idle <-> ready, begun -> over, heard -> idle; decision thread: the others | both   | acq_rel: whose turn it is, and hands over prepared_ and how_ |
+/// | prepared_ | preparation thread; the decision thread commits it from ready on                             | both    | by stage_ |
+/// | how_      | who carries it out                                                       | decision thread | by stage_ |
+/// | the rest  | preparation thread                                                                   | preparation thread  | -         |
 class Action {
  public:
   /// No steps: the rule has no such action. [setup]
@@ -62,13 +62,13 @@ class Action {
   /// [non-rt]
   const ActionSteps& steps() const noexcept { return steps_; }
 
-  // ---- the tender
+  // ---- the preparation thread
 
   /// Prepares it, where it is not prepared, or was before something changed; whether that changed anything. [non-rt]
   bool tend(Host& host, std::uint64_t revision);
   /// Finds out whether it could be prepared once `before` is done, where that was done at another revision. [non-rt]
   void try_after(const ActionSteps& before, Host& host, std::uint64_t revision);
-  /// It is not to be wished now; whether it was ready. [non-rt]
+  /// It is not to be wanted now; whether it was ready. [non-rt]
   bool put_away();
   /// Completes what was committed; carries out what was begun and cannot be prepared: whether it did that. [non-rt]
   bool settle(Host& host);
@@ -79,11 +79,11 @@ class Action {
   /// What is kept prepared. [non-rt]
   std::size_t memory_bytes() const noexcept { return prepared_ != nullptr ? prepared_->memory_bytes() : 0; }
 
-  // ---- the stepper
+  // ---- the decision thread
 
   /// Whether it could begin. [rt]
   bool is_ready() const MAUVE_RT { return stage_.load(std::memory_order_acquire) == Stage::ready; }
-  /// Commits it, or lets the tender carry it out; false: it was not ready any more. [rt] as far as adopt and take are.
+  /// Commits it, or lets the preparation thread carry it out; false: it was not ready any more. [rt] as far as adopt and take are.
   bool begin() noexcept;
   /// How it has ended, once. [rt]
   std::optional<Ended> ended() MAUVE_RT;

@@ -31,16 +31,16 @@ enum class Decided : std::uint8_t {
 
 enum class Why : std::uint8_t {
   none,
-  already,     // it is in effect without it
-  other_hand,  // somebody else changed what it did: left alone until the condition ends
-  cooldown,    // for wait_ns more
-  outranked,   // by a rule of a higher priority that is about the same components: other
-  in_flight,   // another rule's action is: other
-  not_ready,   // it is not prepared
-  refused,     // of failed: by the executor
-  stale,       // of failed: what it was prepared against has changed
-  withdrawn,   // of failed: something more urgent came between
-  timed_out,   // of failed: the components were never in their waits together, or no answer came
+  already,             // it is in effect without it
+  changed_by_another,  // somebody else changed what it did: left alone until the condition ends
+  cooldown,            // for wait_ns more
+  outranked,           // by a rule of a higher priority that is about the same components: other
+  in_flight,           // another rule's action is: other
+  not_ready,           // it is not prepared
+  refused,             // of failed: by the executor
+  stale,               // of failed: what it was prepared against has changed
+  withdrawn,           // of failed: something more urgent came between
+  timed_out,           // of failed: the components were never in their waits together, or no answer came
 };
 
 /// One decision.

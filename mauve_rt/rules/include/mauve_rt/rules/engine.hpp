@@ -31,7 +31,7 @@ struct Rule {
 };
 
 /// What the engine wants done now.
-struct Wish {
+struct PendingAction {
   std::size_t rule{0};
   Act act{Act::do_};
   time_ns_t cause_ns{0};  // since when the condition has been as it is
@@ -46,7 +46,7 @@ struct RuleStatus {
   bool armed{false};
   bool holds{false};
   bool in_effect{false};
-  bool left_alone{false};
+  bool changed_by_another{false};
   time_ns_t since_ns{0};  // the condition has been as it is
   double measured{0.0};
   std::optional<Act> next{};    // what it is going to want if nothing changes
@@ -60,16 +60,16 @@ struct RuleStatus {
 /// in effect stays as it is until the condition ends. One action at a time is under way.
 ///
 /// Whoever hosts it calls step() at the instant that the step before returned, and when word() has changed; carries out
-/// wish(), until there is none; and tells what it finds of the architecture. All of that on one thread, the "stepper".
+/// pending(), until there is none; and tells what it finds of the architecture. All of that on one thread, the "decision thread".
 ///
 /// | member       | written by          | read by             | order                                                     |
 /// | ------------ | ------------------- | ------------------- | --------------------------------------------------------- |
-/// | signals_     | who feeds them      | stepper             | their own: signal.hpp                                     |
-/// | word_ (futex)| signals, wake()     | stepper             | release/acquire: who sees it changed sees why             |
-/// | told_, ring_ | stepper             | who takes decisions | release/acquire: a decision is whole before it is counted |
-/// | taken_       | who takes decisions | stepper             | release/acquire: its place may be written again           |
-/// | lost_        | stepper             | anyone              | relaxed: a lone count                                     |
-/// | the rest     | stepper             | stepper             | -                                                         |
+/// | signals_     | who feeds them      | decision thread     | their own: signal.hpp                                     |
+/// | word_ (futex)| signals, wake()     | decision thread     | release/acquire: who sees it changed sees why             |
+/// | told_, ring_ | decision thread     | who takes decisions | release/acquire: a decision is whole before it is counted |
+/// | taken_       | who takes decisions | decision thread     | release/acquire: its place may be written again           |
+/// | lost_        | decision thread     | anyone              | relaxed: a lone count                                     |
+/// | the rest     | decision thread     | decision thread     | -                                                         |
 class Engine {
  public:
   /// [setup] Throws Error: a rule that cannot be so.
@@ -88,10 +88,10 @@ class Engine {
   const std::vector<Heard>& signals() const noexcept { return heard_; }
   /// Bumped by what is of interest. [rt]
   const std::atomic<std::uint32_t>& word() const MAUVE_RT { return word_; }
-  /// Lets the stepper look. Any thread. [rt]
+  /// Lets the decision thread look. Any thread. [rt]
   void wake() MAUVE_RT;
 
-  // ---- the stepper: what it finds of the architecture
+  // ---- the decision thread: what it finds of the architecture
 
   /// Whether all that the rule is about is there and runs: it is armed, or watches no longer. [rt]
   void set_present(std::size_t rule, bool present, time_ns_t now_ns) MAUVE_RT;
@@ -108,13 +108,13 @@ class Engine {
   /// The same of one rule, that somebody else is to run: it watches no longer. [rt]
   void forget(std::size_t rule) MAUVE_RT;
 
-  // ---- the stepper: deciding
+  // ---- the decision thread: deciding
 
   /// Looks at all conditions; the instant at which it has to at the latest. [rt]
   time_ns_t step(time_ns_t now_ns) MAUVE_RT;
   /// What to do now, found by the last step. [rt]
-  const std::optional<Wish>& wish() const MAUVE_RT { return wish_; }
-  /// The wish is being carried out: there is no other until it has ended. [rt]
+  const std::optional<PendingAction>& pending() const MAUVE_RT { return pending_; }
+  /// The pending is being carried out: there is no other until it has ended. [rt]
   void begun(time_ns_t now_ns) MAUVE_RT;
   /// [rt]
   void ended(Ended how, time_ns_t now_ns) MAUVE_RT;
@@ -125,7 +125,7 @@ class Engine {
   std::optional<Decision> take() MAUVE_RT;
   /// Decisions that found no room, as nobody took them. [rt]
   std::uint64_t lost() const MAUVE_RT { return lost_.load(std::memory_order_relaxed); }
-  /// The stepper. [rt]
+  /// The decision thread. [rt]
   RuleStatus status(std::size_t rule) const MAUVE_RT;
   std::size_t size() const MAUVE_RT { return lives_.size(); }
   /// [non-rt]
@@ -150,8 +150,8 @@ class Engine {
   std::vector<Heard> heard_;
   std::vector<std::unique_ptr<Life>> lives_;
   std::vector<Life*> by_rank_;  // the highest first
-  std::optional<Wish> wish_;
-  std::optional<Wish> under_way_;
+  std::optional<PendingAction> pending_;
+  std::optional<PendingAction> under_way_;
   std::array<Decision, kRing> ring_{};
   alignas(64) std::atomic<std::uint32_t> word_{0};
   alignas(64) std::atomic<std::uint64_t> told_{0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/rules/reflex.hpp"
+#include "mauve_rt/rules/rule_runner.hpp"
 
 #include <chrono>
 #include <mutex>
@@ -19,7 +19,7 @@ constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 constexpr time_ns_t kStoodStill = ms_to_ns(50);
 constexpr time_ns_t kCatchUp = ms_to_ns(20);
 
-// What the tender found of a rule.
+// What the preparation thread found of a rule.
 constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
 constexpr std::uint64_t kKnown = 2;    // from here on one for each act: whether it is known ...
 constexpr std::uint64_t kInPlace = 8;  // ... that what it asks for is so
@@ -36,8 +36,8 @@ bool is_outcome(const Decision& decision) noexcept {
 
 }  // namespace
 
-Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
-               std::map<std::string, std::string> topics)
+RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
+                       std::map<std::string, std::string> topics)
     : host_(host),
       engine_(std::move(engine)),
       feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
@@ -55,36 +55,36 @@ Reflex::Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<Rul
   for (const auto& heard : engine_->signals()) feeds_.open(heard.spec, *heard.signal);
 }
 
-Reflex::~Reflex() { stop(); }
+RuleRunner::~RuleRunner() { stop(); }
 
-void Reflex::start() {
+void RuleRunner::start() {
   if (runs_ || host_.is_simulated()) return;
   ending_.store(0, std::memory_order_relaxed);  // the threads' creation publishes it
   host_.architecture().changes().set_listener(&work_);
   tend();
   const auto tending = [](void* self) -> void* {
-    static_cast<Reflex*>(self)->run_tending();
+    static_cast<RuleRunner*>(self)->run_preparation();
     return nullptr;
   };
   const auto stepping = [](void* self) -> void* {
-    static_cast<Reflex*>(self)->run_steps();
+    static_cast<RuleRunner*>(self)->run_decisions();
     return nullptr;
   };
-  if (tender_.start({.name = "reflex tender"}, tending, this) != 0) {
+  if (preparation_thread_.start({.name = "rules prepare"}, tending, this) != 0) {
     end();
     throw Error(ErrorCode::internal, "the system refuses the thread that prepares what rules do");
   }
-  if (stepper_.start({.name = "reflex", .priority = kPriority, .stack_bytes = kStackBytes}, stepping, this) !=
-      0) {
+  if (decision_thread_.start({.name = "runner", .priority = kPriority, .stack_bytes = kStackBytes}, stepping,
+                             this) != 0) {
     end();
-    tender_.join();
+    preparation_thread_.join();
     throw Error(ErrorCode::internal, "the system refuses the thread that rules act on");
   }
-  stepper_.prefault_stack();
+  decision_thread_.prefault_stack();
   runs_ = true;
 }
 
-void Reflex::end() noexcept {
+void RuleRunner::end() noexcept {
   ending_.store(1, std::memory_order_release);
   futex_wake_all(ending_);
   host_.architecture().changes().set_listener(nullptr);
@@ -92,15 +92,15 @@ void Reflex::end() noexcept {
   work_.bump();
 }
 
-void Reflex::stop() noexcept {
+void RuleRunner::stop() noexcept {
   if (!std::exchange(runs_, false)) return;
   end();
-  stepper_.join();
-  tender_.join();
+  decision_thread_.join();
+  preparation_thread_.join();
   tell();
 }
 
-time_ns_t Reflex::advance() {
+time_ns_t RuleRunner::advance() {
   beat();
   for (;;) {
     tend();
@@ -112,9 +112,9 @@ time_ns_t Reflex::advance() {
   }
 }
 
-// ---- the stepper
+// ---- the decision thread
 
-void Reflex::run_steps() noexcept {
+void RuleRunner::run_decisions() noexcept {
   while (ending_.load(std::memory_order_acquire) == 0) {
     const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before the look
     const time_ns_t next_ns = step();
@@ -124,7 +124,7 @@ void Reflex::run_steps() noexcept {
   }
 }
 
-time_ns_t Reflex::step() noexcept {
+time_ns_t RuleRunner::step() noexcept {
   const time_ns_t now_ns = host_.clock().now_ns();
   hear_ends(now_ns);
   if (!host_.is_deployed()) return kForever;  // its components stop: what is heard of that is no cause to act
@@ -133,8 +133,8 @@ time_ns_t Reflex::step() noexcept {
     for (const Act act : kActs) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());
   }
   const time_ns_t next_ns = engine_->step(now_ns);
-  if (const std::optional<Wish> wish = engine_->wish()) {
-    Action& action = rules_[wish->rule]->action(wish->act);
+  if (const std::optional<PendingAction> pending = engine_->pending()) {
+    Action& action = rules_[pending->rule]->action(pending->act);
     engine_->begun(now_ns);
     if (MAUVE_RT_TRUSTED(action.begin())) {  // as far as the components' own adopt and take are
       under_way_ = &action;
@@ -149,7 +149,7 @@ time_ns_t Reflex::step() noexcept {
   return next_ns;
 }
 
-void Reflex::hear_ends(time_ns_t now_ns) noexcept {
+void RuleRunner::hear_ends(time_ns_t now_ns) noexcept {
   if (under_way_ == nullptr) return;
   const std::optional<Ended> how = under_way_->ended();
   if (!how) return;
@@ -159,7 +159,7 @@ void Reflex::hear_ends(time_ns_t now_ns) noexcept {
 }
 
 /// What was found before the last action ended, or while one is under way, is of yesterday.
-void Reflex::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
+void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
   Rule& rule = *rules_[index];
   const std::uint64_t found = rule.found.load(std::memory_order_acquire);
   const bool is_current = found >> kEndsAt == ends_.load(std::memory_order_relaxed) + 1;  // its own
@@ -181,7 +181,7 @@ void Reflex::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
   }
 }
 
-void Reflex::show_status() noexcept {
+void RuleRunner::show_status() noexcept {
   const std::unique_lock lock(status_mutex_, std::try_to_lock);
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     const RuleStatus status = engine_->status(i);
@@ -190,9 +190,9 @@ void Reflex::show_status() noexcept {
   }
 }
 
-// ---- the tender
+// ---- the preparation thread
 
-void Reflex::run_tending() noexcept {
+void RuleRunner::run_preparation() noexcept {
   while (ending_.load(std::memory_order_acquire) == 0) {
     const std::uint32_t seen = work_.word.load(std::memory_order_acquire);
     if (tend()) engine_->wake();
@@ -201,20 +201,20 @@ void Reflex::run_tending() noexcept {
   }
 }
 
-/// Whether the stepper has something to look at.
-bool Reflex::tend() {
+/// Whether the decision thread has something to look at.
+bool RuleRunner::tend() {
   // Before all: what has ended by now is completed below, and then found in force.
   const std::uint64_t ends = ends_.load(std::memory_order_acquire);
   bool changed = false;
   for (const auto& rule : rules_) {
     for (Action& action : rule->acts) changed = action.settle(host_) || changed;
   }
-  return changed || look_around(ends);  // what was carried out the stepper has to know first
+  return changed || look_around(ends);  // what was carried out the decision thread has to know first
 }
 
-bool Reflex::look_around(std::uint64_t ends) {
+bool RuleRunner::look_around(std::uint64_t ends) {
   const std::uint64_t revision = host_.architecture().revision();
-  const std::string deaf = follow();
+  const std::string unobservable = follow();
   const ArchitectureDescription description = host_.describe();
   bool changed = false;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
@@ -228,14 +228,14 @@ bool Reflex::look_around(std::uint64_t ends) {
     }
     changed = make_ready(rule, revision) || changed;
     changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
-    keep(i, rule, deaf);
+    keep(i, rule, unobservable);
   }
   return changed;
 }
 
 /// For facts().
-void Reflex::keep(std::size_t index, const Rule& rule, const std::string& deaf) {
-  Kept kept{.problem = deaf};
+void RuleRunner::keep(std::size_t index, const Rule& rule, const std::string& unobservable) {
+  Kept kept{.problem = unobservable};
   for (const Action& action : rule.acts) {
     if (kept.problem.empty()) kept.problem = action.problem();
     kept.memory_bytes += action.memory_bytes();
@@ -247,7 +247,7 @@ void Reflex::keep(std::size_t index, const Rule& rule, const std::string& deaf) 
 }
 
 /// What is in effect can be undone, what is not can be done; would it be possible to undo that?
-bool Reflex::make_ready(Rule& rule, std::uint64_t revision) {
+bool RuleRunner::make_ready(Rule& rule, std::uint64_t revision) {
   const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
   Action& next = rule.action(in_effect ? Act::undo : Act::do_);
   Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
@@ -258,7 +258,7 @@ bool Reflex::make_ready(Rule& rule, std::uint64_t revision) {
 }
 
 /// Why something cannot be heard.
-std::string Reflex::follow() {
+std::string RuleRunner::follow() {
   try {
     feeds_.follow();
     return {};
@@ -267,7 +267,7 @@ std::string Reflex::follow() {
   }
 }
 
-void Reflex::tell() {
+void RuleRunner::tell() {
   std::vector<Told> all;
   while (const std::optional<Decision> decision = engine_->take()) {
     all.push_back({.decision = *decision});
@@ -297,7 +297,7 @@ void Reflex::tell() {
 
 // ---- anyone
 
-std::vector<Told> Reflex::wait_told(time_ns_t timeout_ns) {
+std::vector<Told> RuleRunner::wait_told(time_ns_t timeout_ns) {
   std::unique_lock lock(told_mutex_);
   told_changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
                          [&] { return woken_ || !told_.empty(); });
@@ -306,18 +306,18 @@ std::vector<Told> Reflex::wait_told(time_ns_t timeout_ns) {
   return taken;
 }
 
-void Reflex::wake() {
+void RuleRunner::wake() {
   const std::lock_guard lock(told_mutex_);
   woken_ = true;
   told_changed_.notify_all();
 }
 
-std::uint64_t Reflex::lost() const {
+std::uint64_t RuleRunner::lost() const {
   const std::lock_guard lock(told_mutex_);
   return engine_->lost() + left_out_;
 }
 
-std::vector<RuleFacts> Reflex::facts() const {
+std::vector<RuleFacts> RuleRunner::facts() const {
   std::vector<RuleFacts> all;
   const std::scoped_lock lock(told_mutex_, status_mutex_);
   for (std::size_t i = 0; i < rules_.size(); ++i) {

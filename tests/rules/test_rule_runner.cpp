@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Rules at work beside components, on threads and in virtual time.
-#include "mauve_rt/rules/reflex.hpp"
+#include "mauve_rt/rules/rule_runner.hpp"
 
 #include "hosts.hpp"
 
@@ -46,17 +46,17 @@ struct CountedCore : TestCore {
 };
 /// Component "c", whose core a rule replaces; "w", about which it asks; and the resource "beat", which the test writes.
 template <typename Way>
-class ReflexTest : public Hosted<Way> {
+class RuleRunnerTest : public Hosted<Way> {
  protected:
-  ReflexTest() : beat(this->architecture.template add_resource<SharedData<Number>>("beat")) {
+  RuleRunnerTest() : beat(this->architecture.template add_resource<SharedData<Number>>("beat")) {
     CountedCore::reset();
     this->registry.template core<CountedCore>("t/Counted", "t/Shell");
     for (const char* name : {"c", "w"})
       this->add(name).allow({"t/Counting", "t/Counted", "t/Refusing", "t/Throwing", "t/Unready"}, true);
     watched = &this->architecture.component("w");
   }
-  ~ReflexTest() override {
-    if (reflex) reflex->stop();
+  ~RuleRunnerTest() override {
+    if (runner) runner->stop();
     this->way.shutdown();
   }
 
@@ -68,12 +68,12 @@ class ReflexTest : public Hosted<Way> {
     actions.push_back({.do_steps = std::move(act), .undo_steps = std::move(undo)});
   }
   void make() {
-    reflex =
-        std::make_unique<Reflex>(this->host(), std::make_unique<Engine>(rules), actions, std::move(topics));
+    runner = std::make_unique<RuleRunner>(this->host(), std::make_unique<Engine>(rules), actions,
+                                          std::move(topics));
   }
   void begin() {
     make();
-    reflex->start();
+    runner->start();
     see("armed");
   }
   /// Time passes until a decision of this word was told since the last such call.
@@ -84,7 +84,7 @@ class ReflexTest : public Hosted<Way> {
     };
     this->way.until(seen, word.c_str());
     if (this->HasFatalFailure()) {
-      for (const RuleFacts& facts : reflex->facts())
+      for (const RuleFacts& facts : runner->facts())
         ADD_FAILURE() << facts.name << (facts.ready ? " is ready " : " is not ready ") << facts.problem;
     }
     from = static_cast<std::ptrdiff_t>(words.size());
@@ -96,8 +96,8 @@ class ReflexTest : public Hosted<Way> {
     }
   }
   void take() {
-    if constexpr (ReflexTest::is_virtual) reflex->advance();
-    for (Told& told : reflex->wait_told(0)) {
+    if constexpr (RuleRunnerTest::is_virtual) runner->advance();
+    for (Told& told : runner->wait_told(0)) {
       words.emplace_back(name_of(told.decision.decided));
       whole.push_back(std::move(told));
     }
@@ -105,7 +105,7 @@ class ReflexTest : public Hosted<Way> {
   void await_ready(std::size_t rule = 0) {
     const auto is_ready = [&] {
       take();
-      return reflex->facts()[rule].ready;
+      return runner->facts()[rule].ready;
     };
     this->way.until(is_ready, "the action to be ready");
   }
@@ -122,18 +122,18 @@ class ReflexTest : public Hosted<Way> {
   std::vector<mauve::rules::Rule> rules;
   std::vector<RuleActions> actions;
   std::map<std::string, std::string> topics;
-  std::unique_ptr<Reflex> reflex;
+  std::unique_ptr<RuleRunner> runner;
   std::vector<std::string> words;
   std::vector<Told> whole;
   std::ptrdiff_t from{0};
 };
-TYPED_TEST_SUITE(ReflexTest, EveryHost, HostNames);
+TYPED_TEST_SUITE(RuleRunnerTest, EveryHost, HostNames);
 
 When silent(double longer_than_s = 0.05) {
   return leaf("silence", {{"resource", "beat"}, {"longer_than_s", longer_than_s}});
 }
 
-TYPED_TEST(ReflexTest, DoesAndUndoes) {
+TYPED_TEST(RuleRunnerTest, DoesAndUndoes) {
   this->add_rule(silent());
   this->deploy();
   this->begin();
@@ -152,12 +152,12 @@ TYPED_TEST(ReflexTest, DoesAndUndoes) {
 
 When too_high() { return leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", 3.0}}); }
 
-TYPED_TEST(ReflexTest, PreparesNothingWhenItIsTime) {
+TYPED_TEST(RuleRunnerTest, PreparesNothingWhenItIsTime) {
   this->add_rule(too_high(), core("t/Core"), core("t/Counted"));
   this->deploy();
   this->begin();
   this->await_ready();
-  EXPECT_GT(this->reflex->facts()[0].memory_bytes, 0U);
+  EXPECT_GT(this->runner->facts()[0].memory_bytes, 0U);
   const int made = CountedCore::made.load();
   EXPECT_GT(made, 0);
   this->beat.write.write({.value = 4.0}, 1);
@@ -166,7 +166,7 @@ TYPED_TEST(ReflexTest, PreparesNothingWhenItIsTime) {
   EXPECT_EQ(made, CountedCore::made_at_adopt.load()) << "the core was there before";
 }
 
-TYPED_TEST(ReflexTest, ActsWhileNothingCanBePrepared) {
+TYPED_TEST(RuleRunnerTest, ActsWhileNothingCanBePrepared) {
   if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
   this->add_rule(too_high(), core("t/Core"), core("t/Counted"));
   this->add_rule(silent(3600.0), {}, core("t/Counted", "w"));
@@ -186,7 +186,7 @@ TYPED_TEST(ReflexTest, ActsWhileNothingCanBePrepared) {
   EXPECT_EQ("t/Counted", this->present());
 }
 
-TYPED_TEST(ReflexTest, WritesEveryDecisionIntoTheTrace) {
+TYPED_TEST(RuleRunnerTest, WritesEveryDecisionIntoTheTrace) {
   this->add_rule(too_high());
   this->deploy();
   this->begin();
@@ -210,7 +210,7 @@ TYPED_TEST(ReflexTest, WritesEveryDecisionIntoTheTrace) {
   EXPECT_THAT(sequences, ElementsAre(0, 1, 2, 3, 4, 5, 6));
 }
 
-TYPED_TEST(ReflexTest, HearsMessagesOfABoundTopic) {
+TYPED_TEST(RuleRunnerTest, HearsMessagesOfABoundTopic) {
   this->topics = {{"radio/in", "beat"}};
   this->add_rule(leaf("silence", {{"topic", "radio/in"}, {"longer_than_s", 0.05}}));
   this->deploy();
@@ -219,12 +219,12 @@ TYPED_TEST(ReflexTest, HearsMessagesOfABoundTopic) {
   EXPECT_EQ("t/Counting", this->present());
 }
 
-TYPED_TEST(ReflexTest, TakesWhatIsInEffectAsItsOwn) {
+TYPED_TEST(RuleRunnerTest, TakesWhatIsInEffectAsItsOwn) {
   this->add_rule(silent());
   this->deploy();
   this->begin();
   this->see("done");
-  this->reflex.reset();
+  this->runner.reset();
   this->from = 0;
   this->words.clear();
   this->begin();
@@ -235,25 +235,25 @@ TYPED_TEST(ReflexTest, TakesWhatIsInEffectAsItsOwn) {
   EXPECT_EQ("t/Core", this->present());
 }
 
-TYPED_TEST(ReflexTest, LeavesAloneWhatAnotherHandChanges) {
+TYPED_TEST(RuleRunnerTest, LeavesAloneWhatAnotherHandChanges) {
   this->add_rule(silent());
   this->deploy();
   this->begin();
   this->see("done");
   this->host().replace_core("c", "t/Core");
   this->see("suppressed");
-  EXPECT_EQ(Why::other_hand, this->last(Decided::suppressed).decision.why);
+  EXPECT_EQ(Why::changed_by_another, this->last(Decided::suppressed).decision.why);
   this->live(ms_to_ns(120));
   EXPECT_EQ("t/Core", this->present());
 }
 
-TYPED_TEST(ReflexTest, SaysAtOnceWhatCannotBeMadeReady) {
+TYPED_TEST(RuleRunnerTest, SaysAtOnceWhatCannotBeMadeReady) {
   this->add_rule(silent(1.0), core("t/Core"), core("t/Unready"));
   this->add_rule(silent(1.0), core("t/Undeclared"));
   this->deploy();
   this->begin();
   this->take();
-  const std::vector<RuleFacts> facts = this->reflex->facts();
+  const std::vector<RuleFacts> facts = this->runner->facts();
   ASSERT_THAT(facts, SizeIs(2));
   EXPECT_FALSE(facts[0].ready);
   EXPECT_THAT(facts[0].problem, HasSubstr("t/Unready"));
@@ -261,7 +261,7 @@ TYPED_TEST(ReflexTest, SaysAtOnceWhatCannotBeMadeReady) {
   EXPECT_THAT(facts[1].problem, HasSubstr("t/Undeclared")) << "it could not be undone";
 }
 
-TYPED_TEST(ReflexTest, SaysSoWhenAnActionCanNoLongerBeMadeReady) {
+TYPED_TEST(RuleRunnerTest, SaysSoWhenAnActionCanNoLongerBeMadeReady) {
   this->add_rule(silent(600), {{.kind = "connect", .target = "c", .name = "input", .value = "gone.read"}},
                  {{.kind = "connect", .target = "c", .name = "input", .value = "late.read"}});
   this->architecture.template add_resource<SharedData<Number>>("late");
@@ -275,18 +275,18 @@ TYPED_TEST(ReflexTest, SaysSoWhenAnActionCanNoLongerBeMadeReady) {
   this->way.until(
       [&] {
         this->take();
-        return !this->reflex->facts()[0].ready;
+        return !this->runner->facts()[0].ready;
       },
       "the action not to be ready");
-  EXPECT_THAT(this->reflex->facts()[0].problem, HasSubstr("late"));
+  EXPECT_THAT(this->runner->facts()[0].problem, HasSubstr("late"));
 }
 
-TYPED_TEST(ReflexTest, IsNotArmedBeforeItsComponentRuns) {
+TYPED_TEST(RuleRunnerTest, IsNotArmedBeforeItsComponentRuns) {
   this->add_rule(silent());
   this->deploy();
   this->host().stop("c", s_to_ns(10));
   this->make();
-  this->reflex->start();
+  this->runner->start();
   this->live(ms_to_ns(100));
   EXPECT_THAT(this->words, IsEmpty());
   this->host().start("c");
@@ -296,7 +296,7 @@ TYPED_TEST(ReflexTest, IsNotArmedBeforeItsComponentRuns) {
 
 // ---- what it hears
 
-TYPED_TEST(ReflexTest, HearsAValueAndItsComingBack) {
+TYPED_TEST(RuleRunnerTest, HearsAValueAndItsComingBack) {
   this->add_rule(leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", 3.0}}));
   this->deploy();
   this->begin();
@@ -310,7 +310,7 @@ TYPED_TEST(ReflexTest, HearsAValueAndItsComingBack) {
   EXPECT_EQ("t/Core", this->present());
 }
 
-TYPED_TEST(ReflexTest, HearsThatTheNodeIsSilent) {
+TYPED_TEST(RuleRunnerTest, HearsThatTheNodeIsSilent) {
   this->add_rule(leaf("node_silent", {{"longer_than_s", 2.0}}));
   this->deploy();
   this->begin();
@@ -324,13 +324,13 @@ TYPED_TEST(ReflexTest, HearsThatTheNodeIsSilent) {
   }
   this->see("done");
   EXPECT_EQ("t/Counting", this->present());
-  this->reflex->beat();
+  this->runner->beat();
   this->see("done");
   EXPECT_EQ("t/Core", this->present());
 }
 
 /// A value that flaps faster than its decisions are reported: memory stays bounded, and no outcome is lost.
-TYPED_TEST(ReflexTest, LeavesOutDecisionsThatNobodyTakes) {
+TYPED_TEST(RuleRunnerTest, LeavesOutDecisionsThatNobodyTakes) {
   this->rules.push_back({.name = "flapping", .when = too_high(), .for_ns = s_to_ns(3600), .about = {"c"}});
   this->actions.push_back({.do_steps = core("t/Counting")});
   this->deploy();
@@ -338,17 +338,17 @@ TYPED_TEST(ReflexTest, LeavesOutDecisionsThatNobodyTakes) {
   const auto flap = [&] {
     for (const double value : {4.0, 2.0}) {
       this->beat.write.write({.value = value}, 1);
-      if constexpr (TestFixture::is_virtual) this->reflex->advance();
+      if constexpr (TestFixture::is_virtual) this->runner->advance();
       this->way.run_for(us_to_ns(100));
     }
-    return this->reflex->lost() > 0;
+    return this->runner->lost() > 0;
   };
   const time_ns_t until = monotonic_now_ns() + s_to_ns(60);
   while (!flap()) ASSERT_LT(monotonic_now_ns(), until);
-  EXPECT_EQ(1000U, this->reflex->wait_told(0).size());
+  EXPECT_EQ(1000U, this->runner->wait_told(0).size());
 }
 
-TYPED_TEST(ReflexTest, HearsAFault) {
+TYPED_TEST(RuleRunnerTest, HearsAFault) {
   this->add_rule(leaf("fault", {{"component", "w"}}));
   this->deploy();
   this->begin();
@@ -359,7 +359,7 @@ TYPED_TEST(ReflexTest, HearsAFault) {
   EXPECT_EQ("t/Counting", this->present());
 }
 
-TYPED_TEST(ReflexTest, HearsOverruns) {
+TYPED_TEST(RuleRunnerTest, HearsOverruns) {
   const auto many =
       leaf("overruns", {{"component", "w"}, {"at_least", std::int64_t{3}}, {"within_s", 100.0}});
   this->add_rule(many, {});
@@ -376,7 +376,7 @@ TYPED_TEST(ReflexTest, HearsOverruns) {
   EXPECT_GE(this->last(Decided::do_).decision.measured, 3.0);
 }
 
-TYPED_TEST(ReflexTest, HearsLateResponses) {
+TYPED_TEST(RuleRunnerTest, HearsLateResponses) {
   const auto slow = leaf("late", {{"component", "w"}, {"what", "response"}, {"longer_than_s", 0.001}});
   this->add_rule(slow, {});
   this->deploy();
@@ -391,7 +391,7 @@ TYPED_TEST(ReflexTest, HearsLateResponses) {
   this->see("done");
 }
 
-TYPED_TEST(ReflexTest, HearsThatReleasesDoNotCome) {
+TYPED_TEST(RuleRunnerTest, HearsThatReleasesDoNotCome) {
   this->add_rule(leaf("no_release", {{"component", "w"}, {"periods", 50.0}}));
   this->deploy();
   this->begin();
@@ -406,7 +406,7 @@ TYPED_TEST(ReflexTest, HearsThatReleasesDoNotCome) {
   EXPECT_EQ("t/Core", this->present());
 }
 
-TYPED_TEST(ReflexTest, HearsOfChangesOfTheArchitectureAndOfAComponent) {
+TYPED_TEST(RuleRunnerTest, HearsOfChangesOfTheArchitectureAndOfAComponent) {
   this->add_rule(leaf("since_change", {{"longer_than_s", 0.1}}), {}, core("t/Counting", "w"));
   this->add_rule(leaf("since_change", {{"component", "w"}, {"longer_than_s", 0.1}}), {});
   this->deploy();
@@ -419,7 +419,7 @@ TYPED_TEST(ReflexTest, HearsOfChangesOfTheArchitectureAndOfAComponent) {
 
 // ---- what is refused
 
-TYPED_TEST(ReflexTest, RefusesWhatAnExecutorCannotHear) {
+TYPED_TEST(RuleRunnerTest, RefusesWhatAnExecutorCannotHear) {
   const std::vector<std::pair<When, std::string>> cases{
       {leaf("peer", {{"executor", "other"}}), "in: supervisor"},
       {leaf("diagnostic", {{"status", "x"}}), "in: supervisor"},
@@ -437,17 +437,17 @@ TYPED_TEST(ReflexTest, RefusesWhatAnExecutorCannotHear) {
   }
 }
 
-TYPED_TEST(ReflexTest, RefusesStepsThatThereAreNot) {
+TYPED_TEST(RuleRunnerTest, RefusesStepsThatThereAreNot) {
   this->add_rule(silent(), {}, {{.kind = "explode", .target = "c"}});
   this->deploy();
   EXPECT_THAT(this->refusal([&] { this->make(); }).what(), HasSubstr("explode"));
 }
 
-TYPED_TEST(ReflexTest, OnlyOneListensToAComponent) {
+TYPED_TEST(RuleRunnerTest, OnlyOneListensToAComponent) {
   this->add_rule(leaf("fault", {{"component", "w"}}));
   this->deploy();
   this->begin();
-  const std::unique_ptr<Reflex> first = std::move(this->reflex);
+  const std::unique_ptr<RuleRunner> first = std::move(this->runner);
   EXPECT_THAT(this->refusal([&] { this->make(); }).what(), HasSubstr("listen"));
   first->stop();
 }

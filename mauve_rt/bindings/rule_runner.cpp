@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Rules at work beside the components of a host.
-#include "mauve_rt/rules/reflex.hpp"
+#include "mauve_rt/rules/rule_runner.hpp"
 
 #include <algorithm>
 #include <set>
@@ -14,38 +14,38 @@ namespace {
 using Unlocked = py::call_guard<py::gil_scoped_release>;
 
 /// Its threads end without the interpreter's lock, and before the interpreter does: they may need it for parts in Python.
-class PyReflex {
+class PyRuleRunner {
  public:
-  PyReflex(PyHost& host, std::vector<rules::Rule> all, const std::vector<rules::RuleActions>& actions,
-           std::map<std::string, std::string> topics)
-      : reflex_(std::make_unique<rules::Reflex>(host.host(), std::make_unique<rules::Engine>(std::move(all)),
-                                                actions, std::move(topics))) {
+  PyRuleRunner(PyHost& host, std::vector<rules::Rule> all, const std::vector<rules::RuleActions>& actions,
+               std::map<std::string, std::string> topics)
+      : runner_(std::make_unique<rules::RuleRunner>(
+            host.host(), std::make_unique<rules::Engine>(std::move(all)), actions, std::move(topics))) {
     living().insert(this);
   }
-  ~PyReflex() {
+  ~PyRuleRunner() {
     living().erase(this);
     const py::gil_scoped_release release;
-    reflex_.reset();
+    runner_.reset();
   }
-  PyReflex(const PyReflex&) = delete;
-  PyReflex& operator=(const PyReflex&) = delete;
+  PyRuleRunner(const PyRuleRunner&) = delete;
+  PyRuleRunner& operator=(const PyRuleRunner&) = delete;
 
-  rules::Reflex& reflex() const noexcept { return *reflex_; }
+  rules::RuleRunner& runner() const noexcept { return *runner_; }
 
   static void stop_all() {
-    const std::set<PyReflex*> all = living();
+    const std::set<PyRuleRunner*> all = living();
     const py::gil_scoped_release release;
-    for (PyReflex* each : all) each->reflex_->stop();
+    for (PyRuleRunner* each : all) each->runner_->stop();
   }
 
  private:
   /// Under the interpreter's lock.
-  static std::set<PyReflex*>& living() {
-    static std::set<PyReflex*> all;
+  static std::set<PyRuleRunner*>& living() {
+    static std::set<PyRuleRunner*> all;
     return all;
   }
 
-  std::unique_ptr<rules::Reflex> reflex_;
+  std::unique_ptr<rules::RuleRunner> runner_;
 };
 
 rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo) {
@@ -81,31 +81,31 @@ void bind_told(py::module_& module) {
 
 }  // namespace
 
-void bind_reflex(py::module_& module) {
+void bind_rule_runner(py::module_& module) {
   bind_actions(module);
   bind_told(module);
-  py::class_<PyReflex>(module, "Reflex")
+  py::class_<PyRuleRunner>(module, "RuleRunner")
       .def(py::init<PyHost&, std::vector<rules::Rule>, const std::vector<rules::RuleActions>&,
                     std::map<std::string, std::string>>(),
            py::arg("host"), py::arg("rules"), py::arg("actions"),
            py::arg("topics") = std::map<std::string, std::string>{}, py::keep_alive<1, 2>())
       .def(
-          "start", [](PyReflex& self) { self.reflex().start(); }, Unlocked())
+          "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked())
       .def(
-          "stop", [](PyReflex& self) { self.reflex().stop(); }, Unlocked())
+          "stop", [](PyRuleRunner& self) { self.runner().stop(); }, Unlocked())
       .def(
           "wait_told",
-          [](PyReflex& self, time_ns_t timeout_ns) { return self.reflex().wait_told(timeout_ns); },
+          [](PyRuleRunner& self, time_ns_t timeout_ns) { return self.runner().wait_told(timeout_ns); },
           py::arg("timeout_ns"), Unlocked())
       .def(
-          "wake", [](PyReflex& self) { self.reflex().wake(); }, Unlocked())
+          "wake", [](PyRuleRunner& self) { self.runner().wake(); }, Unlocked())
       .def(
-          "facts", [](PyReflex& self) { return self.reflex().facts(); }, Unlocked())
-      .def("beat", [](PyReflex& self) { self.reflex().beat(); })
-      .def("lost", [](PyReflex& self) { return self.reflex().lost(); })
-      .def("advance", [](PyReflex& self) { return self.reflex().advance(); }, Unlocked());
+          "facts", [](PyRuleRunner& self) { return self.runner().facts(); }, Unlocked())
+      .def("beat", [](PyRuleRunner& self) { self.runner().beat(); })
+      .def("lost", [](PyRuleRunner& self) { return self.runner().lost(); })
+      .def("advance", [](PyRuleRunner& self) { return self.runner().advance(); }, Unlocked());
   // Called before the hosts' own: what is registered last is called first.
-  py::module_::import("atexit").attr("register")(py::cpp_function(&PyReflex::stop_all));
+  py::module_::import("atexit").attr("register")(py::cpp_function(&PyRuleRunner::stop_all));
 }
 
 }  // namespace mauve::bindings

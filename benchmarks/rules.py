@@ -33,7 +33,7 @@ rules:
 """
 
 
-def reflex_rows(settings: Settings) -> Iterator[Row]:
+def rule_rows(settings: Settings) -> Iterator[Row]:
     """Rounds of a rule beside the components of its process, and of two bare threads."""
     what = f"{_WHAT}, {_LOAD}"
     if missing := stress.available():
@@ -44,7 +44,7 @@ def reflex_rows(settings: Settings) -> Iterator[Row]:
         executor.stop()  # its component has the same priority
         with stress.stressed():
             rounds = native.both(
-                "bench_reflex",
+                "bench_rules",
                 settings.rounds,
                 count=settings.reactions,
                 priority=settings.priority,

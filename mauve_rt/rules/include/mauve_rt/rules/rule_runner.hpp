@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Reflex: rules at work beside the components of one host.
+// RuleRunner: rules at work beside the components of one host.
 #pragma once
 
 #include <array>
@@ -50,30 +50,30 @@ struct RuleFacts {
 ///
 /// In virtual time there are no threads: whoever simulates calls advance().
 ///
-/// "stepper", "tender": the two threads.
+/// "decision thread", "preparation thread": the two threads.
 ///
 /// | member            | written by | read by        | order                                                            |
 /// | ----------------- | ---------- | -------------- | ---------------------------------------------------------------- |
-/// | engine_           | stepper    | the same       | its decisions: its own                                           |
-/// | feeds_            | tender     | the same       | -                                                                |
+/// | engine_           | decision thread    | the same       | its decisions: its own                                           |
+/// | feeds_            | preparation thread     | the same       | -                                                                |
 /// | Rule::acts        | both       | both           | their own: action.hpp                                            |
-/// | Rule::found       | tender     | stepper        | release/acquire: what was found lies in it                       |
-/// | Rule::in_effect   | stepper    | tender         | relaxed: work_ is bumped after it                                |
-/// | Rule::status      | stepper    | facts()        | status_mutex_, which the stepper only tries                      |
-/// | ends_             | stepper    | tender         | release/acquire: what was done before lies in the architecture   |
-/// | work_ (futex)     | anyone     | tender         | release/acquire: who sees the bump sees the work                 |
+/// | Rule::found       | preparation thread     | decision thread| release/acquire: what was found lies in it                       |
+/// | Rule::in_effect   | decision thread    | preparation thread         | relaxed: work_ is bumped after it                                |
+/// | Rule::status      | decision thread    | facts()        | status_mutex_, which the decision thread only tries                      |
+/// | ends_             | decision thread    | preparation thread         | release/acquire: what was done before lies in the architecture   |
+/// | work_ (futex)     | anyone     | preparation thread         | release/acquire: who sees the bump sees the work                 |
 /// | ending_ (futex)   | stop()     | both           | release/acquire                                                  |
-/// | told_ ... woken_  | tender, wake() | anyone  | told_mutex_                                                      |
-class Reflex {
+/// | told_ ... woken_  | preparation thread, wake() | anyone  | told_mutex_                                                      |
+class RuleRunner {
  public:
   /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
   /// Throws Error as Feeds::open(); invalid_argument: a kind of step that there is not.
-  Reflex(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
-         std::map<std::string, std::string> topics = {});
+  RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
+             std::map<std::string, std::string> topics = {});
   /// As stop().
-  ~Reflex();
-  Reflex(const Reflex&) = delete;
-  Reflex& operator=(const Reflex&) = delete;
+  ~RuleRunner();
+  RuleRunner(const RuleRunner&) = delete;
+  RuleRunner& operator=(const RuleRunner&) = delete;
 
   /// Begins to watch; the host is deployed. A rule is armed once its components run. [non-rt] Throws Error (internal).
   void start();
@@ -106,12 +106,12 @@ class Reflex {
     std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
     std::atomic<bool> in_effect{false};
     RuleStatus status{};
-    std::uint64_t applied{0};  // of found, by the stepper
-    bool was_present{false};   // once, so far as the stepper knows
+    std::uint64_t applied{0};  // of found, by the decision thread
+    bool was_present{false};   // once, so far as the decision thread knows
   };
 
-  void run_steps() noexcept;
-  void run_tending() noexcept;
+  void run_decisions() noexcept;
+  void run_preparation() noexcept;
   time_ns_t step() MAUVE_RT;
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
@@ -119,7 +119,7 @@ class Reflex {
   bool tend();
   bool look_around(std::uint64_t ends);
   bool make_ready(Rule& rule, std::uint64_t revision);
-  void keep(std::size_t index, const Rule& rule, const std::string& deaf);
+  void keep(std::size_t index, const Rule& rule, const std::string& unobservable);
   void tell();
   std::string follow();
   void end() noexcept;
@@ -128,12 +128,12 @@ class Reflex {
   std::unique_ptr<Engine> engine_;
   std::vector<std::unique_ptr<Rule>> rules_;
   Feeds feeds_;
-  Action* under_way_{nullptr};  // of the stepper
+  Action* under_way_{nullptr};  // of the decision thread
   std::atomic<std::uint64_t> ends_{0};
   ChangeSignal work_;
   std::atomic<std::uint32_t> ending_{0};
-  Thread stepper_;
-  Thread tender_;
+  Thread decision_thread_;
+  Thread preparation_thread_;
   bool runs_{false};
   mutable PiMutex status_mutex_;
   mutable std::mutex told_mutex_;

@@ -2,7 +2,7 @@
 // A rule that replaces the core of a running 1 kHz component once an input has been silent for so long, and puts the
 // usual one back when it is written again. Beside it: a bare thread that watches the same deadline, and a bare 1 kHz
 // loop that looks at each release whether that has passed.
-//   bench_reflex [--who component|bare] [--count 1000] [--priority 80] [--cpu 0] [--cpus 2] [--silence-ms 10]
+//   bench_rules [--who component|bare] [--count 1000] [--priority 80] [--cpu 0] [--cpus 2] [--silence-ms 10]
 //                [--work-us 100] [--seed 1]
 // The input is written every 1 to 3 ms, at any phase of the component's, until it falls silent.
 // Prints {"reaction_ns": from the deadline of silence to the first release that follows it with the other core, one a
@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "mauve_rt/base/futex.hpp"
-#include "mauve_rt/rules/reflex.hpp"
+#include "mauve_rt/rules/rule_runner.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"
@@ -143,26 +143,26 @@ mauve::rules::ActionSteps core(const char* implementation) {
 class Rule {
  public:
   Rule(mauve::Host& host, time_ns_t silence_ns)
-      : reflex_(host, std::make_unique<mauve::rules::Engine>(rules(silence_ns)),
+      : runner_(host, std::make_unique<mauve::rules::Engine>(rules(silence_ns)),
                 {{.do_steps = core(kSafe), .undo_steps = core(kUsual)}}) {
-    reflex_.start();
+    runner_.start();
   }
 
   /// Until it is armed and what it does is prepared.
   void await_ready() {
     const time_ns_t until = mauve::monotonic_now_ns() + kGiveUp;
     for (;;) {
-      const mauve::rules::RuleFacts facts = reflex_.facts().front();
+      const mauve::rules::RuleFacts facts = runner_.facts().front();
       if (facts.status.armed && !facts.status.in_effect && facts.ready) return;
       if (!facts.problem.empty()) throw std::runtime_error("the rule cannot act: " + facts.problem);
       if (mauve::monotonic_now_ns() > until) throw std::runtime_error("the rule does not become ready");
-      reflex_.wait_told(mauve::ms_to_ns(1));
+      runner_.wait_told(mauve::ms_to_ns(1));
     }
   }
   /// The release that follows what it does or undoes, decided at that instant or later.
   time_ns_t await_release(mauve::rules::Act act, time_ns_t since_ns) {
     for (const time_ns_t until = mauve::monotonic_now_ns() + kGiveUp; mauve::monotonic_now_ns() < until;) {
-      for (const mauve::rules::Told& told : reflex_.wait_told(mauve::ms_to_ns(100))) {
+      for (const mauve::rules::Told& told : runner_.wait_told(mauve::ms_to_ns(100))) {
         const bool is_it = told.decision.decided == mauve::rules::Decided::done && told.decision.act == act;
         if (!is_it || told.decision.stamp_ns < since_ns) continue;
         const mauve::time_ns_t released_ns = told.action.report.value().steps.front().released_ns;
@@ -185,7 +185,7 @@ class Rule {
     return {rule};
   }
 
-  mauve::rules::Reflex reflex_;
+  mauve::rules::RuleRunner runner_;
 };
 
 void measure_component(const Settings& settings) {
