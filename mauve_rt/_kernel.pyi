@@ -833,6 +833,7 @@ class RuleSpec:
         cooldown_ns: int = 0,
         priority: int = 0,
         about: Sequence[str] = [],
+        otherwise_after_ns: int | None = None,
     ) -> None: ...
 
 @final
@@ -849,7 +850,7 @@ class SignalSpec:
 
 @final
 class PendingAction:
-    """What an engine wants done now. act: 'do' or 'undo'; cause_ns: since when the condition is as it is."""
+    """What an engine wants done now. act: do, undo or otherwise; cause_ns: since when the condition is as it is."""
 
     @property
     def rule(self) -> int: ...
@@ -936,8 +937,10 @@ class RuleEngine:
     def pending(self) -> PendingAction | None: ...
     def begun(self, now_ns: int) -> None:
         """The pending action is being carried out."""
-    def ended(self, how: str, now_ns: int) -> None:
-        """How: done, refused, stale, withdrawn or timed_out."""
+    def ended(self, rule: int, act: str, how: str, now_ns: int) -> None:
+        """An action that was begun has ended. How: done, refused, stale, withdrawn or timed_out."""
+    def gives_way(self, rule: int) -> str | None:
+        """The action of the rule that is to be called off, for that of a rule of higher rank."""
     def take(self) -> RuleDecision | None:
         """The next decision that was not taken yet."""
     def lost(self) -> int:
@@ -960,13 +963,14 @@ class ActionStep:
 
 @final
 class RuleActions:
-    """What a rule does and undoes; no `undo`: nothing."""
+    """What a rule does and undoes; no `undo`: nothing. reserve: stop or safe_outputs."""
 
     def __init__(
         self,
         do: Sequence[ActionStep],
         *,
         undo: Sequence[ActionStep] = [],
+        reserve: str = "stop",
     ) -> None: ...
 
 @final

@@ -48,8 +48,14 @@ class PyRuleRunner {
   std::unique_ptr<rules::RuleRunner> runner_;
 };
 
-rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo) {
+rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo,
+                                const std::string& reserve) {
+  if (reserve != "stop" && reserve != "safe_outputs") {
+    throw Error(ErrorCode::invalid_argument, "there is no such reserve action",
+                {.expected = "stop or safe_outputs", .found = reserve});
+  }
   rules::RuleActions actions;
+  actions.reserve = reserve == "stop" ? rules::ReserveKind::stop : rules::ReserveKind::safe_outputs;
   actions.do_steps = std::move(steps);
   actions.undo_steps = std::move(undo);
   return actions;
@@ -63,7 +69,8 @@ void bind_actions(py::module_& module) {
            }),
            py::arg("kind"), py::arg("target") = "", py::arg("name") = "", py::arg("value") = std::nullopt);
   py::class_<rules::RuleActions>(module, "RuleActions")
-      .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("undo") = rules::ActionSteps{});
+      .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("undo") = rules::ActionSteps{},
+           py::arg("reserve") = "stop");
 }
 
 void bind_told(py::module_& module) {

@@ -16,15 +16,18 @@ constexpr auto kSignalNames =
 constexpr auto kEndings =
     std::to_array<std::string_view>({"done", "refused", "stale", "withdrawn", "timed_out"});
 
-std::string_view name_of_act(rules::Act act) { return act == rules::Act::do_ ? "do" : "undo"; }
+constexpr auto kActNames = std::to_array<std::string_view>({"do", "undo", "otherwise"});
+
+std::string_view name_of_act(rules::Act act) { return kActNames[rules::index_of(act)]; }
 
 [[noreturn]] void refuse_name(const char* what, const std::string& expected, const std::string& found) {
   throw Error(ErrorCode::invalid_argument, what, {.expected = expected, .found = found});
 }
 
 rules::Act act_of(const std::string& name) {
-  if (name != "do" && name != "undo") refuse_name("there is no such act", "do or undo", name);
-  return name == "do" ? rules::Act::do_ : rules::Act::undo;
+  const auto* const found = std::find(kActNames.begin(), kActNames.end(), name);
+  if (found == kActNames.end()) refuse_name("there is no such act", "do, undo or otherwise", name);
+  return static_cast<rules::Act>(found - kActNames.begin());
 }
 
 rules::Ended ended_of(const std::string& name) {
@@ -82,13 +85,14 @@ void bind_rules_of_an_engine(py::module_& module) {
   py::class_<rules::Rule>(module, "RuleSpec")
       .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes,
                        time_ns_t undo_for_ns, time_ns_t cooldown_ns, std::int64_t priority,
-                       std::vector<std::string> about) {
-             return rules::Rule{std::move(name), std::move(when), for_ns,   undoes,
-                                undo_for_ns,     cooldown_ns,     priority, std::move(about)};
+                       std::vector<std::string> about, std::optional<time_ns_t> otherwise_after_ns) {
+             return rules::Rule{std::move(name), std::move(when),  for_ns,
+                                undoes,          undo_for_ns,      cooldown_ns,
+                                priority,        std::move(about), otherwise_after_ns};
            }),
            py::arg("name"), py::arg("when"), py::kw_only(), py::arg("for_ns") = 0, py::arg("undoes") = false,
            py::arg("undo_for_ns") = 0, py::arg("cooldown_ns") = 0, py::arg("priority") = 0,
-           py::arg("about") = std::vector<std::string>{});
+           py::arg("about") = std::vector<std::string>{}, py::arg("otherwise_after_ns") = std::nullopt);
   py::class_<rules::SignalSpec>(module, "SignalSpec")
       .def_property_readonly(
           "kind",
@@ -192,10 +196,16 @@ void bind_engine(py::module_& module) {
           "begun", [](PyRuleEngine& self, time_ns_t now_ns) { self.engine.begun(now_ns); }, py::arg("now_ns"))
       .def(
           "ended",
-          [](PyRuleEngine& self, const std::string& how, time_ns_t now_ns) {
-            self.engine.ended(ended_of(how), now_ns);
+          [](PyRuleEngine& self, std::size_t rule, const std::string& act, const std::string& how,
+             time_ns_t now_ns) { self.engine.ended(self.rule(rule), act_of(act), ended_of(how), now_ns); },
+          py::arg("rule"), py::arg("act"), py::arg("how"), py::arg("now_ns"))
+      .def(
+          "gives_way",
+          [](const PyRuleEngine& self, std::size_t rule) {
+            const auto act = self.engine.gives_way(self.rule(rule));
+            return act ? std::optional(name_of_act(*act)) : std::nullopt;
           },
-          py::arg("how"), py::arg("now_ns"))
+          py::arg("rule"))
       .def("take", [](PyRuleEngine& self) { return self.engine.take(); })
       .def("lost", [](const PyRuleEngine& self) { return self.engine.lost(); })
       .def(

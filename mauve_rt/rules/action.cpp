@@ -72,7 +72,7 @@ bool Action::is_wanting(std::uint64_t revision) const {
   return (stage == Stage::idle || stage == Stage::ready) && tried_at_ != revision;
 }
 
-bool Action::tend(Host& host, std::uint64_t revision) {
+bool Action::prepare(Host& host, std::uint64_t revision) {
   if (!is_wanting(revision)) return false;
   const bool was_ready = put_away();
   if (stage_.load(std::memory_order_acquire) != Stage::idle) return false;  // it has just begun
@@ -115,8 +115,9 @@ bool Action::settle(Host& host) {
     carry_out(host);
     return true;
   }
-  if (stage == Stage::heard) complete();
-  return false;
+  if (stage != Stage::heard) return false;
+  complete();
+  return true;
 }
 
 void Action::complete() {
@@ -149,7 +150,6 @@ void Action::carry_out(Host& host) {
 }
 
 std::optional<ActionReport> Action::report() {
-  if (stage_.load(std::memory_order_acquire) == Stage::heard) complete();  // it ended since it was tended
   if (report_ && committed_ != nullptr) report_->report = committed_->report(options_.timeouts.phase_ns);
   committed_.reset();
   return std::exchange(report_, std::nullopt);
@@ -159,11 +159,11 @@ std::optional<ActionReport> Action::report() {
 
 bool Action::begin() noexcept {
   Stage ready = Stage::ready;
-  if (!stage_.compare_exchange_strong(ready, Stage::begun, std::memory_order_acq_rel)) return false;
-  if (!is_preparable_) return true;
-  how_ = how_ended(prepared_->commit(options_.timeouts.commit_ns));
-  stage_.store(Stage::over, std::memory_order_release);
-  return true;
+  return stage_.compare_exchange_strong(ready, Stage::begun, std::memory_order_acq_rel);
+}
+
+void Action::call_off() noexcept {
+  if (is_preparable_ && stage_.load(std::memory_order_acquire) == Stage::begun) prepared_->call_off();
 }
 
 std::optional<Ended> Action::ended() noexcept {
@@ -171,6 +171,15 @@ std::optional<Ended> Action::ended() noexcept {
   const Ended how = how_;
   stage_.store(Stage::heard, std::memory_order_release);
   return how;
+}
+
+// ---- the commit thread
+
+bool Action::commit() noexcept {
+  if (!is_preparable_ || stage_.load(std::memory_order_acquire) != Stage::begun) return false;
+  how_ = how_ended(prepared_->commit(options_.timeouts.commit_ns));
+  stage_.store(Stage::over, std::memory_order_release);
+  return true;
 }
 
 }  // namespace mauve::rules

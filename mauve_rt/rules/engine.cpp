@@ -40,6 +40,7 @@ constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : 
 /// One rule at work.
 struct Engine::Life {
   std::size_t index{0};
+  std::size_t rank{0};  // 0: the highest
   Rule rule;
   std::unique_ptr<Condition> condition;
   std::vector<bool> contends;  // with the rule of that number: both are about one component
@@ -47,8 +48,12 @@ struct Engine::Life {
   bool armed{false};
   bool in_effect{false};
   bool changed_by_another{false};
-  std::array<std::optional<bool>, 2> in_place{};  // by Act; empty: nobody knows
-  std::array<bool, 2> ready{true, true};
+  std::optional<Act> under_way{};                     // do or undo
+  bool gives_way{false};                              // that is to be called off
+  bool otherwise_begun{false};                        // since the condition has held
+  std::optional<time_ns_t> waits_since_ns{};          // since when `do` may be done and is not in effect
+  std::array<std::optional<bool>, kActs> in_place{};  // by Act; empty: nobody knows
+  std::array<bool, kActs> ready{true, true, true};
   time_ns_t not_before_ns{INT64_MIN};
   int failures{0};
   std::optional<std::pair<Act, Why>> excused{};  // the last reason given, so that it is given once
@@ -90,8 +95,10 @@ Engine::Engine(std::vector<Rule> rules) {
                                                             }));
     }
   }
-  std::stable_sort(by_rank_.begin(), by_rank_.end(),
-                   [](const Life* a, const Life* b) { return a->rule.priority > b->rule.priority; });
+  std::sort(by_rank_.begin(), by_rank_.end(), [](const Life* a, const Life* b) {
+    return std::pair(b->rule.priority, a->index) < std::pair(a->rule.priority, b->index);
+  });
+  for (std::size_t rank = 0; rank < by_rank_.size(); ++rank) by_rank_[rank]->rank = rank;
 }
 
 Engine::~Engine() = default;
@@ -109,6 +116,8 @@ void Engine::set_present(std::size_t rule, bool present, time_ns_t now_ns) noexc
   life.armed = present;
   life.last = {.since_ns = now_ns};
   life.excused.reset();
+  life.waits_since_ns.reset();
+  life.otherwise_begun = false;
   if (present) {
     life.condition->arm(now_ns);
     if (life.in_effect) life.condition->assume();
@@ -123,7 +132,7 @@ void Engine::arm(time_ns_t now_ns) noexcept {
 void Engine::set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) noexcept {
   Life& life = *lives_[rule];
   life.in_place[index_of(act)] = in_place;
-  const bool is_undone = act == Act::do_ && !in_place && life.in_effect && !under_way_;
+  const bool is_undone = act == Act::do_ && !in_place && life.in_effect && !life.under_way;
   if (!is_undone) return;
   life.in_effect = false;
   life.changed_by_another = true;
@@ -149,15 +158,16 @@ void Engine::forget() noexcept {
 
 void Engine::forget(std::size_t rule) noexcept {
   if (pending_ && pending_->rule == rule) pending_.reset();
-  if (under_way_ && under_way_->rule == rule) under_way_.reset();
   Life& life = *lives_[rule];
-  life.armed = life.in_effect = life.changed_by_another = false;
+  life.armed = life.in_effect = life.changed_by_another = life.gives_way = life.otherwise_begun = false;
+  life.under_way.reset();
   life.in_place = {};
-  life.ready = {true, true};
+  life.ready = {true, true, true};
   life.not_before_ns = INT64_MIN;
   life.failures = 0;
   life.excused.reset();
   life.unready_since_ns.reset();
+  life.waits_since_ns.reset();
 }
 
 // ---- deciding
@@ -169,7 +179,9 @@ time_ns_t Engine::step(time_ns_t now_ns) noexcept {
   }
   for (Life* life : by_rank_) {
     if (!life->armed) continue;
-    if (const auto act = wanted(*life, now_ns)) consider(*life, *act, now_ns);
+    const auto act = wanted(*life, now_ns);
+    if (act != Act::do_) life->waits_since_ns.reset();
+    if (act) consider(*life, *act, now_ns);
   }
   time_ns_t next_ns = kForever;
   for (const auto& life : lives_) {
@@ -185,6 +197,7 @@ void Engine::look(Life& life, time_ns_t now_ns) noexcept {
   life.failures = 0;
   life.excused.reset();
   life.unready_since_ns.reset();
+  life.otherwise_begun = false;
   tell(life,
        {.stamp_ns = now_ns, .decided = life.last.holds ? Decided::condition_true : Decided::condition_false});
 }
@@ -193,7 +206,7 @@ void Engine::look(Life& life, time_ns_t now_ns) noexcept {
 std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
   const bool is_due = now_ns >= life.due_ns();
   if (life.last.holds) {
-    if (is_due && !life.in_effect && !life.changed_by_another) return Act::do_;
+    if (is_due && !life.in_effect && !life.changed_by_another && !life.otherwise_begun) return Act::do_;
     return std::nullopt;
   }
   if (!is_due) return std::nullopt;
@@ -204,42 +217,83 @@ std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
 }
 
 time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
+  time_ns_t next_ns = life.last.next_ns;
+  const auto look_at = [&](time_ns_t instant_ns) {
+    if (instant_ns > now_ns) next_ns = std::min(next_ns, instant_ns);
+  };
   const bool may_want = life.last.holds ? !life.in_effect && !life.changed_by_another
                                         : life.in_effect || life.changed_by_another;
-  if (!may_want) return life.last.next_ns;
-  if (life.due_ns() > now_ns) return std::min(life.last.next_ns, life.due_ns());
-  if (life.unready_since_ns && !life.excused)
-    return std::min(life.last.next_ns, later_by(*life.unready_since_ns, kMakingReady));
-  return life.not_before_ns > now_ns ? std::min(life.last.next_ns, life.not_before_ns) : life.last.next_ns;
+  if (!may_want) return next_ns;
+  if (life.waits_since_ns) look_at(later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns));
+  if (life.due_ns() > now_ns) {
+    look_at(life.due_ns());
+  } else if (life.unready_since_ns && !life.excused) {
+    look_at(later_by(*life.unready_since_ns, kMakingReady));
+  } else {
+    look_at(life.not_before_ns);
+  }
+  return next_ns;
 }
 
-bool Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
+void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   if (life.ready[index_of(act)]) life.unready_since_ns.reset();
-  if (under_way_ && under_way_->rule == life.index) return false;
+  if (life.under_way) {
+    if (act == Act::do_) want_otherwise(life, now_ns);
+    return;
+  }
+  if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
+    life.waits_since_ns.reset();
+    suppress(life, act, Why::outranked, now_ns, other);
+    return;
+  }
   if (life.in_place[index_of(act)].value_or(false)) {
     suppress(life, act, Why::already, now_ns);
     settle(life, act, now_ns);
-    return false;
+    return;
   }
-  if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
-    suppress(life, act, Why::outranked, now_ns, other);
-    return false;
+  const bool is_late_enough = now_ns >= life.not_before_ns;
+  if (!is_late_enough && life.failures == 0) {
+    suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
+    return;
   }
-  if (now_ns < life.not_before_ns) {
-    if (life.failures == 0) suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
-    return false;
-  }
-  if (under_way_ || pending_) {
-    suppress(life, act, Why::in_flight, now_ns, lives_[under_way_ ? under_way_->rule : pending_->rule].get());
-    return false;
+  if (act == Act::do_ && want_otherwise(life, now_ns)) return;
+  if (!is_late_enough || pending_) return;  // in the next step, after what is pending
+  if (const Life* other = in_the_way(life)) {
+    suppress(life, act, Why::in_flight, now_ns, other);
+    return;
   }
   if (!life.ready[index_of(act)]) {
     if (!life.unready_since_ns) life.unready_since_ns = now_ns;
     if (now_ns >= later_by(*life.unready_since_ns, kMakingReady)) suppress(life, act, Why::not_ready, now_ns);
-    return false;
+    return;
   }
   pending_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
+}
+
+/// Whether it is time for the reserve action, which waits for nothing.
+bool Engine::want_otherwise(Life& life, time_ns_t now_ns) noexcept {
+  if (!life.rule.otherwise_after_ns) return false;
+  if (!life.waits_since_ns) life.waits_since_ns = now_ns;
+  if (now_ns < later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns)) return false;
+  if (!pending_) {
+    pending_ = {.rule = life.index,
+                .act = Act::otherwise,
+                .cause_ns = life.last.since_ns,
+                .measured = life.last.measured};
+  }
   return true;
+}
+
+/// Another rule whose action is under way and is about one of the same components; nullptr: none. Those of lower rank are to
+/// give way.
+const Engine::Life* Engine::in_the_way(const Life& life) noexcept {
+  const Life* found = nullptr;
+  for (const auto& other : lives_) {
+    if (!other->under_way || !life.contends[other->index]) continue;
+    found = other.get();
+    if (other->rank > life.rank) other->gives_way = true;
+  }
+  return found;
 }
 
 /// A rule of higher rank that is about one of the same components, and has done or is about to do what it does. One that
@@ -248,27 +302,37 @@ const Engine::Life* Engine::outranking(const Life& life) const noexcept {
   for (const Life* other : by_rank_) {
     if (other == &life) return nullptr;
     if (!other->armed || !life.contends[other->index]) continue;
-    const bool begins = under_way_ && under_way_->rule == other->index && under_way_->act == Act::do_;
-    const bool wants = pending_ && pending_->rule == other->index && pending_->act == Act::do_;
-    if (other->in_effect || begins || wants) return other;
+    const bool begins = other->under_way == Act::do_;
+    const bool is_next = pending_ && pending_->rule == other->index && pending_->act == Act::do_;
+    if (other->in_effect || begins || is_next) return other;
   }
   return nullptr;
 }
 
 void Engine::begun(time_ns_t now_ns) noexcept {
-  under_way_ = pending_;
+  if (!pending_) return;
+  const PendingAction action = *pending_;
   pending_.reset();
-  if (!under_way_) return;
-  const Act act = under_way_->act;
-  tell(*lives_[under_way_->rule],
-       {.stamp_ns = now_ns, .decided = act == Act::do_ ? Decided::do_ : Decided::undo, .act = act});
+  Life& life = *lives_[action.rule];
+  Decided decided = Decided::otherwise;
+  if (action.act == Act::otherwise) {
+    life.otherwise_begun = true;
+    life.waits_since_ns.reset();
+    life.gives_way = life.under_way.has_value();
+    in_the_way(life);
+  } else {
+    life.under_way = action.act;
+    decided = action.act == Act::do_ ? Decided::do_ : Decided::undo;
+  }
+  tell(life, {.stamp_ns = now_ns, .decided = decided, .act = action.act});
 }
 
-void Engine::ended(Ended how, time_ns_t now_ns) noexcept {
-  if (!under_way_) return;
-  Life& life = *lives_[under_way_->rule];
-  const Act act = under_way_->act;
-  under_way_.reset();
+void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexcept {
+  Life& life = *lives_[rule];
+  if (act == Act::otherwise) return otherwise_ended(life, how, now_ns);
+  if (life.under_way != act) return;  // forgotten meanwhile
+  life.under_way.reset();
+  life.gives_way = false;
   if (how == Ended::done) {
     tell(life, {.stamp_ns = now_ns, .decided = Decided::done, .act = act});
     settle(life, act, now_ns);
@@ -287,9 +351,31 @@ void Engine::ended(Ended how, time_ns_t now_ns) noexcept {
        {.stamp_ns = now_ns, .decided = Decided::failed, .act = act, .why = why_of(how), .wait_ns = wait_ns});
 }
 
+/// Its components do not run any more, so that it will be disarmed.
+void Engine::otherwise_ended(Life& life, Ended how, time_ns_t now_ns) noexcept {
+  if (how == Ended::done)
+    return tell(life, {.stamp_ns = now_ns, .decided = Decided::done, .act = Act::otherwise});
+  life.otherwise_begun = false;
+  tell(life, {.stamp_ns = now_ns,
+              .decided = Decided::failed,
+              .act = Act::otherwise,
+              .why = why_of(how),
+              .wait_ns = *life.rule.otherwise_after_ns});
+}
+
+std::optional<Act> Engine::gives_way(std::size_t rule) const noexcept {
+  const Life& life = *lives_[rule];
+  return life.gives_way ? life.under_way : std::nullopt;
+}
+
+bool Engine::contend(std::size_t one, std::size_t other) const noexcept {
+  return lives_[one]->contends[other];
+}
+
 /// An action is in effect, whoever did it.
 void Engine::settle(Life& life, Act act, time_ns_t now_ns) noexcept {
   life.in_effect = act == Act::do_;
+  life.waits_since_ns.reset();
   life.failures = 0;
   life.excused.reset();
   life.not_before_ns = later_by(now_ns, life.rule.cooldown_ns);
@@ -359,6 +445,6 @@ RuleStatus Engine::status(std::size_t rule) const noexcept {
   return status;
 }
 
-const Rule& Engine::rule(std::size_t rule) const { return lives_.at(rule)->rule; }
+const Rule& Engine::rule(std::size_t rule) const noexcept { return lives_[rule]->rule; }
 
 }  // namespace mauve::rules

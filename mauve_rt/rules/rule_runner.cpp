@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/rules/rule_runner.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <mutex>
 #include <utility>
@@ -19,13 +20,13 @@ constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 constexpr time_ns_t kStoodStill = ms_to_ns(50);
 constexpr time_ns_t kCatchUp = ms_to_ns(20);
 
-// What the preparation thread found of a rule.
+// What the follower found of a rule.
 constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
 constexpr std::uint64_t kKnown = 2;    // from here on one for each act: whether it is known ...
 constexpr std::uint64_t kInPlace = 8;  // ... that what it asks for is so
 constexpr unsigned kEndsAt = 5;
 
-constexpr std::array kActs{Act::do_, Act::undo};
+constexpr std::array kPrepared{Act::do_, Act::undo};
 
 /// So many decisions may wait for who reports them. Outcomes of actions come on top: each is reported.
 constexpr std::size_t kMostTold = 1000;
@@ -41,16 +42,17 @@ RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::ve
     : host_(host),
       engine_(std::move(engine)),
       feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
-      kept_(actions.size()),
       trace_number_(host.architecture().trace_number("(rules)")) {
   if (actions.size() != engine_->size())
     throw Error(ErrorCode::invalid_argument, "every rule of the engine has its actions, and only these");
   for (const RuleActions& each : actions) {
     make_transaction(each.do_steps);  // its kinds are checked here
     make_transaction(each.undo_steps);
-    rules_.push_back(std::make_unique<Rule>(each));
+    const mauve::rules::Rule& rule = engine_->rule(rules_.size());
+    rules_.push_back(
+        std::make_unique<Rule>(each, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()));
     rules_.back()->applied = UINT64_MAX;
-    rules_.back()->name = TraceNames::intern(engine_->rule(rules_.size() - 1).name);
+    rules_.back()->name = TraceNames::intern(rule.name);
   }
   for (const auto& heard : engine_->signals()) feeds_.open(heard.spec, *heard.signal);
 }
@@ -61,27 +63,51 @@ void RuleRunner::start() {
   if (runs_ || host_.is_simulated()) return;
   ending_.store(0, std::memory_order_relaxed);  // the threads' creation publishes it
   host_.architecture().changes().set_listener(&work_);
-  tend();
-  const auto tending = [](void* self) -> void* {
-    static_cast<RuleRunner*>(self)->run_preparation();
-    return nullptr;
-  };
-  const auto stepping = [](void* self) -> void* {
+  look_around();
+  for (std::size_t i = 0; i < rules_.size(); ++i) prepare(i);
+  const auto deciding = [](void* self) -> void* {
     static_cast<RuleRunner*>(self)->run_decisions();
     return nullptr;
   };
-  if (preparation_thread_.start({.name = "rules prepare"}, tending, this) != 0) {
+  const auto following = [](void* self) -> void* {
+    static_cast<RuleRunner*>(self)->run_follower();
+    return nullptr;
+  };
+  const auto refused = [this](const char* what) {
     end();
-    throw Error(ErrorCode::internal, "the system refuses the thread that prepares what rules do");
+    join_workers();
+    throw Error(ErrorCode::internal, std::string("the system refuses the thread that ") + what);
+  };
+  try {
+    start_workers();
+  } catch (...) {
+    end();
+    join_workers();
+    throw;
   }
-  if (decision_thread_.start({.name = "runner", .priority = kPriority, .stack_bytes = kStackBytes}, stepping,
+  if (follower_.start({.name = "rules follower"}, following, this) != 0)
+    refused("follows the architecture for the rules");
+  if (decision_thread_.start({.name = "rules", .priority = kPriority, .stack_bytes = kStackBytes}, deciding,
                              this) != 0) {
     end();
-    preparation_thread_.join();
-    throw Error(ErrorCode::internal, "the system refuses the thread that rules act on");
+    follower_.join();
+    refused("rules decide on");
   }
   decision_thread_.prefault_stack();
   runs_ = true;
+}
+
+void RuleRunner::start_workers() {
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
+    const std::string& name = engine_->rule(i).name;
+    rule.prepares.start({.name = "prepare " + name}, [this, i] { prepare(i); });
+    rule.commits.start({.name = "commit " + name, .priority = kPriority, .stack_bytes = kStackBytes},
+                       [this, i] { commit(i); });
+    if (!rule.reserve.exists()) continue;
+    rule.reserves.start({.name = "reserve " + name, .priority = kPriority, .stack_bytes = kStackBytes},
+                        [this, i] { reserve(i); });
+  }
 }
 
 void RuleRunner::end() noexcept {
@@ -92,20 +118,44 @@ void RuleRunner::end() noexcept {
   work_.bump();
 }
 
+void RuleRunner::join_workers() noexcept {
+  for (const auto& rule : rules_) {
+    for (Worker* each : {&rule->commits, &rule->reserves, &rule->prepares}) each->end();
+  }
+  for (const auto& rule : rules_) {
+    for (Worker* each : {&rule->commits, &rule->reserves, &rule->prepares}) each->join();
+  }
+}
+
 void RuleRunner::stop() noexcept {
   if (!std::exchange(runs_, false)) return;
   end();
   decision_thread_.join();
-  preparation_thread_.join();
+  for (const auto& rule : rules_) {
+    for (Action& action : rule->acts) {
+      if (action.is_unsettled()) action.call_off();
+    }
+  }
+  join_workers();
+  follower_.join();
+  // What the threads have left, on this one.
+  hear_ends(host_.clock().now_ns());
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    for (Action& action : rules_[i]->acts) action.settle(host_);
+    report(i);
+  }
   tell();
 }
 
 time_ns_t RuleRunner::advance() {
   beat();
   for (;;) {
-    tend();
+    look_around();
+    for (std::size_t i = 0; i < rules_.size(); ++i) prepare(i);
     const time_ns_t next_ns = step();
-    if (!tend()) {
+    bool changed = false;
+    for (std::size_t i = 0; i < rules_.size(); ++i) changed = prepare(i) || changed;
+    if (!look_around() && !changed) {
       tell();
       return next_ns;
     }
@@ -130,40 +180,63 @@ time_ns_t RuleRunner::step() noexcept {
   if (!host_.is_deployed()) return kForever;  // its components stop: what is heard of that is no cause to act
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     apply_found(i, now_ns);
-    for (const Act act : kActs) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());
+    for (const Act act : kPrepared) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());
   }
-  const time_ns_t next_ns = engine_->step(now_ns);
-  if (const std::optional<PendingAction> pending = engine_->pending()) {
-    Action& action = rules_[pending->rule]->action(pending->act);
-    engine_->begun(now_ns);
-    if (MAUVE_RT_TRUSTED(action.begin())) {  // as far as the components' own adopt and take are
-      under_way_ = &action;
-      hear_ends(host_.clock().now_ns());
-    } else {
-      engine_->ended(Ended::stale, now_ns);  // it was ready a moment ago
-    }
-    if (under_way_ == nullptr) engine_->wake();  // what to do next is looked at anew
+  time_ns_t next_ns = engine_->step(now_ns);
+  while (const std::optional<PendingAction> pending = engine_->pending()) {
+    begin(*pending, now_ns);
+    next_ns = engine_->step(now_ns);
+  }
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    if (const std::optional<Act> act = engine_->gives_way(i)) rules_[i]->action(*act).call_off();
   }
   show_status();
   work_.bump();
   return next_ns;
 }
 
-void RuleRunner::hear_ends(time_ns_t now_ns) noexcept {
-  if (under_way_ == nullptr) return;
-  const std::optional<Ended> how = under_way_->ended();
-  if (!how) return;
-  under_way_ = nullptr;
-  engine_->ended(*how, now_ns);
-  ends_.fetch_add(1, std::memory_order_release);
+/// Posts it; its end wakes the engine.
+void RuleRunner::begin(const PendingAction& pending, time_ns_t now_ns) noexcept {
+  Rule& rule = *rules_[pending.rule];
+  if (pending.act == Act::otherwise) {
+    engine_->begun(now_ns);
+    rule.reserve.begin();
+    rule.reserves.ask();
+  } else if (Action& action = rule.action(pending.act); action.begin()) {
+    engine_->begun(now_ns);
+    (action.is_preparable() ? rule.commits : rule.prepares).ask();
+  } else {
+    engine_->set_ready(pending.rule, pending.act, false);  // it was a moment ago
+  }
+  if (!host_.is_simulated()) return;
+  reserve(pending.rule);
+  commit(pending.rule);
+  hear_ends(now_ns);
 }
 
-/// What was found before the last action ended, or while one is under way, is of yesterday.
+void RuleRunner::hear_ends(time_ns_t now_ns) noexcept {
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    for (const Act act : kPrepared) {
+      if (const std::optional<Ended> how = rules_[i]->action(act).ended()) ended(i, act, *how, now_ns);
+    }
+    if (const std::optional<Ended> how = rules_[i]->reserve.ended()) ended(i, Act::otherwise, *how, now_ns);
+  }
+}
+
+void RuleRunner::ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) noexcept {
+  engine_->ended(index, act, how, now_ns);
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    if (i == index || engine_->contend(i, index)) rules_[i]->ends.fetch_add(1, std::memory_order_release);
+  }
+  rules_[index]->prepares.ask();
+}
+
+/// What was found while an action about the same is under way, or before it ended, is of yesterday.
 void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
   Rule& rule = *rules_[index];
   const std::uint64_t found = rule.found.load(std::memory_order_acquire);
-  const bool is_current = found >> kEndsAt == ends_.load(std::memory_order_relaxed) + 1;  // its own
-  if (under_way_ != nullptr || !is_current || found == rule.applied) return;
+  const bool is_current = found >> kEndsAt == rule.ends.load(std::memory_order_relaxed) + 1;  // its own
+  if (!is_current || found == rule.applied || is_unsettled(index)) return;
   rule.applied = found;
   const bool is_present = (found & kPresent) != 0;
   engine_->set_present(index, is_present, now_ns);
@@ -176,84 +249,156 @@ void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
   const bool is_first = !std::exchange(rule.was_present, true);
   if (is_first && engine_->rule(index).undoes && in_place(Act::do_) == true && in_place(Act::undo) == false)
     engine_->adopt(index, now_ns);
-  for (const Act act : kActs) {
+  for (const Act act : kPrepared) {
     if (const std::optional<bool> is_so = in_place(act)) engine_->set_in_place(index, act, *is_so, now_ns);
   }
 }
 
-void RuleRunner::show_status() noexcept {
-  const std::unique_lock lock(status_mutex_, std::try_to_lock);
+/// Whether the architecture is about to change, or its description to follow, by an action of this rule or of one that
+/// contends with it.
+bool RuleRunner::is_unsettled(std::size_t index) const noexcept {
   for (std::size_t i = 0; i < rules_.size(); ++i) {
+    if (i != index && !engine_->contend(i, index)) continue;
+    for (const Action& action : rules_[i]->acts) {
+      if (action.is_unsettled()) return true;
+    }
+  }
+  return false;
+}
+
+void RuleRunner::show_status() noexcept {
+  const bool is_locked = status_mutex_.try_lock();
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
     const RuleStatus status = engine_->status(i);
-    rules_[i]->in_effect.store(status.in_effect, std::memory_order_relaxed);
-    if (lock) rules_[i]->status = status;
+    if (is_locked) rule.status = status;
+    // relaxed: the thread that reads it is asked after it
+    if (rule.in_effect.exchange(status.in_effect, std::memory_order_relaxed) != status.in_effect)
+      rule.prepares.ask();
+  }
+  if (is_locked) status_mutex_.unlock();
+}
+
+// ---- the commit thread and the reserve thread of a rule
+
+void RuleRunner::commit(std::size_t index) noexcept {
+  bool was_begun = false;
+  for (Action& action : rules_[index]->acts) was_begun = action.commit() || was_begun;
+  if (was_begun) engine_->wake();
+}
+
+void RuleRunner::reserve(std::size_t index) noexcept {
+  Rule& rule = *rules_[index];
+  if (!rule.reserve.is_begun()) return;
+  deliver(rule, Act::otherwise, {.failure = rule.reserve.carry_out(host_)});
+  rule.reserve.end();
+  engine_->wake();
+}
+
+// ---- the preparation thread of a rule
+
+/// Whether the decision thread or the follower has something to look at.
+bool RuleRunner::prepare(std::size_t index) {
+  Rule& rule = *rules_[index];
+  bool changed = false;
+  for (Action& action : rule.acts) changed = action.settle(host_) || changed;
+  report(index);
+  if (changed) {
+    work_.bump();
+    engine_->wake();
+  }
+  const bool is_other = make_ready(rule);
+  keep(rule);
+  if (is_other) engine_->wake();
+  return changed || is_other;
+}
+
+/// What is in effect can be undone, what is not can be done; would it be possible to undo that?
+bool RuleRunner::make_ready(Rule& rule) {
+  const std::uint64_t revision = host_.architecture().revision();
+  const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
+  Action& next = rule.action(in_effect ? Act::undo : Act::do_);
+  Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
+  bool changed = other.put_away();
+  if (next.exists()) changed = next.prepare(host_, revision) || changed;
+  if (other.exists()) other.try_after(next.steps(), host_, revision);
+  return changed;
+}
+
+/// For facts().
+void RuleRunner::keep(Rule& rule) {
+  Kept kept;
+  for (const Action& action : rule.acts) {
+    if (kept.problem.empty()) kept.problem = action.problem();
+    kept.memory_bytes += action.memory_bytes();
+  }
+  const std::lock_guard lock(told_mutex_);
+  if (rule.kept == kept) return;
+  rule.kept = std::move(kept);
+  told_changed_.notify_all();
+}
+
+/// Waits for the releases that follow an action.
+void RuleRunner::report(std::size_t index) {
+  Rule& rule = *rules_[index];
+  for (const Act act : kPrepared) {
+    if (auto report = rule.action(act).report()) deliver(rule, act, std::move(*report));
   }
 }
 
-// ---- the preparation thread
+void RuleRunner::deliver(Rule& rule, Act act, ActionReport report) {
+  {
+    const std::lock_guard lock(told_mutex_);
+    rule.reports[index_of(act)].push_back(std::move(report));
+  }
+  work_.bump();
+}
 
-void RuleRunner::run_preparation() noexcept {
+// ---- the follower
+
+void RuleRunner::run_follower() noexcept {
   while (ending_.load(std::memory_order_acquire) == 0) {
     const std::uint32_t seen = work_.word.load(std::memory_order_acquire);
-    if (tend()) engine_->wake();
+    if (look_around()) engine_->wake();
     tell();
     futex_wait_until(work_.word, seen, kForever);
   }
 }
 
 /// Whether the decision thread has something to look at.
-bool RuleRunner::tend() {
-  // Before all: what has ended by now is completed below, and then found in force.
-  const std::uint64_t ends = ends_.load(std::memory_order_acquire);
-  bool changed = false;
-  for (const auto& rule : rules_) {
-    for (Action& action : rule->acts) changed = action.settle(host_) || changed;
-  }
-  return changed || look_around(ends);  // what was carried out the decision thread has to know first
-}
-
-bool RuleRunner::look_around(std::uint64_t ends) {
-  const std::uint64_t revision = host_.architecture().revision();
+bool RuleRunner::look_around() {
   const std::string unobservable = follow();
+  {
+    const std::lock_guard lock(told_mutex_);
+    if (unobservable_ != unobservable) {
+      unobservable_ = unobservable;
+      told_changed_.notify_all();
+    }
+  }
+  // Before the description: what ends later, or has ended and is not completed, is not in it.
+  std::vector<std::optional<std::uint64_t>> ends(rules_.size());
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    const std::uint64_t found_after = rules_[i]->ends.load(std::memory_order_acquire);
+    if (!is_unsettled(i)) ends[i] = found_after;
+  }
+  const std::uint64_t revision = host_.architecture().revision();
   const ArchitectureDescription description = host_.describe();
   bool changed = false;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
+    if (!ends[i]) continue;
     Rule& rule = *rules_[i];
-    std::uint64_t found = (ends + 1) << kEndsAt;  // 0: never looked
+    std::uint64_t found = (*ends[i] + 1) << kEndsAt;  // 0: never looked
     if (can_begin(rule.action(Act::do_).steps(), description)) found |= kPresent;
-    for (const Act act : kActs) {
+    for (const Act act : kPrepared) {
       const std::optional<bool> is_so = is_in_place(rule.action(act).steps(), description);
       if (is_so) found |= kKnown << index_of(act);
       if (is_so == true) found |= kInPlace << index_of(act);
     }
-    changed = make_ready(rule, revision) || changed;
     changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
-    keep(i, rule, unobservable);
   }
-  return changed;
-}
-
-/// For facts().
-void RuleRunner::keep(std::size_t index, const Rule& rule, const std::string& unobservable) {
-  Kept kept{.problem = unobservable};
-  for (const Action& action : rule.acts) {
-    if (kept.problem.empty()) kept.problem = action.problem();
-    kept.memory_bytes += action.memory_bytes();
+  if (std::exchange(followed_, revision) != revision) {
+    for (const auto& rule : rules_) rule->prepares.ask();
   }
-  const std::lock_guard lock(told_mutex_);
-  if (kept_[index] == kept) return;
-  kept_[index] = std::move(kept);
-  told_changed_.notify_all();
-}
-
-/// What is in effect can be undone, what is not can be done; would it be possible to undo that?
-bool RuleRunner::make_ready(Rule& rule, std::uint64_t revision) {
-  const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
-  Action& next = rule.action(in_effect ? Act::undo : Act::do_);
-  Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
-  bool changed = other.put_away();
-  if (next.exists()) changed = next.tend(host_, revision) || changed;
-  if (other.exists()) other.try_after(next.steps(), host_, revision);
   return changed;
 }
 
@@ -268,10 +413,9 @@ std::string RuleRunner::follow() {
 }
 
 void RuleRunner::tell() {
-  std::vector<Told> all;
   while (const std::optional<Decision> decision = engine_->take()) {
-    all.push_back({.decision = *decision});
     Rule& rule = *rules_[static_cast<std::size_t>(decision->rule)];
+    rule.held.push_back({.decision = *decision, .action = {}, .number = made_++});
     host_.architecture().record({.sequence = 0,
                                  .time_ns = decision->stamp_ns,
                                  .a = trace_code(*decision),
@@ -280,11 +424,25 @@ void RuleRunner::tell() {
                                  .name = rule.name,
                                  .kind = static_cast<std::uint16_t>(TraceKind::decision),
                                  .component = trace_number_});
-    if (!is_outcome(*decision)) continue;
-    if (auto report = rule.action(decision->act).report()) all.back().action = std::move(*report);
+  }
+  const std::lock_guard lock(told_mutex_);
+  std::vector<Told> all;
+  for (const auto& rule : rules_) {
+    while (!rule->held.empty()) {
+      Told& told = rule->held.front();
+      if (is_outcome(told.decision)) {
+        auto& reports = rule->reports[index_of(told.decision.act)];
+        if (reports.empty()) break;
+        told.action = std::move(reports.front());
+        reports.pop_front();
+      }
+      all.push_back(std::move(told));
+      rule->held.pop_front();
+    }
   }
   if (all.empty()) return;
-  const std::lock_guard lock(told_mutex_);
+  std::sort(all.begin(), all.end(),
+            [](const Told& one, const Told& other) { return one.number < other.number; });
   for (Told& each : all) {
     if (told_.size() >= kMostTold && !is_outcome(each.decision)) {
       ++left_out_;
@@ -325,8 +483,8 @@ std::vector<RuleFacts> RuleRunner::facts() const {
     all.push_back({.name = engine_->rule(i).name,
                    .status = rule.status,
                    .ready = rule.action(rule.status.in_effect ? Act::undo : Act::do_).is_ready(),
-                   .problem = kept_[i].problem,
-                   .memory_bytes = kept_[i].memory_bytes});
+                   .problem = unobservable_.empty() ? rule.kept.problem : unobservable_,
+                   .memory_bytes = rule.kept.memory_bytes});
   }
   return all;
 }

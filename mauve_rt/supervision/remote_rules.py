@@ -3,7 +3,8 @@
 Without ROS and with injected time, ns of any steady clock. Whoever hosts them calls `tick` at the instant
 that the last one returned and whenever something of interest was heard, `on_state` with every ~/state,
 `on_outcome` with the reply to a request and `on_inventory` with that of ~/list_components, all from one
-thread. What the rules want goes to three callables. One action at a time is in flight.
+thread. What the rules want goes to three callables. One action at a time is in flight: the executor
+carries out requests one after the other.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -96,7 +97,7 @@ class RemoteRules:
             return self._due_ns
         self._check_flight(now_ns)
         next_ns = self._engine.step(now_ns)
-        while (pending := self._engine.pending) is not None:
+        while self._flight is None and (pending := self._engine.pending) is not None:
             self._send(pending, now_ns)
             next_ns = self._engine.step(now_ns)
         self._tell()
@@ -244,9 +245,11 @@ class RemoteRules:
         self._end(now_ns, how, failure=reason, message=message)
 
     def _end(self, now_ns: int, how: str, *, failure: str = "", message: str = "") -> None:
-        self._flight = None
+        flight, self._flight = self._flight, None
+        if flight is None:
+            return
         self._failure, self._message = failure, message
-        self._engine.ended(how, now_ns)
+        self._engine.ended(flight.each.number, flight.act, how, now_ns)
         self._tell()
         self._failure = self._message = ""
         self._follow(now_ns)

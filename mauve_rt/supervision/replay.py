@@ -151,7 +151,7 @@ def _stepped(engine: RuleEngine, rules: list[Rule], now_ns: int, found: list[Act
         if pending is not None:
             found.append(Acted(now_ns, rules[pending.rule].name, pending.act))
             engine.begun(now_ns)
-            engine.ended("done", now_ns)
+            engine.ended(pending.rule, pending.act, "done", now_ns)
         while engine.take() is not None:
             pass  # what it tells of them is of no interest
         if pending is None:

@@ -41,8 +41,9 @@ struct Tried {
     for (;;) {
       due_ns = engine.step(now_ns);
       while (engine.pending() && acts) {
+        const PendingAction action = *engine.pending();
         engine.begun(now_ns);
-        engine.ended(ending, now_ns);
+        engine.ended(action.rule, action.act, ending, now_ns);
         due_ns = engine.step(now_ns);
       }
       take();
@@ -337,20 +338,142 @@ TEST(Rules, TheHighestDecidesAndWhoLostSaysSo) {
   EXPECT_TRUE(tried.engine.status(0).in_effect);
 }
 
-TEST(Rules, OneActionAtATimeAndTheNextOneComesAfterIt) {
-  Tried tried({rule("a", silence(1.0)), rule("b", silence(1.0))});
-  tried.acts = false;
-  tried.run_to(ms(1001));
-  ASSERT_TRUE(tried.engine.pending());
-  EXPECT_EQ(0U, tried.engine.pending()->rule);
-  tried.engine.begun(tried.now_ns);
-  tried.run_to(ms(1100));
+/// Two rules that are due at once; the actions stay under way.
+struct TwoDue : Tried {
+  explicit TwoDue(std::vector<std::string> other_about, std::int64_t priority = 0)
+      : Tried({ranked("a", priority, {"c"}), ranked("b", 0, std::move(other_about))}) {
+    acts = false;
+    run_to(ms(1001));
+  }
+  static Rule ranked(const std::string& name, std::int64_t priority, std::vector<std::string> about) {
+    Rule made = rule(name, silence(1.0));
+    made.priority = priority;
+    made.about = std::move(about);
+    return made;
+  }
+  std::size_t begin() {
+    const std::size_t begun = engine.pending() ? engine.pending()->rule : SIZE_MAX;
+    engine.begun(now_ns);
+    run_to(now_ns + ms(1));
+    return begun;
+  }
+};
+
+TEST(Rules, ActionsAboutDifferentComponentsAreUnderWaySideBySide) {
+  TwoDue tried({"d"});
+  EXPECT_EQ(0U, tried.begin());
+  EXPECT_EQ(1U, tried.begin()) << "it does not wait for the first";
+  EXPECT_FALSE(tried.engine.gives_way(0));
+  EXPECT_FALSE(tried.engine.gives_way(1));
+  tried.engine.ended(1, Act::do_, Ended::done, tried.now_ns);
+  tried.engine.ended(0, Act::do_, Ended::timed_out, tried.now_ns);
+  EXPECT_TRUE(tried.engine.status(1).in_effect);
+  EXPECT_FALSE(tried.engine.status(0).in_effect);
+}
+
+TEST(Rules, OfTheSameComponentTheLowerOneWaits) {
+  TwoDue tried({"c"});
+  EXPECT_EQ(0U, tried.begin());
   EXPECT_FALSE(tried.engine.pending());
-  EXPECT_THAT(tried.words, ::testing::Contains("1000 b suppressed the action of another rule is under way"));
-  tried.engine.ended(Ended::done, tried.now_ns);
-  tried.run_to(ms(1101));
+  EXPECT_FALSE(tried.engine.gives_way(0)) << "the other does not come before it";
+  tried.engine.ended(0, Act::do_, Ended::refused, tried.now_ns);
+  tried.run_to(tried.now_ns + ms(1));
+  EXPECT_EQ(1U, tried.begin());
+}
+
+TEST(Rules, ARuleOfHigherRankHasTheLowerOnesActionCalledOff) {
+  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1000, {"c", "d"})});
+  tried.acts = false;
+  tried.tell(1);
+  tried.now_ns = ms(500);
+  tried.tell(1);
+  tried.run_to(ms(1001));
+  ASSERT_EQ(0U, tried.engine.pending()->rule);
+  tried.engine.begun(tried.now_ns);
+  tried.run_to(ms(1400));
+  EXPECT_FALSE(tried.engine.gives_way(0));
+  tried.run_to(ms(1501));
+  EXPECT_EQ(Act::do_, tried.engine.gives_way(0));
+  EXPECT_FALSE(tried.engine.pending()) << "once the lower one has let go";
+  tried.engine.ended(0, Act::do_, Ended::withdrawn, tried.now_ns);
+  tried.run_to(ms(1502));
   ASSERT_TRUE(tried.engine.pending());
   EXPECT_EQ(1U, tried.engine.pending()->rule);
+  EXPECT_FALSE(tried.engine.gives_way(0));
+}
+
+TEST(Rules, OfTwoThatDoTheSameTheHigherOneHasDoneIt) {
+  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1, {"c"})});
+  tried.acts = false;
+  tried.run_to(ms(500));
+  tried.tell(1);
+  tried.acts = true;
+  tried.run_to(ms(1100));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  tried.engine.set_in_place(1, Act::do_, true, tried.now_ns);
+  tried.run_to(ms(1600));
+  EXPECT_TRUE(tried.engine.status(1).in_effect);
+  for (int i = 0; i < 3; ++i) {
+    tried.engine.set_in_place(0, Act::do_, true, tried.now_ns);
+    tried.engine.set_in_place(1, Act::do_, true, tried.now_ns);
+    tried.run_to(tried.now_ns + ms(1));
+    EXPECT_TRUE(tried.engine.status(1).in_effect) << "the lower one does not take it over";
+    EXPECT_FALSE(tried.engine.status(0).in_effect);
+  }
+}
+
+/// A rule with a reserve action 200 ms after `do` is due.
+Rule reserved() {
+  Rule made = rule("r", silence(1.0));
+  made.otherwise_after_ns = ms(200);
+  return made;
+}
+
+TEST(Rules, TheReserveActionComesWhereWhatItDoesIsNotReady) {
+  Tried tried({reserved()});
+  tried.engine.set_ready(0, Act::do_, false);
+  tried.run_to(ms(1500));
+  EXPECT_THAT(tried.words, ElementsAre("1000 r condition_true", "1100 r suppressed it is not prepared",
+                                       "1200 r otherwise", "1200 r done"));
+  EXPECT_FALSE(tried.engine.status(0).in_effect);
+}
+
+TEST(Rules, TheReserveActionComesWhereWhatItDoesHangs) {
+  Tried tried({reserved()});
+  tried.acts = false;
+  tried.run_to(ms(1001));
+  tried.engine.begun(tried.now_ns);
+  tried.run_to(ms(1199));
+  EXPECT_FALSE(tried.engine.pending());
+  tried.run_to(ms(1201));
+  ASSERT_TRUE(tried.engine.pending());
+  EXPECT_EQ(Act::otherwise, tried.engine.pending()->act);
+  EXPECT_FALSE(tried.engine.gives_way(0));
+  tried.engine.begun(tried.now_ns);
+  EXPECT_EQ(Act::do_, tried.engine.gives_way(0)) << "its own action is called off";
+}
+
+TEST(Rules, TheReserveActionIsTriedAgainWhereItFailed) {
+  Tried tried({reserved()});
+  tried.engine.set_ready(0, Act::do_, false);
+  tried.ending = Ended::timed_out;
+  tried.run_to(ms(1650));
+  EXPECT_EQ(3, std::count(tried.words.begin(), tried.words.end(), "1200 r otherwise") +
+                   std::count(tried.words.begin(), tried.words.end(), "1400 r otherwise") +
+                   std::count(tried.words.begin(), tried.words.end(), "1600 r otherwise"));
+}
+
+TEST(Rules, ThereIsNoReserveActionForWhatIsDoneOrOutranked) {
+  Rule low = reserved();
+  low.about = {"c"};
+  Tried tried({low, TwoDue::ranked("high", 1, {"c"})});
+  tried.run_to(ms(3000));
+  EXPECT_TRUE(tried.engine.status(1).in_effect);
+  for (const std::string& word : tried.words) EXPECT_THAT(word, ::testing::Not(HasSubstr("otherwise")));
+  Tried done({reserved()});
+  done.run_to(ms(3000));
+  EXPECT_TRUE(done.engine.status(0).in_effect);
+  for (const std::string& word : done.words) EXPECT_THAT(word, ::testing::Not(HasSubstr("otherwise")));
 }
 
 TEST(Rules, WhatFailedIsTriedAgainLaterEachTime) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Rules at work beside components, on threads and in virtual time.
+#include <random>
+
 #include "mauve_rt/rules/rule_runner.hpp"
 
 #include "hosts.hpp"
@@ -150,7 +152,9 @@ TYPED_TEST(RuleRunnerTest, DoesAndUndoes) {
               ElementsAre("armed", "condition_true", "do", "done", "condition_false", "undo", "done"));
 }
 
-When too_high() { return leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", 3.0}}); }
+When too_high(double above = 3.0) {
+  return leaf("value", {{"resource", "beat"}, {"field", "value"}, {"above", above}});
+}
 
 TYPED_TEST(RuleRunnerTest, PreparesNothingWhenItIsTime) {
   this->add_rule(too_high(), core("t/Core"), core("t/Counted"));
@@ -184,6 +188,225 @@ TYPED_TEST(RuleRunnerTest, ActsWhileNothingCanBePrepared) {
   CountedCore::closed.store(false);
   this->see("done");
   EXPECT_EQ("t/Counted", this->present());
+}
+
+// ---- no rule waits for another
+
+/// A state that does not end while the gate is closed.
+class Gate {
+ public:
+  ~Gate() { open(); }
+  /// Before the component starts.
+  void guard(TestCore& core) {
+    core.work = [this] {
+      while (is_closed_.load()) {
+        is_held_.store(true);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    };
+  }
+  template <typename Way>
+  void close(Way& way) {
+    is_closed_.store(true);
+    way.until([this] { return is_held_.load(); }, "the state");
+  }
+  void open() { is_closed_.store(false); }
+
+ private:
+  std::atomic<bool> is_closed_{false};
+  std::atomic<bool> is_held_{false};
+};
+
+TYPED_TEST(RuleRunnerTest, ActsWhileAnothersComponentDoesNotComeToAWait) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(too_high(3.0), {}, core("t/Counting", "w"));
+  this->rules.back().about = {"w"};
+  this->add_rule(too_high(10.0), {});
+  Gate gate;
+  gate.guard(this->core(*this->watched));
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  this->await_ready(1);
+  gate.close(this->way);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("do");
+  this->beat.write.write({.value = 20.0}, 2);
+  this->see("done");
+  EXPECT_EQ(1, this->last(Decided::done).decision.rule);
+  EXPECT_EQ("t/Counting", this->present());
+  this->see("failed");
+  EXPECT_EQ(Why::timed_out, this->last(Decided::failed).decision.why);
+  EXPECT_EQ(0, this->last(Decided::failed).decision.rule);
+  gate.open();
+  this->see("done");
+}
+
+TYPED_TEST(RuleRunnerTest, CallsOffTheActionOfALowerRule) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(too_high(3.0), {}, core("t/Counting", "w"));
+  this->add_rule(too_high(10.0), {}, core("t/Counted", "w"));
+  for (auto& rule : this->rules) rule.about = {"w"};
+  this->rules.back().priority = 1000;
+  Gate gate;
+  gate.guard(this->core(*this->watched));
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  this->await_ready(1);
+  gate.close(this->way);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("do");
+  this->beat.write.write({.value = 20.0}, 2);
+  this->see("failed");
+  EXPECT_EQ(0, this->last(Decided::failed).decision.rule);
+  EXPECT_EQ(Why::withdrawn, this->last(Decided::failed).decision.why);
+  const auto has_begun = [this] {
+    this->take();
+    return this->last(Decided::do_).decision.rule == 1;
+  };
+  this->way.until(has_begun, "the higher rule to act");
+  gate.open();
+  this->see("done");
+  EXPECT_EQ(1, this->last(Decided::done).decision.rule);
+  EXPECT_EQ("t/Counted", this->watched->shown().core);
+}
+
+TYPED_TEST(RuleRunnerTest, PreparesWhileAnothersPartIsSlow) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(too_high(), core("t/Core", "w"), core("t/Counted", "w"));
+  this->rules.back().about = {"w"};
+  this->add_rule(too_high(), core("t/Core"));
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  CountedCore::closed.store(true);
+  const int configuring = CountedCore::configuring.load();
+  this->host().set_property("w", "gain", 2.0);  // what is prepared of it is stale
+  this->way.until([&] { return CountedCore::configuring.load() > configuring; }, "the slow preparation");
+  this->host().set_property("c", "gain", 2.0);
+  this->await_ready(1);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  this->beat.write.write({.value = 1.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present()) << "the undo was prepared, too";
+  CountedCore::closed.store(false);
+}
+
+/// Each action that was begun has one outcome, and of rules about one component only one is under way at a time.
+TYPED_TEST(RuleRunnerTest, KeepsActionsApartInAStorm) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 6; ++i) {
+    const std::string target = i % 2 == 0 ? "c" : "w";
+    this->add_rule(too_high(1.0 + i), core("t/Core", target),
+                   core(i < 3 ? "t/Counting" : "t/Counted", target));
+    this->rules.back().about = {target};
+    this->rules.back().priority = static_cast<std::int64_t>(random() % 3);
+  }
+  this->deploy();
+  this->begin();
+  const time_ns_t until = this->host().now_ns() + ms_to_ns(500);
+  while (this->host().now_ns() < until) {
+    this->beat.write.write({.value = static_cast<double>(random() % 9)}, 1);
+    try {
+      if (random() % 20 == 0) this->host().set_property("w", "gain", 2.0);
+    } catch (const Error& failure) {  // an action of a rule came before it
+      EXPECT_EQ(ErrorCode::wrong_revision, failure.code());
+    }
+    this->way.run_for(us_to_ns(static_cast<std::int64_t>(random() % 3000)));
+    if (random() % 2 == 0) this->take();
+  }
+  this->beat.write.write({.value = 0.0}, 2);
+  const auto is_calm = [this] {
+    this->take();
+    const std::vector<RuleFacts> facts = this->runner->facts();
+    return this->present() == "t/Core" && this->watched->shown().core == "t/Core" &&
+           std::none_of(facts.begin(), facts.end(),
+                        [](const RuleFacts& each) { return each.status.holds || each.status.in_effect; });
+  };
+  this->way.until(is_calm, "all to be undone");
+  this->runner->stop();
+  this->take();
+  std::map<std::string, std::int32_t> under_way;  // by component
+  int begun = 0;
+  std::sort(this->whole.begin(), this->whole.end(),
+            [](const Told& one, const Told& other) { return one.number < other.number; });
+  for (const Told& told : this->whole) {
+    const Decided decided = told.decision.decided;
+    const std::string& about = this->rules.at(static_cast<std::size_t>(told.decision.rule)).about.front();
+    if (decided == Decided::do_ || decided == Decided::undo) {
+      EXPECT_FALSE(under_way.contains(about)) << "two at a time";
+      under_way[about] = told.decision.rule;
+      ++begun;
+    } else if (decided == Decided::done || decided == Decided::failed) {
+      ASSERT_TRUE(under_way.contains(about));
+      EXPECT_EQ(told.decision.rule, under_way.at(about));
+      under_way.erase(about);
+    }
+  }
+  EXPECT_TRUE(under_way.empty()) << "an action without an outcome";
+  EXPECT_GT(begun, 10);
+}
+
+// ---- the reserve action
+
+TYPED_TEST(RuleRunnerTest, StopsWhereWhatItDoesCannotBeMadeReady) {
+  this->add_rule(silent(), {}, core("t/Unready"));
+  this->rules.back().otherwise_after_ns = ms_to_ns(10);
+  this->deploy();
+  this->begin();
+  this->see("done");
+  EXPECT_EQ(Act::otherwise, this->last(Decided::done).decision.act);
+  EXPECT_EQ(ComponentState::stopped, this->architecture.component("c").task().state());
+  EXPECT_EQ(ComponentState::running, this->watched->task().state());
+  const auto is_disarmed = [this] {
+    this->take();
+    return this->whole.back().decision.decided == Decided::disarmed;
+  };
+  this->way.until(is_disarmed, "the rule to watch no longer");
+}
+
+TYPED_TEST(RuleRunnerTest, MakesOutputsSafeWhereItsComponentHangs) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(silent(), {}, core("t/Counting", "w"));
+  this->rules.back().about = {"w"};
+  this->rules.back().otherwise_after_ns = ms_to_ns(10);
+  this->actions.back().reserve = ReserveKind::safe_outputs;
+  Gate gate;
+  gate.guard(this->core(*this->watched));
+  this->deploy();
+  this->begin();
+  gate.close(this->way);
+  this->see("done");
+  EXPECT_EQ(Act::otherwise, this->last(Decided::done).decision.act);
+  EXPECT_EQ(ComponentState::faulted, this->watched->task().state()) << "while its state lasts";
+  EXPECT_EQ(ComponentState::running, this->architecture.component("c").task().state());
+  const auto is_called_off = [this] {
+    this->take();
+    return std::find(this->words.begin(), this->words.end(), "failed") != this->words.end();
+  };
+  this->way.until(is_called_off, "the end of what it does");
+  EXPECT_EQ(Act::do_, this->last(Decided::failed).decision.act);
+}
+
+TYPED_TEST(RuleRunnerTest, LetsAStateEndBeforeItGivesItsComponentUp) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->add_rule(silent(), {}, core("t/Unready", "w"));
+  this->rules.back().about = {"w"};
+  this->rules.back().otherwise_after_ns = ms_to_ns(10);
+  Gate gate;
+  gate.guard(this->core(*this->watched));
+  this->deploy();
+  this->begin();
+  gate.close(this->way);
+  this->see("otherwise");
+  gate.open();
+  this->see("done");
+  const ComponentState state =
+      this->watched->task().state();  // a stall may have lasted longer than the patience
+  EXPECT_TRUE(state == ComponentState::stopped || state == ComponentState::faulted);
 }
 
 TYPED_TEST(RuleRunnerTest, WritesEveryDecisionIntoTheTrace) {

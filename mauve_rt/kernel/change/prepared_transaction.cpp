@@ -7,6 +7,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <optional>
 
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/error.hpp"
@@ -33,6 +34,8 @@ const char* to_string(PreparedOutcome outcome) noexcept {
 
 namespace {
 
+constexpr time_ns_t kLook = ms_to_ns(20);
+
 std::size_t allocated_bytes() noexcept {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -46,6 +49,7 @@ std::size_t allocated_bytes() noexcept {
 /// | used       | who commits first                       | anyone        | acq_rel: one commits                         |
 /// | phase      | who commits, first under the gate; then who holds the change lock | both | release/acquire: hands over the work |
 /// | outcome    | who commits                             | who completes | relaxed: phase, or its caller, hands it over |
+/// | is_called_off | who calls off, under the gate        | who commits   | relaxed: under the gate, or a hint           |
 /// | is_dropped | who holds the change lock, under the gate | anyone      | release/acquire                              |
 /// | work       | who commits; else who holds the change lock | the same  | phase: committing; is_dropped                |
 /// | failure    | who holds the change lock               | the same      | -                                            |
@@ -72,14 +76,28 @@ class PreparedTransaction::State {
                     !touched.component->change_mark().is_claimed();
            });
   }
-  /// Claims all; false when what it was prepared against has changed, or is being changed. CommitGate::structural held where it
-  /// is structural.
-  bool begin() noexcept {
+  /// Claims all; or why not. CommitGate::structural held where it is structural.
+  std::optional<PreparedOutcome> begin() noexcept {
     const std::lock_guard gate(architecture.commit_gate().mutex);
-    if (!is_current()) return false;
+    if (is_called_off.load(std::memory_order_relaxed) || !host.is_deployed())
+      return PreparedOutcome::withdrawn;
+    if (!is_current()) return PreparedOutcome::stale;
     for (const auto& touched : basis.touched) touched.component->change_mark().claim();
     phase.store(kCommitting, std::memory_order_release);
-    return true;
+    return std::nullopt;
+  }
+  /// Whoever calls the change off cannot wake who waits for a lock.
+  bool lock_structure(time_ns_t until_ns) noexcept {
+    for (;;) {
+      const time_ns_t now = monotonic_now_ns();
+      if (architecture.commit_gate().structural.try_lock_until(std::min(until_ns, now + kLook))) return true;
+      if (now >= until_ns || is_called_off.load(std::memory_order_relaxed)) return false;
+    }
+  }
+  void call_off() MAUVE_RT {
+    const std::lock_guard gate(architecture.commit_gate().mutex);
+    is_called_off.store(true, std::memory_order_relaxed);
+    if (phase.load(std::memory_order_relaxed) == kCommitting) work->call_off();  // relaxed: under the gate
   }
   void end(bool is_made) noexcept {
     const std::lock_guard gate(architecture.commit_gate().mutex);
@@ -126,6 +144,7 @@ class PreparedTransaction::State {
   std::atomic<Phase> phase{kReady};
   std::atomic<PreparedOutcome> outcome{PreparedOutcome::stale};
   std::atomic<bool> is_dropped{false};
+  std::atomic<bool> is_called_off{false};
   std::exception_ptr failure{};  // why it was not made; or what went wrong in the retirement of one that was
 };
 
@@ -168,21 +187,17 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
   const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
   CommitGate& gate = state.architecture.commit_gate();
   gate.press(state.urgent);
-  const bool has_gate = !state.basis.is_structural || gate.structural.try_lock_until(until_ns);
+  const bool has_gate = !state.basis.is_structural || state.lock_structure(until_ns);
   gate.relax(state.urgent);
-  PreparedOutcome outcome = PreparedOutcome::timed_out;
-  if (has_gate) {
-    outcome = state.host.is_deployed() ? PreparedOutcome::stale : PreparedOutcome::withdrawn;
-    const bool is_current = state.begin();
-    if (is_current) outcome = state.commit(until_ns);
-    state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: phase, or its caller, hands it on
-    if (is_current) state.end(outcome == PreparedOutcome::committed);
-    if (state.basis.is_structural) gate.structural.unlock();
-  } else {
-    state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: its caller hands it on
-  }
+  const std::optional<PreparedOutcome> why_not = has_gate ? state.begin() : PreparedOutcome::timed_out;
+  const PreparedOutcome outcome = why_not ? *why_not : state.commit(until_ns);
+  state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: phase, or its caller, hands it on
+  if (!why_not) state.end(outcome == PreparedOutcome::committed);
+  if (has_gate && state.basis.is_structural) gate.structural.unlock();
   return outcome;
 }
+
+void PreparedTransaction::call_off() noexcept { state_->call_off(); }
 
 /// The change lock held.
 bool PreparedTransaction::settle() noexcept {
@@ -261,6 +276,10 @@ TransactionReport PreparedTransaction::complete() {
   }
   if (state.failure) std::rethrow_exception(state.failure);
   if (outcome == PreparedOutcome::committed) return state.work->report(state.phase_ns);
+  if (outcome == PreparedOutcome::withdrawn && state.host.is_deployed()) {
+    throw Error(ErrorCode::wrong_revision, "the change was called off before it began; nothing was changed",
+                {.remedy = "prepare it anew"});
+  }
   if (outcome == PreparedOutcome::withdrawn) {
     throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
                 {.remedy = "deploy it, then prepare the change anew"});

@@ -39,6 +39,8 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   Basis prepare_for_later(Transaction transaction);
   /// All components of the basis claimed, the basis checked. [rt] as far as the actions are.
   Commit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
+  /// Calls off commit_prepared(), before or while it runs. [rt]
+  void call_off() MAUVE_RT { commit_->call_off(Commit::Off::preempted); }
   /// Sleeps until all components have taken the change that was committed, at most until the instant. [non-rt]
   bool wait_passed(time_ns_t until_ns) const noexcept;
   /// Has the architecture complete a prepared change that was committed. [non-rt], the change lock held.

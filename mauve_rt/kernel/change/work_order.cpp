@@ -2,6 +2,8 @@
 // A change among others: those that it waits for, those that it lets go on, and what is left of it while a component is late.
 #include <algorithm>
 
+#include "mauve_rt/architecture/runner.hpp"
+
 #include "change/work.hpp"
 
 namespace mauve {

@@ -155,7 +155,7 @@ Commit::Off Commit::off() const noexcept {
 Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexcept {
   timeout_ns_ = timeout_ns;
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
-  if (!lock(until)) return Outcome::timed_out;
+  if (!lock(until)) return cut_.look().is_off() ? Outcome::off : Outcome::timed_out;
   unfit_ = find_unfit();
   if (unfit_ != nullptr) {
     unlock();
@@ -183,12 +183,23 @@ Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexce
 
 bool Commit::lock(time_ns_t until_ns) noexcept {
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    if (order_[i]->task->command_mutex().try_lock_until(until_ns)) continue;
-    locked_out_ = order_[i]->task;
+    if (lock(*order_[i]->task, until_ns)) continue;
     while (i-- > 0) order_[i]->task->command_mutex().unlock();
     return false;
   }
   return true;
+}
+
+/// Whoever calls the change off cannot wake who waits for a lock.
+bool Commit::lock(Task& task, time_ns_t until_ns) noexcept {
+  for (;;) {
+    const time_ns_t now = monotonic_now_ns();
+    if (task.command_mutex().try_lock_until(std::min(until_ns, now + kLook))) return true;
+    if (!cut_.look().is_open()) return false;
+    if (now < until_ns) continue;
+    locked_out_ = &task;
+    return false;
+  }
 }
 
 void Commit::unlock() noexcept {
@@ -282,7 +293,8 @@ void Commit::call_off_if_one_left() noexcept {
 }
 
 void Commit::retract_all(time_ns_t until_ns) noexcept {
-  if (off() == Off::shut_down) until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
+  if (off() == Off::shut_down || off() == Off::preempted)
+    until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
   for (Participant* participant : order_) {
     if (participant->left_behind) participant->task->give_up_claim();
     if (!participant->is_own) continue;

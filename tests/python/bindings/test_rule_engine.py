@@ -40,7 +40,7 @@ def test_a_rule_does_and_undoes() -> None:
     assert engine.pending is not None
     assert (engine.pending.act, engine.pending.cause_ns) == ("do", 1000 * MS)
     engine.begun(due)
-    engine.ended("done", due)
+    engine.ended(0, "do", "done", due)
     engine.tell(0, 1500 * MS)
     assert engine.step(1500 * MS) == 1800 * MS
     status = engine.status(0)
@@ -66,7 +66,7 @@ def test_what_cannot_be_so_is_refused() -> None:
     with pytest.raises(MauveError, match="do or undo"):
         engine.set_ready(0, "redo", ready=True)
     with pytest.raises(MauveError, match="stale"):
-        engine.ended("well", 0)
+        engine.ended(0, "do", "well", 0)
     with pytest.raises(IndexError, match="1 rules"):
         engine.status(1)
     with pytest.raises(IndexError, match="1 signals"):

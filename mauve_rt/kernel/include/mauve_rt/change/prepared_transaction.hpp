@@ -57,6 +57,10 @@ class PreparedTransaction final : private OpenChange {
   bool is_current() const MAUVE_RT;
   /// Makes the change, once, whatever it answers; the second call answers stale. [rt] as far as adopt and take are.
   PreparedOutcome commit(time_ns_t timeout_ns) noexcept;
+  /// Lets commit() end without the change, now or once it begins, unless that is made already; it answers withdrawn. What it
+  /// waits for is left at once, a start() of a component within 20 ms, an adopt or take as after a time-out. Any thread, until
+  /// complete(). [rt]
+  void call_off() MAUVE_RT;
   /// Publishes and retires what was committed, unless the next change did; returns its report, or throws Error in words
   /// where commit() did not answer `committed`. Waits for a change under way. After commit(); may be called again. [non-rt]
   TransactionReport complete();

@@ -41,15 +41,15 @@ struct ActionReport {
 
 /// One transaction of a rule, prepared anew for each time that it is carried out.
 ///
-/// "preparation thread": the ordinary thread that prepares; "decision thread": the one that decides, and commits what is prepared. Steps that
-/// cannot be prepared (configure, resynchronise) are tried beforehand, and carried out by the preparation thread.
+/// "decision thread", "preparation thread", "commit thread": see RuleRunner. Steps that cannot be prepared (configure,
+/// resynchronise) are tried beforehand, and carried out by the preparation thread.
 ///
-/// | member    | written by                                                               | read by | order     |
-/// | --------- | ------------------------------------------------------------------------ | ------- | --------- |
-/// | stage_    | preparation thread: idle <-> ready, begun -> over, heard -> idle; decision thread: the others | both   | acq_rel: whose turn it is, and hands over prepared_ and how_ |
-/// | prepared_ | preparation thread; the decision thread commits it from ready on                             | both    | by stage_ |
-/// | how_      | who carries it out                                                       | decision thread | by stage_ |
-/// | the rest  | preparation thread                                                                   | preparation thread  | -         |
+/// | member    | written by                                                   | read by         | order     |
+/// | --------- | ------------------------------------------------------------ | --------------- | --------- |
+/// | stage_    | decision thread: ready -> begun, over -> heard; who carries it out: begun -> over; preparation thread: the others | all | acq_rel: whose turn it is, and hands over prepared_ and how_ |
+/// | prepared_ | preparation thread; commit thread while begun                | decision thread while begun | by stage_ |
+/// | how_      | who carries it out                                           | decision thread | by stage_ |
+/// | the rest  | preparation thread                                           | preparation thread | -      |
 class Action {
  public:
   /// No steps: the rule has no such action. [setup]
@@ -61,18 +61,22 @@ class Action {
   bool exists() const MAUVE_RT { return !steps_.empty(); }
   /// [non-rt]
   const ActionSteps& steps() const noexcept { return steps_; }
+  /// Whether a real-time thread commits it; else the preparation thread carries it out. [rt]
+  bool is_preparable() const MAUVE_RT { return is_preparable_; }
+  /// Whether it was begun, and what came of it is not in the architecture's description yet. [rt]
+  bool is_unsettled() const MAUVE_RT { return stage_.load(std::memory_order_acquire) > Stage::ready; }
 
   // ---- the preparation thread
 
   /// Prepares it, where it is not prepared, or was before something changed; whether that changed anything. [non-rt]
-  bool tend(Host& host, std::uint64_t revision);
+  bool prepare(Host& host, std::uint64_t revision);
   /// Finds out whether it could be prepared once `before` is done, where that was done at another revision. [non-rt]
   void try_after(const ActionSteps& before, Host& host, std::uint64_t revision);
   /// It is not to be wanted now; whether it was ready. [non-rt]
   bool put_away();
-  /// Completes what was committed; carries out what was begun and cannot be prepared: whether it did that. [non-rt]
+  /// Completes what was committed; carries out what was begun and cannot be prepared: whether there was such a thing. [non-rt]
   bool settle(Host& host);
-  /// What came of it, once; completes what was committed, and waits for the releases that follow. [non-rt]
+  /// What came of it, once, after settle(); waits for the releases that follow. [non-rt]
   std::optional<ActionReport> report();
   /// Why it could not be prepared; empty: it could be, or that was not tried. [non-rt]
   const std::string& problem() const noexcept { return problem_; }
@@ -83,10 +87,17 @@ class Action {
 
   /// Whether it could begin. [rt]
   bool is_ready() const MAUVE_RT { return stage_.load(std::memory_order_acquire) == Stage::ready; }
-  /// Commits it, or lets the preparation thread carry it out; false: it was not ready any more. [rt] as far as adopt and take are.
-  bool begin() noexcept;
+  /// Posts it to who carries it out; false: it was not ready any more. [rt]
+  bool begin() MAUVE_RT;
+  /// Lets a commit under way end soon, without the change where that is not made. [rt]
+  void call_off() MAUVE_RT;
   /// How it has ended, once. [rt]
   std::optional<Ended> ended() MAUVE_RT;
+
+  // ---- the commit thread
+
+  /// Commits it, where it was begun; whether it was. [rt] as far as adopt and take are.
+  bool commit() noexcept;
 
  private:
   enum class Stage : std::uint8_t { idle, ready, begun, over, heard };

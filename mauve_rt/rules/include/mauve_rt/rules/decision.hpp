@@ -11,8 +11,14 @@
 
 namespace mauve::rules {
 
-/// The two things that a rule can want.
-enum class Act : std::uint8_t { do_, undo };
+/// What a rule can want.
+enum class Act : std::uint8_t {
+  do_,
+  undo,
+  otherwise,  // its reserve action: what `do` is about stops, as `do` does not come about
+};
+/// How many there are.
+inline constexpr std::size_t kActs = 3;
 /// The place of an act in a table of one entry per act. [rt]
 constexpr std::size_t index_of(Act act) MAUVE_RT { return static_cast<std::size_t>(act); }
 
@@ -24,6 +30,7 @@ enum class Decided : std::uint8_t {
   condition_false,
   do_,         // it begins what it does
   undo,        // it begins to undo that
+  otherwise,   // it begins its reserve action
   done,        // what was begun is in effect
   failed,      // it is not; it is tried again after wait_ns
   suppressed,  // it wants something, and that is not begun: why, says Why

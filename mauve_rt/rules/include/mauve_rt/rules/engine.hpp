@@ -28,6 +28,8 @@ struct Rule {
   time_ns_t cooldown_ns{0};  // from the end of an action to the next one of the rule
   std::int64_t priority{0};  // of several that are about the same, the highest decides; then the first
   std::vector<std::string> about{};  // components that it changes
+  std::optional<time_ns_t>
+      otherwise_after_ns{};  // so long after `do` is due, and not in effect: its reserve action
 };
 
 /// What the engine wants done now.
@@ -57,10 +59,11 @@ struct RuleStatus {
 ///
 /// A rule does (`do`) once its condition has held for `for_ns`, and undoes (`undo`) once it has not held for `undo_for_ns`.
 /// It never fights a person: what it wants and finds already done is not done again, and what somebody changes while it is
-/// in effect stays as it is until the condition ends. One action at a time is under way.
+/// in effect stays as it is until the condition ends. Actions of rules about different components are under way side by
+/// side. Of rules about the same component one action at a time is: a rule of higher rank has that of a lower one called off.
 ///
 /// Whoever hosts it calls step() at the instant that the step before returned, and when word() has changed; carries out
-/// pending(), until there is none; and tells what it finds of the architecture. All of that on one thread, the "decision thread".
+/// pending(), then steps again, until nothing is pending; calls off what gives_way(); and tells what it finds of the architecture. All of that on one thread, the "decision thread".
 ///
 /// | member       | written by          | read by             | order                                                     |
 /// | ------------ | ------------------- | ------------------- | --------------------------------------------------------- |
@@ -114,10 +117,15 @@ class Engine {
   time_ns_t step(time_ns_t now_ns) MAUVE_RT;
   /// What to do now, found by the last step. [rt]
   const std::optional<PendingAction>& pending() const MAUVE_RT { return pending_; }
-  /// The pending is being carried out: there is no other until it has ended. [rt]
+  /// The pending action is being carried out. [rt]
   void begun(time_ns_t now_ns) MAUVE_RT;
-  /// [rt]
-  void ended(Ended how, time_ns_t now_ns) MAUVE_RT;
+  /// An action that was begun has ended. [rt]
+  void ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
+  /// The rule's `do` or `undo` that is under way, which is to be called off: a rule of higher rank, or its own reserve action,
+  /// comes before it. [rt]
+  std::optional<Act> gives_way(std::size_t rule) const MAUVE_RT;
+  /// Whether the two are about one component. [rt]
+  bool contend(std::size_t one, std::size_t other) const MAUVE_RT;
 
   // ---- telling
 
@@ -128,8 +136,8 @@ class Engine {
   /// The decision thread. [rt]
   RuleStatus status(std::size_t rule) const MAUVE_RT;
   std::size_t size() const MAUVE_RT { return lives_.size(); }
-  /// [non-rt]
-  const Rule& rule(std::size_t rule) const;
+  /// [rt]
+  const Rule& rule(std::size_t rule) const MAUVE_RT;
 
  private:
   struct Life;
@@ -139,7 +147,10 @@ class Engine {
   void look(Life& life, time_ns_t now_ns) noexcept;
   std::optional<Act> wanted(Life& life, time_ns_t now_ns) noexcept;
   time_ns_t next_look(const Life& life, time_ns_t now_ns) const noexcept;
-  bool consider(Life& life, Act act, time_ns_t now_ns) noexcept;
+  void consider(Life& life, Act act, time_ns_t now_ns) noexcept;
+  void otherwise_ended(Life& life, Ended how, time_ns_t now_ns) noexcept;
+  bool want_otherwise(Life& life, time_ns_t now_ns) noexcept;
+  const Life* in_the_way(const Life& life) noexcept;
   const Life* outranking(const Life& life) const noexcept;
   void settle(Life& life, Act act, time_ns_t now_ns) noexcept;
   void suppress(Life& life, Act act, Why why, time_ns_t now_ns, const Life* other = nullptr,
@@ -151,7 +162,6 @@ class Engine {
   std::vector<std::unique_ptr<Life>> lives_;
   std::vector<Life*> by_rank_;  // the highest first
   std::optional<PendingAction> pending_;
-  std::optional<PendingAction> under_way_;
   std::array<Decision, kRing> ring_{};
   alignas(64) std::atomic<std::uint32_t> word_{0};
   alignas(64) std::atomic<std::uint64_t> told_{0};

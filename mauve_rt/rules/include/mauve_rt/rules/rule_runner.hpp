@@ -18,6 +18,8 @@
 #include "mauve_rt/rules/action.hpp"
 #include "mauve_rt/rules/engine.hpp"
 #include "mauve_rt/rules/feeds.hpp"
+#include "mauve_rt/rules/reserve.hpp"
+#include "mauve_rt/rules/worker.hpp"
 
 namespace mauve::rules {
 
@@ -27,12 +29,15 @@ struct RuleActions {
   TransactionOptions do_options{};
   ActionSteps undo_steps{};  // none: it does not undo
   TransactionOptions undo_options{};
+  ReserveKind reserve{ReserveKind::stop};  // what its reserve action does, where the engine's rule has one
 };
 
 /// One decision, for who tells it.
 struct Told {
   Decision decision{};
   ActionReport action{};  // of `done` and `failed`: what came of it
+  std::uint64_t number{
+      0};  // of all decisions, as they were made: one that waits for its report is told after later ones
 };
 
 /// How one rule fares.
@@ -44,26 +49,31 @@ struct RuleFacts {
   std::size_t memory_bytes{0};  // of what is kept prepared
 };
 
-/// Runs an engine beside the components of a host: decides and commits on a real-time thread above the components and
-/// below who conducts their changes; prepares, completes and tells on an ordinary thread of its own. Neither needs
-/// Python, but for parts that are written in it, nor anything of another process.
+/// Runs an engine beside the components of a host. Neither Python is needed for that, but for parts that are written in it,
+/// nor anything of another process. No rule waits for another one, unless both are about the same component; two that add,
+/// remove or wire something share the architecture's structure, and their commits go one after the other.
 ///
 /// In virtual time there are no threads: whoever simulates calls advance().
 ///
-/// "decision thread", "preparation thread": the two threads.
+/// The decision thread steps the engine and begins actions; it is above the components, and carries nothing out. The follower,
+/// an ordinary thread, tells it what becomes of the architecture, and collects what it decided. Each rule has threads of its
+/// own: the commit thread commits what is prepared, as urgent as the decision thread; the preparation thread, an ordinary one,
+/// prepares, completes and reports; the reserve thread carries out the reserve action, where the rule has one.
 ///
-/// | member            | written by | read by        | order                                                            |
-/// | ----------------- | ---------- | -------------- | ---------------------------------------------------------------- |
-/// | engine_           | decision thread    | the same       | its decisions: its own                                           |
-/// | feeds_            | preparation thread     | the same       | -                                                                |
-/// | Rule::acts        | both       | both           | their own: action.hpp                                            |
-/// | Rule::found       | preparation thread     | decision thread| release/acquire: what was found lies in it                       |
-/// | Rule::in_effect   | decision thread    | preparation thread         | relaxed: work_ is bumped after it                                |
-/// | Rule::status      | decision thread    | facts()        | status_mutex_, which the decision thread only tries                      |
-/// | ends_             | decision thread    | preparation thread         | release/acquire: what was done before lies in the architecture   |
-/// | work_ (futex)     | anyone     | preparation thread         | release/acquire: who sees the bump sees the work                 |
-/// | ending_ (futex)   | stop()     | both           | release/acquire                                                  |
-/// | told_ ... woken_  | preparation thread, wake() | anyone  | told_mutex_                                                      |
+/// | member            | written by      | read by         | order                                                       |
+/// | ----------------- | --------------- | --------------- | ----------------------------------------------------------- |
+/// | engine_           | decision thread | the same        | its decisions: its own                                      |
+/// | feeds_            | follower        | the same        | -                                                           |
+/// | Rule::acts, reserve | several       | several         | their own: action.hpp, reserve.hpp                          |
+/// | Rule::found       | follower        | decision thread | release/acquire: what was found lies in it                  |
+/// | Rule::ends        | decision thread | follower        | release/acquire: what was done before lies in the architecture |
+/// | Rule::in_effect   | decision thread | preparation thread | relaxed: the thread is asked after it                    |
+/// | Rule::status      | decision thread | facts()         | status_mutex_, which the decision thread only tries         |
+/// | Rule::held        | follower        | the same        | -                                                           |
+/// | Rule::reports, kept | preparation thread, reserve thread | follower, facts() | told_mutex_                            |
+/// | work_ (futex)     | anyone          | follower        | release/acquire: who sees the bump sees the work            |
+/// | ending_ (futex)   | stop()          | decision thread, follower | release/acquire                                   |
+/// | told_ ... woken_, unobservable_ | follower, wake() | anyone | told_mutex_                                          |
 class RuleRunner {
  public:
   /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
@@ -95,57 +105,76 @@ class RuleRunner {
   time_ns_t advance();
 
  private:
+  /// What its preparation thread found out.
+  struct Kept {
+    std::string problem{};
+    std::size_t memory_bytes{0};
+    bool operator==(const Kept&) const = default;
+  };
   struct Rule {
-    explicit Rule(const RuleActions& actions)
+    Rule(const RuleActions& actions, std::vector<std::string> about)
         : acts{Action(actions.do_steps, actions.do_options),
-               Action(actions.undo_steps, actions.undo_options)} {}
+               Action(actions.undo_steps, actions.undo_options)},
+          reserve(actions.reserve, std::move(about)) {}
     Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
 
-    std::array<Action, 2> acts;           // by Act
+    std::array<Action, 2> acts;  // by Act
+    Reserve reserve;
+    Worker commits;
+    Worker prepares;
+    Worker reserves;
     std::uint32_t name{0};                // in the trace
     std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
+    std::atomic<std::uint64_t> ends{0};   // of actions of this rule, and of those that contend with it
     std::atomic<bool> in_effect{false};
     RuleStatus status{};
     std::uint64_t applied{0};  // of found, by the decision thread
     bool was_present{false};   // once, so far as the decision thread knows
+    std::deque<Told> held{};   // decisions behind one whose report is not there yet, that one first
+    std::array<std::deque<ActionReport>, kActs> reports{};  // by Act
+    Kept kept{};
   };
 
   void run_decisions() noexcept;
-  void run_preparation() noexcept;
+  void run_follower() noexcept;
   time_ns_t step() MAUVE_RT;
+  void begin(const PendingAction& pending, time_ns_t now_ns) MAUVE_RT;
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
+  void ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
   void show_status() MAUVE_RT;
-  bool tend();
-  bool look_around(std::uint64_t ends);
-  bool make_ready(Rule& rule, std::uint64_t revision);
-  void keep(std::size_t index, const Rule& rule, const std::string& unobservable);
+  bool is_unsettled(std::size_t index) const MAUVE_RT;
+  void commit(std::size_t index) noexcept;
+  void reserve(std::size_t index) noexcept;
+  bool prepare(std::size_t index);
+  bool make_ready(Rule& rule);
+  void keep(Rule& rule);
+  void report(std::size_t index);
+  void deliver(Rule& rule, Act act, ActionReport report);
+  bool look_around();
   void tell();
   std::string follow();
+  void start_workers();
+  void join_workers() noexcept;
   void end() noexcept;
 
   Host& host_;
   std::unique_ptr<Engine> engine_;
   std::vector<std::unique_ptr<Rule>> rules_;
   Feeds feeds_;
-  Action* under_way_{nullptr};  // of the decision thread
-  std::atomic<std::uint64_t> ends_{0};
   ChangeSignal work_;
   std::atomic<std::uint32_t> ending_{0};
   Thread decision_thread_;
-  Thread preparation_thread_;
+  Thread follower_;
+  std::uint64_t made_{0};      // the follower's: how many decisions
+  std::uint64_t followed_{0};  // the follower's: the revision at which preparation threads were asked
   bool runs_{false};
   mutable PiMutex status_mutex_;
   mutable std::mutex told_mutex_;
   std::condition_variable told_changed_;
   std::deque<Told> told_;
   std::uint64_t left_out_{0};
-  struct Kept {
-    std::string problem{};
-    std::size_t memory_bytes{0};
-    bool operator==(const Kept&) const = default;
-  };
-  std::vector<Kept> kept_;  // by rule
+  std::string unobservable_{};  // why something cannot be heard
   bool woken_{false};
   std::uint16_t trace_number_;
 };

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Worker: a thread that does one job each time that it is asked to.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/threads.hpp"
+
+namespace mauve::rules {
+
+/// | member         | written by     | read by    | order                                                   |
+/// | -------------- | -------------- | ---------- | ------------------------------------------------------- |
+/// | asked_ (futex) | ask(), end()   | the thread | release/acquire: the job sees what was before ask()     |
+/// | job_           | start()        | the thread | the thread's creation                                   |
+class Worker {
+ public:
+  Worker() = default;
+  ~Worker();
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  /// The job throws nothing. [setup] Throws Error (internal): the system refuses the thread.
+  void start(const ThreadSettings& settings, std::function<void()> job);
+  /// The job begins once more after this. [rt]
+  void ask() MAUVE_RT;
+  /// The job under way is the last one. [rt]
+  void end() MAUVE_RT;
+  /// Waits for it, after end(). [non-rt]
+  void join() noexcept;
+
+ private:
+  static constexpr std::uint32_t kEnding = 1;
+  static constexpr std::uint32_t kOnce = 2;
+
+  void run() noexcept;
+
+  Thread thread_;
+  std::function<void()> job_;
+  std::atomic<std::uint32_t> asked_{0};
+  bool runs_{false};
+};
+
+}  // namespace mauve::rules
