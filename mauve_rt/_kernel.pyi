@@ -879,7 +879,11 @@ class RuleDecision:
     def other(self) -> int | None:
         """The rule that outranks it, or whose action is under way."""
     @property
-    def cause_ns(self) -> int: ...
+    def cause_ns(self) -> int:
+        """Since when the condition is as it is."""
+    @property
+    def sample_ns(self) -> int:
+        """What made it so: the last sample before a silence, the first one beyond a bound."""
     @property
     def wait_ns(self) -> int: ...
     @property

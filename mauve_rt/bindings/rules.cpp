@@ -119,6 +119,7 @@ void bind_answers(py::module_& module) {
                                return self.other < 0 ? std::optional<std::int32_t>() : self.other;
                              })
       .def_readonly("cause_ns", &rules::Decision::cause_ns)
+      .def_readonly("sample_ns", &rules::Decision::sample_ns)
       .def_readonly("wait_ns", &rules::Decision::wait_ns)
       .def_readonly("measured", &rules::Decision::measured);
   py::class_<rules::RuleStatus>(module, "RuleStatus")

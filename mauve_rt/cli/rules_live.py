@@ -82,7 +82,7 @@ def _row(rule: Any) -> tuple[str, str, str, str, str]:
     holds = f"{'true' if rule.holds else 'false'} for {rule.since_s:.1f} s"
     stands = "in effect" if rule.in_effect else "watching"
     if rule.changed_by_another:
-        stands = "left alone: another hand changed what it did"
+        stands = "waits: another requester changed what it did"
     coming = f"{rule.next} in {rule.next_in_s:.1f} s" if rule.next else "-"
     return "yes", holds, stands, coming, _prepared(rule)
 

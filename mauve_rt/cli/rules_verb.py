@@ -74,14 +74,20 @@ def _complain(file: "RulesFile", problem: Problem) -> None:
 
 
 def _print_bounds(file: "RulesFile", periods: Mapping[str, float]) -> None:
-    from mauve_rt.supervision.rule_bounds import bound_of  # noqa: PLC0415
+    from mauve_rt.supervision.rule_bounds import bound_of, reserve_bound_of  # noqa: PLC0415
 
     for rule in file.rules.rules:
-        bound = bound_of(rule, periods)
-        unknown = "" if bound.total_s is not None else " and what is not known"
-        most = f"{bound.known_s * 1e3:.3f} ms{unknown}"
-        print(f"{rule.name} (in the {rule.where}): at most from the cause to the first release: {most}")
-        _print_parts(bound)
+        named = f"{rule.name} (in the {rule.where})"
+        bound = bound_of(rule, periods, beside=file.rules.rules)
+        _print_bound(f"{named}: at most from the cause to the first release", bound)
+        if (reserve := reserve_bound_of(rule, periods)) is not None:
+            _print_bound(f"{named}: otherwise at most from the cause to safe outputs", reserve)
+
+
+def _print_bound(what: str, bound: "Bound") -> None:
+    unknown = "" if bound.total_s is not None else " and what is not known"
+    print(f"{what}: {bound.known_s * 1e3:.3f} ms{unknown}")
+    _print_parts(bound)
 
 
 def _print_parts(bound: "Bound") -> None:

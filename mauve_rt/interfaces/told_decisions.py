@@ -11,7 +11,7 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.decisions import UNKNOWN_S, decision_message
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.decisions import decision_of
-from mauve_rt.supervision.rule_bounds import reaction_s
+from mauve_rt.supervision.rule_bounds import Bound, bound_of, reserve_bound_of
 from mauve_rt.supervision.rules import Rule
 
 DECISION_TYPE = "mauve_msgs/msg/SupervisorDecision"
@@ -54,14 +54,27 @@ class DecisionMessages:
         )
         if made.decision in ("do", "undo"):
             self._causes[made.rule, made.act] = f"{rule.name}: {decision.reason}"
-        message = decision_message(
-            decision, stamp, took_s=_took_s(told), bound_s=self._bound_s(rule, made.act)
+        bound = self._bound(rule, made.act)
+        total_s = bound.total_s if bound is not None else None
+        bound_s = UNKNOWN_S if total_s is None else total_s
+        return decision_message(decision, stamp, took_s=_took_s(told), bound_s=bound_s), done
+
+    def lateness(self, told: ToldDecision, message: Any) -> str:
+        """What of an action took longer than its bound, with its parts; empty: nothing."""
+        if message.bound_s < 0 or message.took_s <= message.bound_s:
+            return ""
+        made = told.decision
+        bound = self._bound(self._rules[made.rule], made.act)
+        parts = ", ".join(f"{part.what} {part.seconds:.3f} s" for part in bound.parts) if bound else ""
+        known_s = (made.stamp_ns - made.sample_ns) / 1e9
+        return (
+            f"rule {message.rule}: {made.act} took {message.took_s:.3f} s, its bound is {message.bound_s:.3f} s "
+            f"({parts}); its end was known {known_s:.3f} s after the cause"
         )
-        return message, done
 
     def _done(self, rule: Rule, told: ToldDecision) -> Done | None:
         decision = told.decision
-        if told.report is None and not told.failure:
+        if decision.act == "otherwise" or (told.report is None and not told.failure):
             return None
         steps: tuple[Step, ...] = tuple(rule.steps(decision.act))
         revision = self._runtime.observe().revision
@@ -82,10 +95,11 @@ class DecisionMessages:
         cause = self._causes.get((decision.rule, decision.act), rule.name)
         return Done(Request(steps=steps, requested_by=self._who, cause=cause), outcome)
 
-    def _bound_s(self, rule: Rule, act: str) -> float:
+    def _bound(self, rule: Rule, act: str) -> Bound | None:
         periods = {part.name: part.period_ns / 1e9 for part in self._runtime.components()}
-        bound = reaction_s(rule, periods, act=act)
-        return UNKNOWN_S if bound is None else bound
+        if act == "otherwise":
+            return reserve_bound_of(rule, periods)
+        return bound_of(rule, periods, beside=self._rules, act=act)
 
 
 def rule_info(facts: RuleFacts, now_ns: int) -> Any:
@@ -110,9 +124,12 @@ def rule_info(facts: RuleFacts, now_ns: int) -> Any:
 
 
 def _took_s(told: ToldDecision) -> float:
-    """From the cause to the last of the first releases after it."""
-    report = told.report
-    if told.decision.decision != "done" or report is None:
+    """From the cause to the last of the first releases after it; of a reserve action to its end."""
+    made, report = told.decision, told.report
+    if made.decision != "done":
         return UNKNOWN_S
-    releases = [step.released_ns for step in report.steps if step.released_ns != NOT_MEASURED]
-    return (max(releases) - told.decision.cause_ns) / 1e9 if releases else UNKNOWN_S
+    if made.act == "otherwise":
+        return (made.stamp_ns - made.sample_ns) / 1e9
+    steps = report.steps if report is not None else ()
+    releases = [step.released_ns for step in steps if step.released_ns != NOT_MEASURED]
+    return (max(releases) - made.sample_ns) / 1e9 if releases else UNKNOWN_S

@@ -32,6 +32,11 @@ class StepKind:
         return self.value in ("resource.service", "section")
 
     @property
+    def is_structural(self) -> bool:
+        """Whether it adds, removes or wires something: such changes are committed one after the other."""
+        return self.removes or self.target.startswith("new") or self.name in ("shell", "port")
+
+    @property
     def is_about_resource(self) -> bool:
         """Whether its target is a resource."""
         return self.target in ("resource", "new resource")

@@ -49,6 +49,7 @@ struct Engine::Life {
   bool in_effect{false};
   bool changed_by_another{false};
   std::optional<Act> under_way{};                     // do or undo
+  Look begun{};                                       // the condition, as the last action began
   bool gives_way{false};                              // that is to be called off
   bool otherwise_begun{false};                        // since the condition has held
   std::optional<time_ns_t> waits_since_ns{};          // since when `do` may be done and is not in effect
@@ -314,6 +315,7 @@ void Engine::begun(time_ns_t now_ns) noexcept {
   const PendingAction action = *pending_;
   pending_.reset();
   Life& life = *lives_[action.rule];
+  life.begun = life.last;
   Decided decided = Decided::otherwise;
   if (action.act == Act::otherwise) {
     life.otherwise_begun = true;
@@ -409,8 +411,11 @@ void Engine::tell(const Life& life, Decision decision) noexcept {
     return;
   }
   decision.rule = static_cast<std::int32_t>(life.index);
-  decision.cause_ns = life.last.since_ns;
-  decision.measured = life.last.measured;
+  const bool is_outcome = decision.decided == Decided::done || decision.decided == Decided::failed;
+  const Look& look = is_outcome ? life.begun : life.last;
+  decision.cause_ns = look.since_ns;
+  decision.sample_ns = look.cause_ns();
+  decision.measured = look.measured;
   ring_[told % kRing] = decision;
   told_.store(told + 1, std::memory_order_release);
 }

@@ -46,7 +46,7 @@ class SimulatedRules:
         self._messages = DecisionMessages(
             rules, runtime, who=name, name=lambda topic: resolved(topic, namespace)
         )
-        self._runner = RuleRunner(runtime.host, rule_specs(rules), rule_actions(file, runtime), topics)
+        self._runner = RuleRunner(runtime.host, rule_specs(rules, with_reserve=True), rule_actions(file, runtime), topics)
         self._due_ns = 0
         self.look()
 

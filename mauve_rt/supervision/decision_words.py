@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from mauve_rt._kernel import RuleDecision
+from mauve_rt.supervision.effects import touched
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.when import COMBINATIONS, NOT, When
 
@@ -64,6 +65,10 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
         case "do" | "undo":
             said = condition_words(rule.when, holds=kind == "do", measured=measured, name=name)
             return f"{said} for {lasted_s:.2f} s" if kind == "undo" else said
+        case "otherwise":
+            return f"do is not in effect {rule.otherwise_after_s:g} s after it was due: {_reserve_words(rule)}"
+        case "done" if act == "otherwise":
+            return f"otherwise: {_reserve_words(rule)}"
         case "done":
             return f"{act}: {', '.join(str(step) for step in rule.steps(act))}"
         case "failed":
@@ -71,6 +76,11 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
             return f"{act} failed: {failure or decision.why}{again}"
         case _:
             return _not_done(decision, rules)
+
+
+def _reserve_words(rule: Rule) -> str:
+    about = touched(rule.do) | touched(rule.steps("undo"))
+    return f"{rule.otherwise} {', '.join(sorted(about))}"
 
 
 def _not_done(decision: RuleDecision, rules: Sequence[Rule]) -> str:

@@ -8,13 +8,14 @@ from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.when_spec import nanoseconds, when_spec
 
 
-def rule_specs(rules: Iterable[Rule]) -> list[RuleSpec]:
-    """In the order of the rules."""
-    return [_rule_spec(rule) for rule in rules]
+def rule_specs(rules: Iterable[Rule], *, with_reserve: bool = False) -> list[RuleSpec]:
+    """In the order of the rules; `with_reserve`: who runs them can carry out `otherwise`."""
+    return [_rule_spec(rule, with_reserve=with_reserve) for rule in rules]
 
 
-def _rule_spec(rule: Rule) -> RuleSpec:
+def _rule_spec(rule: Rule, *, with_reserve: bool) -> RuleSpec:
     undo = rule.undo
+    has_reserve = with_reserve and rule.otherwise is not None
     return RuleSpec(
         rule.name,
         when_spec(rule.when),
@@ -24,4 +25,5 @@ def _rule_spec(rule: Rule) -> RuleSpec:
         cooldown_ns=nanoseconds(rule.cooldown_s),
         priority=rule.priority,
         about=sorted(touched(rule.do) | touched(undo.do if undo is not None else ())),
+        otherwise_after_ns=nanoseconds(rule.otherwise_after_s) if has_reserve else None,
     )

@@ -22,14 +22,16 @@ from mauve_rt.trace.reading.trace import Trace
 
 _NOT_ARMED = "not armed"
 # What a message says of why nothing was done, by words of its reason: a record has a number for it.
+_CHANGED = "changed by another requester"
 _WHY = {
     "watching again once": _NOT_ARMED,
-    "by another hand": "changed by another hand",
+    "by another requester": _CHANGED,
+    "by another hand": _CHANGED,  # in bags of before
     "already": "in effect already",
     "outranked": "outranked",
 }
-_ACT = re.compile(r"(?:no |nothing to )?(do|undo)\b")
-_LOST = ("changed by another hand", "outranked")
+_ACT = re.compile(r"(?:no |nothing to )?(do|undo|otherwise)\b")
+_LOST = (_CHANGED, "changed by another hand", "outranked")
 
 
 class StoryEntry(NamedTuple):
@@ -73,6 +75,10 @@ class Standing:
                 self.armed, self.holds, self.hindered = True, entry.decision == "condition_true", None
             case "do" | "undo":
                 self.armed, self.hindered = True, None
+            case "otherwise":
+                self.armed, self.hindered = True, entry
+            case "done" if entry.act == "otherwise":
+                self.hindered = entry
             case "adopted" | "done":
                 self._set_in_effect(entry.act != "undo", entry)
                 self.hindered = None

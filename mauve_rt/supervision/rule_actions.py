@@ -64,7 +64,7 @@ def _actions(file: RulesFile, index: int, runtime: Runtime) -> RuleActions:
     places, steps = zip(*_placed(rule, index), strict=True)
     done = _planned(file, places, rule.do, runtime)
     both = _planned(file, places, steps, runtime)  # what undoes is about what was done
-    return RuleActions(done, undo=both[len(done) :])
+    return RuleActions(done, undo=both[len(done) :], reserve=rule.otherwise or "stop")
 
 
 def _placed(rule: Rule, index: int) -> list[tuple[Location, Step]]:

@@ -9,11 +9,19 @@ each agree in a wait of their own, so the last one agrees within one period of t
 then takes its new part at its next release, within one period more.
 
 In the supervisor the request travels and the new part is built when it is asked for; both are assumed.
+
+Other rules and their components have no part in that, whatever they do: each rule has threads of its own.
+But a rule of lower rank about one of the same components may be in the middle of its action: that is called
+off, and an adopt that does not end is given up after `CALLED_OFF_S`. And two rules that add, remove or wire
+something commit one after the other.
+
+A reserve action waits for nothing: it stops its components, and gives up those that still execute.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.supervision.condition_table import parameters_of
 from mauve_rt.supervision.effects import touched
 from mauve_rt.supervision.rules import Rule
@@ -26,6 +34,9 @@ WOKEN_S = (
 FOLLOWED_S = 0.020  # assumed of the executor's ordinary thread, which sees that the architecture changed
 SENT_S = 0.020  # assumed of a supervisor: it is late by no more, and its request arrives
 BUILT_S = 0.200  # assumed of the executor, which builds the new part when it is asked
+CALLED_OFF_S = 0.100  # the kernel's patience with an adopt or take under way
+TIMEOUT_S = 1.0  # of the kernel's commits
+RESERVE_S: Mapping[str, float] = {"stop": 0.050, "safe_outputs": 0.001}  # the patience of rules/reserve.hpp
 TOLD_S = 1.0  # assumed of who sends /diagnostics, or of another executor's state: at least so often
 
 
@@ -56,17 +67,54 @@ class Bound:
         return sum(part.seconds or 0.0 for part in self.parts)
 
 
-def bound_of(rule: Rule, periods_s: Mapping[str, float]) -> Bound:
-    """The bound of a rule's `do`; `periods_s`: of components, as far as they are known; 0: it has none."""
-    return Bound((*_noticing(rule.when, periods_s), *_reaction(rule, periods_s)))
+def bound_of(
+    rule: Rule, periods_s: Mapping[str, float], *, beside: Iterable[Rule] = (), act: str = "do"
+) -> Bound:
+    """The bound of what a rule does or undoes, from what made its condition true, or false.
 
-
-def reaction_s(rule: Rule, periods_s: Mapping[str, float], *, act: str = "do") -> float | None:
-    """From the instant at which the condition became true, of `undo` false, to the first release.
-
-    None when it is not known.
+    `periods_s`: of components, as far as they are known; 0: it has none. `beside`: the other rules of the
+    executor; the rule itself may be among them.
     """
-    return Bound(tuple(_reaction(rule, periods_s, act=act))).total_s
+    noticing = _noticing(rule.when, periods_s, negated=act == "undo")
+    return Bound((*noticing, *_reaction(rule, periods_s, act=act), *_beside(rule, beside)))
+
+
+def reserve_bound_of(rule: Rule, periods_s: Mapping[str, float]) -> Bound | None:
+    """The bound of a rule's reserve action, from the cause to safe outputs; None: it has none."""
+    if rule.otherwise is None:
+        return None
+    waits = [BoundPart("for_s of the rule", rule.for_s)] if rule.for_s > 0 else []
+    return Bound(
+        (
+            *_noticing(rule.when, periods_s),
+            *waits,
+            BoundPart("otherwise_after_s", rule.otherwise_after_s),
+            BoundPart("the executor decides, and makes outputs safe", WOKEN_S, assumed=True),
+            BoundPart(f"{rule.otherwise}: who still executes then is given up", RESERVE_S[rule.otherwise]),
+        )
+    )
+
+
+def _beside(rule: Rule, others: Iterable[Rule]) -> Iterator[BoundPart]:
+    """What other rules of the executor can add."""
+    if rule.where != "executor":
+        return
+    own = [other for other in others if other.where == "executor" and other.name != rule.name]
+    lower = [each.name for each in own if each.priority <= rule.priority and _about(rule) & _about(each)]
+    if lower:
+        yield BoundPart(f"until the action of {', '.join(lower)} is called off", CALLED_OFF_S)
+    wiring = [each.name for each in own if _wires(each)] if _wires(rule) else []
+    if wiring:
+        what = f"until {', '.join(wiring)} let go of the architecture's structure"
+        yield BoundPart(what, TIMEOUT_S * len(wiring))
+
+
+def _about(rule: Rule) -> set[str]:
+    return touched(rule.do) | touched(rule.steps("undo"))
+
+
+def _wires(rule: Rule) -> bool:
+    return any(STEP_KINDS[step.kind].is_structural for step in (*rule.do, *rule.steps("undo")))
 
 
 def _reaction(rule: Rule, periods_s: Mapping[str, float], *, act: str = "do") -> Iterator[BoundPart]:

@@ -11,6 +11,8 @@
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
         undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
+        otherwise: stop             # where `do` does not come about: stop, or safe_outputs
+        otherwise_after_s: 0.1      # from the instant at which `do` is due
 
 What may stand in `when`: see supervision/when.py. One file serves both: the executor runs the rules that are
 `in: executor`; its supervisor runs the others, and those too where the executor does not. Names of topics and
@@ -56,6 +58,8 @@ class Rule(Section):
     do: list[Step] = setting(STEPS)
     undo: Undo | None = setting(Part(Undo), default=None)
     cooldown_s: float = setting(_SECONDS, default=0.0)
+    otherwise: Literal["stop", "safe_outputs"] | None = setting(Choice("stop", "safe_outputs"), default=None)
+    otherwise_after_s: float = setting(_SECONDS, default=0.1)
 
     def steps(self, act: str) -> list[Step]:
         """The transaction of `do` or `undo`."""
@@ -106,8 +110,12 @@ class RulesFile:
             seen.add(rule.name)
 
     def _refused(self) -> Iterator[Problem]:
-        """Of conditions whose parameters are each what they may be, but not together."""
-        for rule in self.rules.rules:
+        """Of conditions whose parameters are each what they may be, but not together; and of reserve actions."""
+        for index, rule in enumerate(self.rules.rules):
+            if rule.otherwise is not None and rule.where == "supervisor":
+                what = "only an executor has a reserve action: a supervisor's request may not come through"
+                remedy = "let the executor run the rule, `in: executor`"
+                yield self.problem(("rules", index, "otherwise"), what, remedy=remedy)
             for leaf in rule.when.leaves():
                 place = (*leaf.place, leaf.kind)
                 if (error := refusal(leaf)) is not None:

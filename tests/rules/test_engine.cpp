@@ -463,6 +463,30 @@ TEST(Rules, TheReserveActionIsTriedAgainWhereItFailed) {
                    std::count(tried.words.begin(), tried.words.end(), "1600 r otherwise"));
 }
 
+TEST(Rules, AnOutcomeTellsTheSampleThatCausedItsAction) {
+  const auto last = [](const Tried& tried, Decided decided) {
+    return std::find_if(tried.decisions.rbegin(), tried.decisions.rend(),
+                        [decided](const Decision& each) { return each.decided == decided; })
+        ->sample_ns;
+  };
+  Tried silent({rule("r", combine("any", {silence(1.0)}))});
+  silent.now_ns = ms(300);
+  silent.tell(0);
+  silent.run_to(ms(1500));
+  EXPECT_EQ(ms(300), last(silent, Decided::done)) << "the last sample before the silence";
+  silent.tell(0);
+  EXPECT_EQ(ms(1500), last(silent, Decided::done)) << "the first one after it";
+  When high = leaf("value", {{"topic", "radio"}, {"field", "x"}, {"above", 1.0}});
+  high.for_ns = ms(200);
+  Tried beyond({rule("r", high)});
+  for (const std::int64_t at : {100, 150, 200, 250}) {
+    beyond.run_to(ms(at));
+    beyond.tell(0, 2.0);
+  }
+  beyond.run_to(ms(400));
+  EXPECT_EQ(ms(100), last(beyond, Decided::done)) << "the first one beyond the bound";
+}
+
 TEST(Rules, ThereIsNoReserveActionForWhatIsDoneOrOutranked) {
   Rule low = reserved();
   low.about = {"c"};
@@ -496,7 +520,7 @@ TEST(Rules, ItNeverFightsAPerson) {
   tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);
   tried.run_to(ms(1600));
   EXPECT_TRUE(tried.engine.status(0).changed_by_another);
-  EXPECT_THAT(tried.words.back(), HasSubstr("by another hand"));
+  EXPECT_THAT(tried.words.back(), HasSubstr("by another requester"));
   tried.tell(0);
   tried.run_to(ms(3000));
   EXPECT_TRUE(tried.engine.status(0).in_effect) << "the next time it acts again";

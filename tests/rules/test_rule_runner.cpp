@@ -46,6 +46,30 @@ struct CountedCore : TestCore {
   static inline std::atomic<int> adopted{0};
   static inline std::atomic<bool> closed{false};  // none is configured until it is open
 };
+/// A state that does not end while the gate is closed.
+class Gate {
+ public:
+  /// Before the component starts.
+  void guard(TestCore& core) {
+    core.work = [this] {
+      while (is_closed_.load()) {
+        is_held_.store(true);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    };
+  }
+  template <typename Way>
+  void close(Way& way) {
+    is_closed_.store(true);
+    way.until([this] { return is_held_.load(); }, "the state");
+  }
+  void open() { is_closed_.store(false); }
+
+ private:
+  std::atomic<bool> is_closed_{false};
+  std::atomic<bool> is_held_{false};
+};
+
 /// Component "c", whose core a rule replaces; "w", about which it asks; and the resource "beat", which the test writes.
 template <typename Way>
 class RuleRunnerTest : public Hosted<Way> {
@@ -58,6 +82,7 @@ class RuleRunnerTest : public Hosted<Way> {
     watched = &this->architecture.component("w");
   }
   ~RuleRunnerTest() override {
+    gate.open();
     if (runner) runner->stop();
     this->way.shutdown();
   }
@@ -121,6 +146,7 @@ class RuleRunnerTest : public Hosted<Way> {
 
   SharedData<Number>& beat;
   Component* watched;
+  Gate gate;  // of "w", where the test guards it
   std::vector<mauve::rules::Rule> rules;
   std::vector<RuleActions> actions;
   std::map<std::string, std::string> topics;
@@ -192,43 +218,17 @@ TYPED_TEST(RuleRunnerTest, ActsWhileNothingCanBePrepared) {
 
 // ---- no rule waits for another
 
-/// A state that does not end while the gate is closed.
-class Gate {
- public:
-  ~Gate() { open(); }
-  /// Before the component starts.
-  void guard(TestCore& core) {
-    core.work = [this] {
-      while (is_closed_.load()) {
-        is_held_.store(true);
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-    };
-  }
-  template <typename Way>
-  void close(Way& way) {
-    is_closed_.store(true);
-    way.until([this] { return is_held_.load(); }, "the state");
-  }
-  void open() { is_closed_.store(false); }
-
- private:
-  std::atomic<bool> is_closed_{false};
-  std::atomic<bool> is_held_{false};
-};
-
 TYPED_TEST(RuleRunnerTest, ActsWhileAnothersComponentDoesNotComeToAWait) {
   if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
   this->add_rule(too_high(3.0), {}, core("t/Counting", "w"));
   this->rules.back().about = {"w"};
   this->add_rule(too_high(10.0), {});
-  Gate gate;
-  gate.guard(this->core(*this->watched));
+  this->gate.guard(this->core(*this->watched));
   this->deploy();
   this->begin();
   this->await_ready(0);
   this->await_ready(1);
-  gate.close(this->way);
+  this->gate.close(this->way);
   this->beat.write.write({.value = 4.0}, 1);
   this->see("do");
   this->beat.write.write({.value = 20.0}, 2);
@@ -238,7 +238,7 @@ TYPED_TEST(RuleRunnerTest, ActsWhileAnothersComponentDoesNotComeToAWait) {
   this->see("failed");
   EXPECT_EQ(Why::timed_out, this->last(Decided::failed).decision.why);
   EXPECT_EQ(0, this->last(Decided::failed).decision.rule);
-  gate.open();
+  this->gate.open();
   this->see("done");
 }
 
@@ -248,13 +248,12 @@ TYPED_TEST(RuleRunnerTest, CallsOffTheActionOfALowerRule) {
   this->add_rule(too_high(10.0), {}, core("t/Counted", "w"));
   for (auto& rule : this->rules) rule.about = {"w"};
   this->rules.back().priority = 1000;
-  Gate gate;
-  gate.guard(this->core(*this->watched));
+  this->gate.guard(this->core(*this->watched));
   this->deploy();
   this->begin();
   this->await_ready(0);
   this->await_ready(1);
-  gate.close(this->way);
+  this->gate.close(this->way);
   this->beat.write.write({.value = 4.0}, 1);
   this->see("do");
   this->beat.write.write({.value = 20.0}, 2);
@@ -266,7 +265,7 @@ TYPED_TEST(RuleRunnerTest, CallsOffTheActionOfALowerRule) {
     return this->last(Decided::do_).decision.rule == 1;
   };
   this->way.until(has_begun, "the higher rule to act");
-  gate.open();
+  this->gate.open();
   this->see("done");
   EXPECT_EQ(1, this->last(Decided::done).decision.rule);
   EXPECT_EQ("t/Counted", this->watched->shown().core);
@@ -374,11 +373,10 @@ TYPED_TEST(RuleRunnerTest, MakesOutputsSafeWhereItsComponentHangs) {
   this->rules.back().about = {"w"};
   this->rules.back().otherwise_after_ns = ms_to_ns(10);
   this->actions.back().reserve = ReserveKind::safe_outputs;
-  Gate gate;
-  gate.guard(this->core(*this->watched));
+  this->gate.guard(this->core(*this->watched));
   this->deploy();
   this->begin();
-  gate.close(this->way);
+  this->gate.close(this->way);
   this->see("done");
   EXPECT_EQ(Act::otherwise, this->last(Decided::done).decision.act);
   EXPECT_EQ(ComponentState::faulted, this->watched->task().state()) << "while its state lasts";
@@ -396,13 +394,12 @@ TYPED_TEST(RuleRunnerTest, LetsAStateEndBeforeItGivesItsComponentUp) {
   this->add_rule(silent(), {}, core("t/Unready", "w"));
   this->rules.back().about = {"w"};
   this->rules.back().otherwise_after_ns = ms_to_ns(10);
-  Gate gate;
-  gate.guard(this->core(*this->watched));
+  this->gate.guard(this->core(*this->watched));
   this->deploy();
   this->begin();
-  gate.close(this->way);
+  this->gate.close(this->way);
   this->see("otherwise");
-  gate.open();
+  this->gate.open();
   this->see("done");
   const ComponentState state =
       this->watched->task().state();  // a stall may have lasted longer than the patience

@@ -247,5 +247,5 @@ def _standing(facts: RuleFacts) -> str:
     if status.in_effect:
         return "in effect"
     if status.changed_by_another:
-        return "left alone: its work was changed by another hand"
+        return "what it did was changed by another requester: it waits for its condition's end"
     return "its condition holds" if status.holds else "watching"

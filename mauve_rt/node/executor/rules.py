@@ -208,6 +208,8 @@ class OwnRules:
             self._event(done.request, done.outcome)
         text = f"{message.rule}: {message.decision}: {message.reason}"
         console = self._node.get_logger()
+        if late := messages.lateness(told, message):
+            console.error(late)
         (console.error if message.decision == "failed" else console.info)(text)
         self._publish(self._decisions, messages.TYPE, message, self._qos)
 

@@ -40,7 +40,8 @@ Look Age::look(time_ns_t now_ns) noexcept {
     return Look{.holds = holds,
                 .since_ns = since_ns_,
                 .next_ns = holds ? kForever : later_by(due_ns, 1),
-                .measured = static_cast<double>(now_ns - from_ns) * 1e-9};
+                .measured = static_cast<double>(now_ns - from_ns) * 1e-9,
+                .sample_ns = holds ? from_ns : since_ns_};
   });
 }
 

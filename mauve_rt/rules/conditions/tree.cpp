@@ -16,7 +16,7 @@ class AtLeast final : public Condition {
   void arm(time_ns_t now_ns) noexcept override {
     for (const auto& part : parts_) part->arm(now_ns);
     holds_ = count_ == 0;
-    since_ns_ = now_ns;
+    since_ns_ = cause_ns_ = now_ns;
   }
   void assume() noexcept override {
     for (const auto& part : parts_) part->assume();
@@ -26,18 +26,26 @@ class AtLeast final : public Condition {
     Look answer;
     bool is_measured = false;
     time_ns_t latest_ns = since_ns_;
+    time_ns_t cause_ns = cause_ns_;
     for (const auto& part : parts_) {
       const Look look = part->look(now_ns);
       holding += look.holds ? 1 : 0;
-      latest_ns = std::max(latest_ns, look.since_ns);
+      if (look.since_ns >= latest_ns) {
+        latest_ns = look.since_ns;
+        cause_ns = look.cause_ns();
+      }
       answer.next_ns = std::min(answer.next_ns, look.next_ns);
       if (!is_measured) answer.measured = look.measured;  // of the first that holds, or else the last
       is_measured |= look.holds;
     }
     answer.holds = holding >= count_;
-    if (answer.holds != holds_) since_ns_ = latest_ns;  // what changed last has changed it
+    if (answer.holds != holds_) {  // what changed last has changed it
+      since_ns_ = latest_ns;
+      cause_ns_ = cause_ns;
+    }
     holds_ = answer.holds;
     answer.since_ns = since_ns_;
+    answer.sample_ns = cause_ns_;
     return answer;
   }
 
@@ -46,6 +54,7 @@ class AtLeast final : public Condition {
   const std::size_t count_;
   bool holds_{false};
   time_ns_t since_ns_{0};
+  time_ns_t cause_ns_{0};
 };
 
 class Not final : public Condition {
@@ -85,6 +94,7 @@ class For final : public Condition {
     }
     const time_ns_t due_ns = later_by(look.since_ns, for_ns_);
     if (is_assumed_ || now_ns >= due_ns) {
+      look.sample_ns = look.cause_ns();
       if (!is_assumed_) look.since_ns = due_ns;
       return look;
     }
@@ -106,25 +116,37 @@ class Within final : public Condition {
   void arm(time_ns_t now_ns) noexcept override {
     part_->arm(now_ns);
     held_ = was_held_ = false;
-    since_ns_ = now_ns;
+    since_ns_ = cause_ns_ = now_ns;
   }
   void assume() noexcept override { part_->assume(); }
   Look look(time_ns_t now_ns) noexcept override {
     Look look = part_->look(now_ns);
     if (look.holds) {
-      if (!held_) since_ns_ = look.since_ns;
+      if (!held_) {
+        since_ns_ = look.since_ns;
+        cause_ns_ = look.cause_ns();
+      }
       held_ = was_held_ = true;
-      return {.holds = true, .since_ns = since_ns_, .next_ns = look.next_ns, .measured = look.measured};
+      return {.holds = true,
+              .since_ns = since_ns_,
+              .next_ns = look.next_ns,
+              .measured = look.measured,
+              .sample_ns = cause_ns_};
     }
     if (std::exchange(was_held_, false)) ends_ns_ = later_by(look.since_ns, within_ns_);
     if (held_ && now_ns < ends_ns_) {
       return {.holds = true,
               .since_ns = since_ns_,
               .next_ns = std::min(look.next_ns, ends_ns_),
-              .measured = look.measured};
+              .measured = look.measured,
+              .sample_ns = cause_ns_};
     }
-    if (std::exchange(held_, false)) since_ns_ = ends_ns_;
+    if (std::exchange(held_, false)) {
+      since_ns_ = ends_ns_;
+      cause_ns_ = ends_ns_ - within_ns_;
+    }
     look.since_ns = since_ns_;
+    look.sample_ns = cause_ns_;
     return look;
   }
 
@@ -135,6 +157,7 @@ class Within final : public Condition {
   bool held_{false};      // this one
   time_ns_t ends_ns_{0};
   time_ns_t since_ns_{0};
+  time_ns_t cause_ns_{0};
 };
 
 std::string joined(const std::vector<std::string>& names) {

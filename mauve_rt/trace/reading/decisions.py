@@ -37,6 +37,9 @@ TOLD_AS: Mapping[str, tuple[str, str]] = {
     "undo failed": ("failed", "undo"),
     "no do": ("suppressed", "do"),
     "no undo": ("suppressed", "undo"),
+    "otherwise": ("otherwise", ""),
+    "otherwise done": ("done", "otherwise"),
+    "otherwise failed": ("failed", "otherwise"),
 }
 
 

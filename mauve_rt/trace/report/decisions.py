@@ -11,6 +11,7 @@ SHOWN = 5_000
 """Flags on the timeline, at most."""
 _MANY_ROWS = 400
 _LEVELS = {"do": "acts", "undo": "acts", "done": "acts", "undone": "acts"}
+_LEVELS |= {"otherwise": "fails", "otherwise done": "fails", "otherwise failed": "fails"}
 _LEVELS |= {"do failed": "fails", "undo failed": "fails", "no do": "waits", "no undo": "waits"}
 
 

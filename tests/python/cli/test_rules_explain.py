@@ -104,6 +104,7 @@ def test_why_a_rule_did_not_act(explain: Explain) -> None:
     ("decision", "reason", "how"),
     [
         ("suppressed", "core A by another hand: left alone until the condition ends", "not in effect, "),
+        ("suppressed", "no do: changed by another requester: left alone until", "not in effect, "),
         ("suppressed", "do waits: outranked by rule a (priority 1)", "not in effect, "),
         (
             "suppressed",

@@ -200,7 +200,7 @@ def test_a_person_who_swaps_back_by_hand_is_left_alone_until_the_condition_ends(
     world.run(1.5)
     world.tell({"exploration": ComponentView("RUNNING", USUAL)})
     assert world.said()[-1] == "suppressed"
-    assert "by another hand" in world.decisions[-1].reason
+    assert "by another requester" in world.decisions[-1].reason
     world.run(5.0)
     world.talking = True
     world.run(4.0)

@@ -23,6 +23,10 @@ struct Look {
   time_ns_t since_ns{0};        // the instant from which on it has been so
   time_ns_t next_ns{kForever};  // the first instant at which it can be otherwise though nothing is told
   double measured{0.0};         // what it looks at: s of silence, a value, how many
+  std::optional<time_ns_t> sample_ns{};  // the last sample before a silence; empty: since_ns
+
+  /// When that happened which made it so: the last sample before a silence, the first one beyond a bound. [rt]
+  time_ns_t cause_ns() const MAUVE_RT { return sample_ns.value_or(since_ns); }
 };
 
 /// A condition at work. Asked from one thread, with instants that never go back.

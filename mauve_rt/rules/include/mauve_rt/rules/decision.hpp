@@ -59,6 +59,7 @@ struct Decision {
   Why why{Why::none};
   std::int32_t other{-1};  // the other rule, where there is one
   time_ns_t cause_ns{0};   // since when the condition has been as it is
+  time_ns_t sample_ns{0};  // what made it so: the last sample before a silence, the first one beyond a bound
   time_ns_t wait_ns{0};    // of cooldown and failed
   double measured{0.0};    // what the condition looks at: s of silence, a value, how many
 };
