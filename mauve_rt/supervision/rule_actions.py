@@ -9,6 +9,7 @@ from mauve_rt.control.requests import RefusalError
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Plan
 from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.model.plugins import PluginIndex
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
@@ -17,6 +18,11 @@ from mauve_rt.supervision.rules import Rule, RulesFile
 
 UNPREPARED = "the executor cannot make a step of kind {} ready for a rule"
 REMEDY = "give the rule `in: supervisor`, or do it by steps about what is there"
+IN_PYTHON = (
+    "core {} is written in Python: to put it in needs the interpreter's lock, which something else may hold "
+    "for long, and then its component comes too late"
+)
+CPP_REMEDY = "write the core in C++, or give the rule `in: supervisor`"
 
 
 class _Collected:
@@ -34,14 +40,17 @@ def own_rules(file: RulesFile) -> list[Rule]:
     return [rule for rule in file.rules.rules if rule.where == "executor"]
 
 
-def unprepared(file: RulesFile, index: int) -> Iterator[Problem]:
-    """Steps of a rule of the executor that it cannot make ready."""
+def unprepared(file: RulesFile, index: int, plugins: PluginIndex) -> Iterator[Problem]:
+    """Steps of a rule of the executor that it cannot make ready, or not carry out in time."""
     rule = file.rules.rules[index]
     if rule.where != "executor":
         return
     for place, step in _placed(rule, index):
         if not STEP_KINDS[step.kind].is_prepared:
             yield file.problem(place, UNPREPARED.format(step.kind), remedy=REMEDY)
+        core = plugins.find("core", step.name) if STEP_KINDS[step.kind].name == "core" else None
+        if core is not None and core.is_python:
+            yield file.problem((*place, "name"), IN_PYTHON.format(core.name), remedy=CPP_REMEDY)
 
 
 def rule_actions(file: RulesFile, runtime: Runtime) -> list[RuleActions]:
@@ -59,7 +68,7 @@ def rule_actions(file: RulesFile, runtime: Runtime) -> list[RuleActions]:
 
 def _actions(file: RulesFile, index: int, runtime: Runtime) -> RuleActions:
     rule = file.rules.rules[index]
-    if problems := list(unprepared(file, index)):
+    if problems := list(unprepared(file, index, runtime.index)):
         raise ArchitectureFileError(file.path, problems)
     places, steps = zip(*_placed(rule, index), strict=True)
     done = _planned(file, places, rule.do, runtime)

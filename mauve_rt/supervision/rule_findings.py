@@ -1,7 +1,7 @@
 """What keeps the rules of a file from being run: names, what cannot be heard, what cannot be made ready."""
 
 from mauve_rt.errors import Problem
-from mauve_rt.model import ArchitectureModel
+from mauve_rt.model import ArchitectureModel, PluginIndex
 from mauve_rt.supervision.rule_actions import unprepared
 from mauve_rt.supervision.rule_hearing import only_outside
 from mauve_rt.supervision.rule_names import name_findings
@@ -10,5 +10,8 @@ from mauve_rt.supervision.rules import RulesFile
 
 def standing_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
     """Names that are not there, and what who runs a rule can neither hear nor make ready."""
-    steps = (problem for index in range(len(file.rules.rules)) for problem in unprepared(file, index))
+    plugins = PluginIndex.installed()
+    steps = (
+        problem for index in range(len(file.rules.rules)) for problem in unprepared(file, index, plugins)
+    )
     return [*name_findings(file, model), *only_outside(file), *steps]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from checked_rules import QUIET, ROBOT, Check, rule
 
-from mauve_rt.supervision.rule_bounds import WOKEN_S, Bound, bound_of, reaction_s
+from mauve_rt.supervision.rule_bounds import CALLED_OFF_S, WOKEN_S, Bound, bound_of, reserve_bound_of
 from mauve_rt.supervision.rules import Rule, RulesFile
 
 PERIODS_S = {"one": 0.010, "slow": 0.100, "told": 0.0}
@@ -80,7 +80,6 @@ def test_without_an_architecture_nobody_knows_the_period(check: Check) -> None:
 def test_what_passes_before_it_is_noticed(tmp_path: Path, when: str, seconds: float) -> None:
     one = loaded(tmp_path, when)
     assert bound_of(one, PERIODS_S).total_s == pytest.approx(seconds + WOKEN_S + PERIODS_S["one"])
-    assert reaction_s(one, PERIODS_S) == pytest.approx(WOKEN_S + PERIODS_S["one"])
 
 
 def test_several_components_have_to_agree_first(tmp_path: Path) -> None:
@@ -93,7 +92,6 @@ def test_several_components_have_to_agree_first(tmp_path: Path) -> None:
 
 def test_a_component_without_a_period_has_no_bound(tmp_path: Path) -> None:
     one = loaded(tmp_path, QUIET, SWAP.replace("one", "told"))
-    assert reaction_s(one, PERIODS_S) is None
     bound = bound_of(one, PERIODS_S)
     assert bound.total_s is None
     assert bound.known_s == pytest.approx(1.0 + WOKEN_S)
@@ -103,8 +101,50 @@ def test_a_component_without_a_period_has_no_bound(tmp_path: Path) -> None:
 def test_what_is_told_now_and_then_is_as_old_as_that(tmp_path: Path) -> None:
     for when in ("{diagnostic: {status: gps}}", "{peer: {executor: robot_2}}"):
         one = loaded(tmp_path, when, more="    in: supervisor\n")
-        bound, reaction = bound_of(one, PERIODS_S), reaction_s(one, PERIODS_S)
+        bound = bound_of(one, PERIODS_S)
         assert isinstance(bound, Bound)
-        assert reaction is not None
-        assert bound.known_s == pytest.approx(1.0 + reaction)
+        assert bound.known_s == pytest.approx(1.0 + 0.220 + PERIODS_S["one"])
         assert bound.parts[1].assumed
+
+
+def test_a_rule_of_lower_rank_about_the_same_component_is_called_off(tmp_path: Path) -> None:
+    low, high, wiring = (
+        loaded(tmp_path, QUIET, more=f"    priority: {priority}\n") for priority in (0, 5, 7)
+    )
+    low.name, high.name, wiring.name = "low", "high", "wiring"
+    alone = bound_of(high, PERIODS_S).known_s
+    assert bound_of(low, PERIODS_S, beside=[low, high]).known_s == alone
+    beside = bound_of(high, PERIODS_S, beside=[low, high])
+    assert beside.known_s == pytest.approx(alone + CALLED_OFF_S)
+    assert beside.parts[-1].what == "until the action of low is called off"
+
+
+def test_rules_that_wire_commit_one_after_the_other(tmp_path: Path) -> None:
+    wires = "{kind: disconnect, target: one, name: input}"
+    one, other = (loaded(tmp_path, QUIET, wires.replace("one", target)) for target in ("one", "slow"))
+    one.name, other.name = "first", "second"
+    bound = bound_of(other, PERIODS_S, beside=[one, other])
+    assert (bound.parts[-1].what, bound.parts[-1].seconds) == (
+        "until first let go of the architecture's structure",
+        1.0,
+    )
+
+
+@pytest.mark.parametrize(("kind", "patience_s"), [("stop", 0.050), ("safe_outputs", 0.001)])
+def test_a_reserve_action_waits_for_no_component(tmp_path: Path, kind: str, patience_s: float) -> None:
+    one = loaded(tmp_path, QUIET, more=f"    for_s: 0.5\n    otherwise: {kind}\n    otherwise_after_s: 0.2\n")
+    bound = reserve_bound_of(one, {})
+    assert bound is not None
+    assert bound.total_s == pytest.approx(1.0 + 0.5 + 0.2 + WOKEN_S + patience_s)
+    assert reserve_bound_of(loaded(tmp_path, QUIET), {}) is None
+
+
+def test_a_reserve_action_is_printed_and_only_an_executor_has_one(check: Check) -> None:
+    more = "    otherwise: stop\n"
+    status, out, errors = check(rule(more=more), robot=ROBOT)
+    assert (status, errors) == (0, [])
+    said = "quiet (in the executor): otherwise at most from the cause to safe outputs: 1151.000 ms"
+    assert said in out
+    status, _, errors = check(rule(more=f"{more}    in: supervisor\n"), robot=ROBOT)
+    assert status == 2
+    assert "only an executor has a reserve action" in errors[0]
