@@ -68,8 +68,8 @@ class DecisionMessages:
         parts = ", ".join(f"{part.what} {part.seconds:.3f} s" for part in bound.parts) if bound else ""
         known_s = (made.stamp_ns - made.sample_ns) / 1e9
         return (
-            f"rule {message.rule}: {made.act} took {message.took_s:.3f} s, its bound is {message.bound_s:.3f} s "
-            f"({parts}); its end was known {known_s:.3f} s after the cause"
+            f"rule {message.rule}: {made.act} took {message.took_s:.3f} s, longer than its bound of "
+            f"{message.bound_s:.3f} s ({parts}); its end was known {known_s:.3f} s after the cause"
         )
 
     def _done(self, rule: Rule, told: ToldDecision) -> Done | None:

@@ -46,7 +46,8 @@ class SimulatedRules:
         self._messages = DecisionMessages(
             rules, runtime, who=name, name=lambda topic: resolved(topic, namespace)
         )
-        self._runner = RuleRunner(runtime.host, rule_specs(rules, with_reserve=True), rule_actions(file, runtime), topics)
+        specs = rule_specs(rules, with_reserve=True)
+        self._runner = RuleRunner(runtime.host, specs, rule_actions(file, runtime), topics)
         self._due_ns = 0
         self.look()
 

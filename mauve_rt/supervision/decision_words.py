@@ -59,6 +59,7 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
     kind, act = decision.decision, decision.act
     measured = decision.measured
     lasted_s = max(decision.stamp_ns - decision.cause_ns, 0) / 1e9
+    what = _reserve_words(rule) if act == "otherwise" else ", ".join(str(step) for step in rule.steps(act))
     match kind:
         case "condition_true" | "condition_false":
             return condition_words(rule.when, holds=kind == "condition_true", measured=measured, name=name)
@@ -66,16 +67,11 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
             said = condition_words(rule.when, holds=kind == "do", measured=measured, name=name)
             return f"{said} for {lasted_s:.2f} s" if kind == "undo" else said
         case "otherwise":
-            return f"do is not in effect {rule.otherwise_after_s:g} s after it was due: {_reserve_words(rule)}"
-        case "done" if act == "otherwise":
-            return f"otherwise: {_reserve_words(rule)}"
+            return f"do is not in effect {rule.otherwise_after_s:g} s after it was due: {what}"
         case "done":
-            return f"{act}: {', '.join(str(step) for step in rule.steps(act))}"
-        case "failed":
-            again = f"; next try in {decision.wait_ns / 1e9:.2f} s if still needed"
-            return f"{act} failed: {failure or decision.why}{again}"
+            return f"{act}: {what}"
         case _:
-            return _not_done(decision, rules)
+            return _not_done(decision, rules, failure)
 
 
 def _reserve_words(rule: Rule) -> str:
@@ -83,7 +79,10 @@ def _reserve_words(rule: Rule) -> str:
     return f"{rule.otherwise} {', '.join(sorted(about))}"
 
 
-def _not_done(decision: RuleDecision, rules: Sequence[Rule]) -> str:
+def _not_done(decision: RuleDecision, rules: Sequence[Rule], failure: str) -> str:
+    if decision.decision == "failed":
+        again = f"; next try in {decision.wait_ns / 1e9:.2f} s if still needed"
+        return f"{decision.act} failed: {failure or decision.why}{again}"
     if not decision.why:
         return "what it is about does not run: watching again once it does"
     why = decision.why

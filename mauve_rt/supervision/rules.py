@@ -110,7 +110,7 @@ class RulesFile:
             seen.add(rule.name)
 
     def _refused(self) -> Iterator[Problem]:
-        """Of conditions whose parameters are each what they may be, but not together; and of reserve actions."""
+        """What may be so each by itself, but not together."""
         for index, rule in enumerate(self.rules.rules):
             if rule.otherwise is not None and rule.where == "supervisor":
                 what = "only an executor has a reserve action: a supervisor's request may not come through"
