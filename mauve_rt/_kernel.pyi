@@ -850,7 +850,7 @@ class SignalSpec:
 
 @final
 class PendingAction:
-    """What an engine wants done now: do, undo or otherwise. cause_ns: since when its condition is as it is."""
+    """What an engine wants done now: do, undo or otherwise. cause_ns: since when its condition is so."""
 
     @property
     def rule(self) -> int: ...

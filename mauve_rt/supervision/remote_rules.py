@@ -38,6 +38,7 @@ class _Flight:
     request: Request
     deadline_ns: int
     outcome: Outcome | None = field(default=None)
+    behind: set[int] = field(default_factory=set)  # rules that were told to wait for it
 
 
 class RemoteRules:
@@ -97,9 +98,11 @@ class RemoteRules:
             return self._due_ns
         self._check_flight(now_ns)
         next_ns = self._engine.step(now_ns)
-        while self._flight is None and (pending := self._engine.pending) is not None:
+        while (pending := self._engine.pending) is not None and self._flight is None:
             self._send(pending, now_ns)
             next_ns = self._engine.step(now_ns)
+        if pending is not None:
+            self._let_wait(pending, now_ns)
         self._tell()
         self._arming.tick(now_ns)
         if self._flight is not None:
@@ -213,6 +216,14 @@ class RemoteRules:
         each.untouched = False
         self._flight = _Flight(each, pending.act, request, now_ns + ANSWER_TIMEOUT_NS)
         self._act(request)
+
+    def _let_wait(self, pending: PendingAction, now_ns: int) -> None:
+        flight = self._flight
+        if flight is None or pending.rule in flight.behind:
+            return
+        flight.behind.add(pending.rule)
+        reason = f"no {pending.act}: the action of rule {flight.each.rule.name} is under way"
+        self._say(self._watched[pending.rule], "suppressed", reason, now_ns)
 
     def _check_flight(self, now_ns: int) -> None:
         flight = self._flight

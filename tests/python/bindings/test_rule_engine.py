@@ -63,7 +63,7 @@ def test_what_cannot_be_so_is_refused() -> None:
         RuleEngine([RuleSpec("r", WhenSpec("silense"))])
     assert "rule r" in str(error.value)
     engine = RuleEngine([RuleSpec("r", _silence())])
-    with pytest.raises(MauveError, match="do or undo"):
+    with pytest.raises(MauveError, match="do, undo or otherwise"):
         engine.set_ready(0, "redo", ready=True)
     with pytest.raises(MauveError, match="stale"):
         engine.ended(0, "do", "well", 0)

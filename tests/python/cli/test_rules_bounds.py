@@ -17,10 +17,10 @@ def parts(out: list[str]) -> dict[str, float]:
     return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out[1:-1])}
 
 
-def loaded(folder: Path, when: str, do: str = SWAP, more: str = "") -> Rule:
+def loaded(folder: Path, when: str, do: str = SWAP, more: str = "", name: str = "one") -> Rule:
     path = folder / "rules"
     path.write_text(
-        f"mauve: 1\nrules:\n  - name: one\n    when: {when}\n    do: [{do}]\n{more}", encoding="utf-8"
+        f"mauve: 1\nrules:\n  - name: {name}\n    when: {when}\n    do: [{do}]\n{more}", encoding="utf-8"
     )
     return RulesFile(path).rules.rules[0]
 
@@ -108,10 +108,8 @@ def test_what_is_told_now_and_then_is_as_old_as_that(tmp_path: Path) -> None:
 
 
 def test_a_rule_of_lower_rank_about_the_same_component_is_called_off(tmp_path: Path) -> None:
-    low, high, wiring = (
-        loaded(tmp_path, QUIET, more=f"    priority: {priority}\n") for priority in (0, 5, 7)
-    )
-    low.name, high.name, wiring.name = "low", "high", "wiring"
+    low = loaded(tmp_path, QUIET, name="low")
+    high = loaded(tmp_path, QUIET, more="    priority: 5\n", name="high")
     alone = bound_of(high, PERIODS_S).known_s
     assert bound_of(low, PERIODS_S, beside=[low, high]).known_s == alone
     beside = bound_of(high, PERIODS_S, beside=[low, high])
@@ -121,8 +119,8 @@ def test_a_rule_of_lower_rank_about_the_same_component_is_called_off(tmp_path: P
 
 def test_rules_that_wire_commit_one_after_the_other(tmp_path: Path) -> None:
     wires = "{kind: disconnect, target: one, name: input}"
-    one, other = (loaded(tmp_path, QUIET, wires.replace("one", target)) for target in ("one", "slow"))
-    one.name, other.name = "first", "second"
+    one = loaded(tmp_path, QUIET, wires, name="first")
+    other = loaded(tmp_path, QUIET, wires.replace("one", "slow"), name="second")
     bound = bound_of(other, PERIODS_S, beside=[one, other])
     assert (bound.parts[-1].what, bound.parts[-1].seconds) == (
         "until first let go of the architecture's structure",
