@@ -40,6 +40,7 @@ bool is_outcome(const Decision& decision) noexcept {
 RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
                        std::map<std::string, std::string> topics)
     : host_(host),
+      clock_(host.clock()),
       engine_(std::move(engine)),
       feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
       trace_number_(host.architecture().trace_number("(rules)")) {
@@ -139,7 +140,7 @@ void RuleRunner::stop() noexcept {
   join_workers();
   follower_.join();
   // What the threads have left, on this one.
-  hear_ends(host_.clock().now_ns());
+  hear_ends(clock_.now_ns());
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     for (Action& action : rules_[i]->acts) action.settle(host_);
     report(i);
@@ -154,7 +155,11 @@ time_ns_t RuleRunner::advance() {
     for (std::size_t i = 0; i < rules_.size(); ++i) prepare(i);
     const time_ns_t next_ns = step();
     bool changed = false;
-    for (std::size_t i = 0; i < rules_.size(); ++i) changed = prepare(i) || changed;
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+      changed = commit(i) || changed;
+      changed = reserve(i) || changed;
+      changed = prepare(i) || changed;
+    }
     if (!look_around() && !changed) {
       tell();
       return next_ns;
@@ -169,13 +174,13 @@ void RuleRunner::run_decisions() noexcept {
     const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before the look
     const time_ns_t next_ns = step();
     if (futex_wait_until(engine_->word(), word, next_ns)) continue;
-    if (host_.clock().now_ns() > later_by(next_ns, kStoodStill))
-      futex_wait_until(ending_, 0, host_.clock().now_ns() + kCatchUp);
+    if (clock_.now_ns() > later_by(next_ns, kStoodStill))
+      futex_wait_until(ending_, 0, clock_.now_ns() + kCatchUp);
   }
 }
 
 time_ns_t RuleRunner::step() noexcept {
-  const time_ns_t now_ns = host_.clock().now_ns();
+  const time_ns_t now_ns = clock_.now_ns();
   hear_ends(now_ns);
   if (!host_.is_deployed()) return kForever;  // its components stop: what is heard of that is no cause to act
   for (std::size_t i = 0; i < rules_.size(); ++i) {
@@ -208,10 +213,6 @@ void RuleRunner::begin(const PendingAction& pending, time_ns_t now_ns) noexcept 
   } else {
     engine_->set_ready(pending.rule, pending.act, false);  // it was a moment ago
   }
-  if (!host_.is_simulated()) return;
-  reserve(pending.rule);
-  commit(pending.rule);
-  hear_ends(now_ns);
 }
 
 void RuleRunner::hear_ends(time_ns_t now_ns) noexcept {
@@ -281,18 +282,21 @@ void RuleRunner::show_status() noexcept {
 
 // ---- the commit thread and the reserve thread of a rule
 
-void RuleRunner::commit(std::size_t index) noexcept {
+/// Whether there was something to commit.
+bool RuleRunner::commit(std::size_t index) noexcept {
   bool was_begun = false;
   for (Action& action : rules_[index]->acts) was_begun = action.commit() || was_begun;
   if (was_begun) engine_->wake();
+  return was_begun;
 }
 
-void RuleRunner::reserve(std::size_t index) noexcept {
+bool RuleRunner::reserve(std::size_t index) noexcept {
   Rule& rule = *rules_[index];
-  if (!rule.reserve.is_begun()) return;
+  if (!rule.reserve.is_begun()) return false;
   deliver(rule, Act::otherwise, {.failure = rule.reserve.carry_out(host_)});
   rule.reserve.end();
   engine_->wake();
+  return true;
 }
 
 // ---- the preparation thread of a rule

@@ -144,8 +144,8 @@ class RuleRunner {
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
   void show_status() MAUVE_RT;
   bool is_unsettled(std::size_t index) const MAUVE_RT;
-  void commit(std::size_t index) noexcept;
-  void reserve(std::size_t index) noexcept;
+  bool commit(std::size_t index) noexcept;
+  bool reserve(std::size_t index) noexcept;
   bool prepare(std::size_t index);
   bool make_ready(Rule& rule);
   void keep(Rule& rule);
@@ -159,6 +159,7 @@ class RuleRunner {
   void end() noexcept;
 
   Host& host_;
+  const Clock& clock_;
   std::unique_ptr<Engine> engine_;
   std::vector<std::unique_ptr<Rule>> rules_;
   Feeds feeds_;
