@@ -130,6 +130,12 @@ class Bridge:
         Raises:
             MauveError: there is no such resource, or it is none to serve.
         """
+    def listen_for_silence(self, resources: set[str]) -> None:
+        """Report arrivals for these resources by a best-effort subscription too, and that there are none.
+
+        Raises:
+            MauveError: the middleware refuses.
+        """
     @overload
     def close(self, numbers: list[int]) -> None:
         """End these; what was written before is sent."""

@@ -111,6 +111,21 @@ class Hosts:
             table = f"table inet loss {{ chain input {{ type filter hook input priority 0; {rule}; }}; }}"
             machine.run("nft", table)
 
+    def take_off_switch(self) -> tuple[list[str], list[str]]:
+        """Leave it to a program of the caller's to carry frames between the machines' cables.
+
+        Returns:
+            What goes before its command line, and the names of the cables' other ends.
+
+        Raises:
+            HostsError: the kernel refuses.
+
+        """
+        ports = [f"port{number}" for number in range(1, len(self._machines) + 1)]
+        for port in ports:
+            self._switch.run("ip", "link", "set", port, "nomaster")
+        return self._switch.wrapper, ports
+
     def connect_ground(self) -> None:
         """Move this process into a network of its own, with a cable to each machine that stays plugged in.
 

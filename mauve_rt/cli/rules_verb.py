@@ -52,14 +52,19 @@ def _check(args: argparse.Namespace) -> int:
     model = load_architecture(args.architecture) if args.architecture else None
     found = [*standing_findings(file, model), *logic_findings(file)]
     periods: Mapping[str, float] = {}
+    warnings: list[Problem] = []
     if model is not None:
         from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
+        from mauve_rt.supervision.silence_limits import limit_warnings  # noqa: PLC0415
 
         refused, periods = rehearsal_problems(file, model)
         found += refused
+        warnings = list(limit_warnings(file, model, periods))
     _print_bounds(file, periods)
     for problem in sorted(found, key=lambda each: (each.line, each.column)):
         _complain(file, problem)
+    for warning in warnings:
+        _complain(file, warning, "warning: ")
     counted = f"{len(file.rules.rules)} rules{_held_against(model)}"
     print(f"{file.path}: {counted}: {f'{len(found)} findings' if found else 'no error found'}")
     return REFUSED if found else OK
@@ -69,8 +74,8 @@ def _held_against(model: "ArchitectureModel | None") -> str:
     return f", held against {model.path}" if model is not None else ""
 
 
-def _complain(file: "RulesFile", problem: Problem) -> None:
-    print(f"{file.path}:{problem.line}:{problem.column}: {problem.text()}", file=sys.stderr)
+def _complain(file: "RulesFile", problem: Problem, kind: str = "") -> None:
+    print(f"{file.path}:{problem.line}:{problem.column}: {kind}{problem.text()}", file=sys.stderr)
 
 
 def _print_bounds(file: "RulesFile", periods: Mapping[str, float]) -> None:

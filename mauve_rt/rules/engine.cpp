@@ -218,7 +218,7 @@ std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
 }
 
 time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
-  time_ns_t next_ns = life.last.next_ns;
+  time_ns_t next_ns = std::min(life.last.next_ns, life.last.look_ns);
   const auto look_at = [&](time_ns_t instant_ns) {
     if (instant_ns > now_ns) next_ns = std::min(next_ns, instant_ns);
   };

@@ -16,9 +16,6 @@ namespace {
 
 constexpr int kPriority = 97;  // above components, below who conducts changes and who watches
 constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
-// A machine or a process that stood still finds its timers due and its messages waiting alike: those come first.
-constexpr time_ns_t kStoodStill = ms_to_ns(50);
-constexpr time_ns_t kCatchUp = ms_to_ns(20);
 
 // What the follower found of a rule.
 constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
@@ -173,9 +170,7 @@ void RuleRunner::run_decisions() noexcept {
   while (ending_.load(std::memory_order_acquire) == 0) {
     const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before the look
     const time_ns_t next_ns = step();
-    if (futex_wait_until(engine_->word(), word, next_ns)) continue;
-    if (clock_.now_ns() > later_by(next_ns, kStoodStill))
-      futex_wait_until(ending_, 0, clock_.now_ns() + kCatchUp);
+    futex_wait_until(engine_->word(), word, next_ns);
   }
 }
 

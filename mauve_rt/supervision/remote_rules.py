@@ -24,10 +24,6 @@ from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import ViewSignals
 
 ACTS = ("do", "undo")
-# A process that did not get the processor for so long finds its timer due and its messages waiting alike:
-# those come first.
-_STOOD_STILL_NS = 50_000_000
-_CATCH_UP_NS = 20_000_000
 _LEFT = "the executor runs it itself: left to it while it does"
 
 
@@ -93,9 +89,6 @@ class RemoteRules:
     def tick(self, now_ns: int) -> int:
         """Decide and act on what is due; when to do it again at the latest."""
         self._word = self._engine.word()
-        if self._due_ns is not None and now_ns > self._due_ns + _STOOD_STILL_NS:
-            self._due_ns = now_ns + _CATCH_UP_NS
-            return self._due_ns
         self._check_flight(now_ns)
         next_ns = self._engine.step(now_ns)
         while (pending := self._engine.pending) is not None and self._flight is None:

@@ -85,7 +85,10 @@ class World:
     def run(self, seconds: float) -> None:
         end_s = self.now_s + seconds - TICK_S / 2
         while self.now_s < end_s:
-            self.now_s += TICK_S
+            next_s = self.now_s + TICK_S
+            while (due_s := self.engine.tick(self.now_ns) / 1e9) < next_s:
+                self.now_s = due_s
+            self.now_s = next_s
             if self.talking and self.now_s - self._last_word_s >= 0.2:
                 self._last_word_s = self.now_s
                 self.hear()

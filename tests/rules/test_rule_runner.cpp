@@ -530,6 +530,48 @@ TYPED_TEST(RuleRunnerTest, HearsAValueAndItsComingBack) {
   EXPECT_EQ("t/Core", this->present());
 }
 
+TYPED_TEST(RuleRunnerTest, HearsArrivalsThatAreNotWrittenYet) {
+  this->add_rule(silent());
+  this->deploy();
+  this->begin();
+  this->see("done");
+  this->beat.arrived(1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, SilenceIsProvenAsFarAsWhoReceivesHasCaughtUp) {
+  this->add_rule(silent());
+  this->deploy();
+  this->make();
+  this->beat.caught_up(this->host().now_ns());
+  this->runner->start();
+  this->live(ms_to_ns(200));
+  EXPECT_THAT(this->words, ElementsAre("armed"));
+  this->beat.caught_up(this->host().now_ns());
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+/// A value that was beyond its bound between two looks only.
+TYPED_TEST(RuleRunnerTest, HearsEveryPulse) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->begin();
+  const auto pulse = [this] {
+    for (const double value : {2.0, 4.0, 2.0}) this->beat.write.write({.value = value}, 1);
+  };
+  this->await_ready();
+  pulse();
+  this->see("done", 2);
+  EXPECT_EQ("t/Core", this->present());
+  for (int i = 1; i < 20; ++i) {  // acted on or not: what is to be done may not be ready again
+    pulse();
+    this->see("condition_false");
+  }
+  EXPECT_EQ(20, std::count(this->words.begin(), this->words.end(), "condition_true"));
+}
+
 TYPED_TEST(RuleRunnerTest, HearsThatTheNodeIsSilent) {
   this->add_rule(leaf("node_silent", {{"longer_than_s", 2.0}}));
   this->deploy();

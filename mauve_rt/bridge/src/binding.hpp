@@ -84,6 +84,9 @@ class Binding {
   virtual bool send() { return false; }
   /// What its receivers wait for. [non-rt]
   virtual std::vector<Arrival*> arrivals(Lane /*lane*/) { return {}; }
+  /// Whether rules listen for the silence of its resource: then it reports arrivals as early as it can, and that
+  /// there are none. Its receivers are stopped. [non-rt] Throws Error when rcl refuses.
+  virtual void listen_for_silence(bool /*on*/) {}
   virtual void report(BridgeReport& report) const = 0;
 
  protected:

@@ -41,6 +41,7 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
     for (const std::size_t number : numbers) {
       Binding& binding = *bindings_.at(number);
       binding.attach(architecture_.hold_resource(binding.resource_name()));
+      binding.listen_for_silence(silent_.contains(binding.resource_name()));
     }
   } catch (...) {
     start_receivers();
@@ -48,6 +49,21 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
   }
   start_receivers();
   architecture_.publications().notify();  // of what was written before
+}
+
+void Bridge::listen_for_silence(std::set<std::string> resources) {
+  silent_ = std::move(resources);
+  stop_receivers();
+  try {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [number, binding] : bindings_) {
+      if (binding->is_attached()) binding->listen_for_silence(silent_.contains(binding->resource_name()));
+    }
+  } catch (...) {
+    start_receivers();
+    throw;
+  }
+  start_receivers();
 }
 
 void Bridge::close(const std::vector<std::size_t>& numbers) {

@@ -5,6 +5,8 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
@@ -46,6 +48,8 @@ class Bridge {
 
   /// These serve the resources of their names from now on. [non-rt] Throws Error when one is none to serve.
   void attach(const std::vector<std::size_t>& numbers);
+  /// Rules listen for the silence of these resources, and of no others. [non-rt] Throws Error when rcl refuses.
+  void listen_for_silence(std::set<std::string> resources);
   /// These end; what was written before is sent. [non-rt]
   void close(const std::vector<std::size_t>& numbers);
 
@@ -75,6 +79,7 @@ class Bridge {
   PiMutex mutex_;
   std::map<std::size_t, std::unique_ptr<Binding>> bindings_;
   std::size_t opened_{0};
+  std::set<std::string> silent_;  // resources whose silence rules listen for
   Receiver messages_{node_, "topics_in"};
   Receiver requests_{node_, "requests_in"};  // the resource's own code runs here
   Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap

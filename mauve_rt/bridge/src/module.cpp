@@ -119,6 +119,7 @@ PYBIND11_MODULE(_bridge, module) {
       .def("attach", &Bridge::attach, py::arg("numbers"), Unlocked())
       .def("close", py::overload_cast<const std::vector<std::size_t>&>(&Bridge::close), py::arg("numbers"),
            Unlocked())
+      .def("listen_for_silence", &Bridge::listen_for_silence, py::arg("resources"), Unlocked())
       .def("start", &Bridge::start)
       .def("stop", &Bridge::stop, Unlocked())
       .def("close", py::overload_cast<>(&Bridge::close), Unlocked())

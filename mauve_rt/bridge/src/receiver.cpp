@@ -8,6 +8,12 @@
 
 namespace mauve::bridge {
 
+namespace {
+
+constexpr time_ns_t kIdleEvery = ms_to_ns(5);  // rules tell silence from a receiver that is late by it
+
+}  // namespace
+
 Receiver::Receiver(const rcl_node_t& node, const char* name) : context_(*node.context), name_(name) {
   check(rcl_guard_condition_init(&wake_, &context_, rcl_guard_condition_get_default_options()),
         "the bridge cannot receive", "guard condition");
@@ -39,19 +45,32 @@ void Receiver::run() {
     rcl_reset_error();
     return;
   }
-  while (!ending_.load(std::memory_order_acquire) && wait(set)) {
+  for (;;) {
+    const time_ns_t waited_ns = monotonic_now_ns();  // before the middleware looks
+    if (ending_.load(std::memory_order_acquire) || !wait(set)) break;
     for (Arrival* arrival : arrivals_) {
-      if (arrival->has_arrived(set)) arrival->take();
+      if (arrival->has_arrived(set)) {
+        arrival->take();
+      } else if (arrival->wants_idle()) {
+        arrival->idle(waited_ns);
+      }
     }
   }
   if (rcl_wait_set_fini(&set) != RCL_RET_OK) rcl_reset_error();
+}
+
+time_ns_t Receiver::longest_wait_ns() const {
+  for (const Arrival* arrival : arrivals_) {
+    if (arrival->wants_idle()) return kIdleEvery;
+  }
+  return -1;  // for ever
 }
 
 bool Receiver::wait(rcl_wait_set_t& set) {
   if (rcl_wait_set_clear(&set) != RCL_RET_OK) return false;
   if (rcl_wait_set_add_guard_condition(&set, &wake_, nullptr) != RCL_RET_OK) return false;
   for (Arrival* arrival : arrivals_) arrival->join(set);
-  const rcl_ret_t outcome = rcl_wait(&set, -1);
+  const rcl_ret_t outcome = rcl_wait(&set, longest_wait_ns());
   if (outcome != RCL_RET_OK) rcl_reset_error();
   return outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT;  // else the context was shut down
 }

@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include "mauve_rt/base/time.hpp"
+
 namespace mauve::bridge {
 
 /// Something of rcl that a wait set can wait for.
@@ -25,6 +27,10 @@ class Arrival {
   virtual bool has_arrived(const rcl_wait_set_t& set) const = 0;
   /// Takes all that arrived. [non-rt]
   virtual void take() = 0;
+  /// Whether it wants to know, every few ms, that nothing waits. [non-rt]
+  virtual bool wants_idle() const { return false; }
+  /// Nothing that had arrived by then waits. [non-rt]
+  virtual void idle(time_ns_t /*until_ns*/) {}
 };
 
 /// Waits on a thread of its own while it runs.
@@ -49,6 +55,7 @@ class Receiver {
  private:
   void run();
   bool wait(rcl_wait_set_t& set);
+  time_ns_t longest_wait_ns() const;
 
   rcl_context_t& context_;
   const char* name_;

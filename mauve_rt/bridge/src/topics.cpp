@@ -70,9 +70,33 @@ bool OutgoingTopic::send() {
   return true;
 }
 
+ArrivalTwin::ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, Resource& resource)
+    : resource_(resource), subscription_(node, rcl_get_zero_initialized_subscription()) {
+  rcl_subscription_options_t options = rcl_subscription_get_default_options();
+  options.qos = rmw_qos_profile_sensor_data;
+  options.qos.depth = 1;
+  check(rcl_subscription_init(subscription_.get(), &node, &message_type_support(settings.type),
+                              settings.name.c_str(), &options),
+        "arrivals of the topic cannot be subscribed to", described(settings));
+}
+
+void ArrivalTwin::join(rcl_wait_set_t& set) {
+  if (rcl_wait_set_add_subscription(&set, subscription_.get(), &place_) != RCL_RET_OK) rcl_reset_error();
+}
+
+void ArrivalTwin::take() {
+  rmw_message_info_t about = rmw_get_zero_initialized_message_info();
+  for (int taken = 0; taken < kMessagesAtOnce; ++taken) {
+    if (!went_well(rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr))) return;
+    resource_.arrived(monotonic_now_ns());
+  }
+}
+
 IncomingTopic::IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number,
                              TopicLog& log)
     : BoundTopic(settings.resource, number, log),
+      node_(node),
+      settings_(settings),
       subscription_(node, rcl_get_zero_initialized_subscription()) {
   rcl_subscription_options_t options = rcl_subscription_get_default_options();
   options.qos = settings.qos;
@@ -83,7 +107,21 @@ IncomingTopic::IncomingTopic(rcl_node_t& node, const TopicSettings& settings, st
 }
 
 std::vector<Arrival*> IncomingTopic::arrivals(Lane lane) {
-  return lane == Lane::messages ? std::vector<Arrival*>{this} : BoundTopic::arrivals(lane);
+  if (lane != Lane::messages) return BoundTopic::arrivals(lane);
+  std::vector<Arrival*> all{this};
+  if (twin_ != nullptr) all.push_back(twin_.get());
+  return all;
+}
+
+void IncomingTopic::listen_for_silence(bool on) {
+  if (on == listens_) return;
+  if (on && settings_.qos.reliability != RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT)
+    twin_ = std::make_unique<ArrivalTwin>(node_, settings_, resource());
+  if (!on) {
+    twin_.reset();
+    resource().caught_up(kForever);
+  }
+  listens_ = on;
 }
 
 void IncomingTopic::join(rcl_wait_set_t& set) {

@@ -5,6 +5,7 @@
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
 
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -66,6 +67,26 @@ class OutgoingTopic final : public BoundTopic {
   TopicEvents events_;  // end before the entity that they are of
 };
 
+/// A subscription that only reports arrivals: best effort, so that a lost message holds up no later one until it is
+/// repaired. Taken from by the receiver's thread.
+class ArrivalTwin final : public Arrival {
+ public:
+  /// The resource outlives it. Throws Error as IncomingTopic. [non-rt]
+  ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, Resource& resource);
+
+ private:
+  void join(rcl_wait_set_t& set) override;
+  bool has_arrived(const rcl_wait_set_t& set) const override { return set.subscriptions[place_] != nullptr; }
+  void take() override;
+  bool wants_idle() const override { return true; }
+  void idle(time_ns_t until_ns) override { resource_.caught_up(until_ns); }
+
+  Resource& resource_;
+  Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
+  OwnedMessage message_;
+  std::size_t place_{0};  // in the wait set
+};
+
 /// Writes to a resource what is published. Taken from by the receiver's thread.
 class IncomingTopic final : public BoundTopic, private Arrival {
  public:
@@ -73,16 +94,23 @@ class IncomingTopic final : public BoundTopic, private Arrival {
   IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number, TopicLog& log);
 
   std::vector<Arrival*> arrivals(Lane lane) override;
+  void listen_for_silence(bool on) override;
 
  private:
   void join(rcl_wait_set_t& set) override;
   bool has_arrived(const rcl_wait_set_t& set) const override;
   void take() override;
+  bool wants_idle() const override { return listens_ && twin_ == nullptr; }
+  void idle(time_ns_t until_ns) override { resource().caught_up(until_ns); }
   std::string full_name() const override { return rcl_subscription_get_topic_name(subscription_.get()); }
   const TopicEvents& events() const override { return events_; }
 
+  rcl_node_t& node_;
+  const TopicSettings settings_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;
+  std::unique_ptr<ArrivalTwin> twin_;  // while rules listen for silence, of a reliable subscription
+  bool listens_{false};
   std::size_t place_{0};  // in the wait set
   TopicEvents events_;    // end before the entity that they are of
 };

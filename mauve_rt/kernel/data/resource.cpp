@@ -60,9 +60,9 @@ void EventListeners::replace(EventListener& listener, EventListener& by) noexcep
   if (place != listeners_.end()) *place = &by;
 }
 
-void EventListeners::call_all(time_ns_t time_ns) noexcept {
+void EventListeners::call_all(Call what, time_ns_t time_ns) noexcept {
   const std::lock_guard lock(mutex_);
-  for (EventListener* const listener : listeners_) listener->on_event(time_ns);
+  for (EventListener* const listener : listeners_) (listener->*what)(time_ns);
 }
 
 void Resource::bind_input() {

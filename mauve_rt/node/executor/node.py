@@ -66,6 +66,7 @@ class ExecutorNode(LifecycleNode):
             self,
             runtime,
             topics=self._bound.heard,
+            listen=self._bound.listen_for_silence,
             publish=self._state.send,
             event=self._state.event,
             follow=self._properties.follow,

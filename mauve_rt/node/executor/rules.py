@@ -1,7 +1,7 @@
 """The rules that an executor runs itself, natively. Python only tells what they decided."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,7 @@ class OwnRules:
         runtime: Runtime,
         *,
         topics: Callable[[], dict[str, str]],
+        listen: Callable[[set[str]], None],
         publish: Callable[[Any, str, Any, QoSProfile], None],
         event: Callable[[Request, Outcome], None],
         follow: Callable[[], None],
@@ -48,11 +49,14 @@ class OwnRules:
     ) -> None:
         """`topics`: those that resources are bound to; `publish` sends and records a message.
 
+        `listen` is told the resources whose silence rules wait for.
+
         `event` tells of what was done; `follow` lets parameters follow it.
         """
         self._node = node
         self._runtime = runtime
         self._topics = topics
+        self._listen = listen
         self._publish = publish
         self._event = event
         self._follow = follow
@@ -138,6 +142,7 @@ class OwnRules:
     def _begin(self, loaded: "LoadedRules") -> None:
         topics = self._topics_of(loaded.rules)
         runner = loaded.runner(self._runtime.host, topics)
+        self._listen(_silent(loaded.rules, topics))
         runner.start()
         self._runner, self._at_work = runner, [rule.name for rule in loaded.rules]
         self._ending.clear()
@@ -150,6 +155,7 @@ class OwnRules:
         if runner is None:
             return
         runner.stop()
+        self._listen(set())
         self._ending.set()
         runner.wake()
         if self._thread is not None:
@@ -219,6 +225,12 @@ class OwnRules:
         past_ns = monotonic_ns() - monotonic
         now = clock.now()
         return type(now)(nanoseconds=now.nanoseconds - past_ns, clock_type=now.clock_type).to_msg()
+
+
+def _silent(rules: Sequence["Rule"], topics: Mapping[str, str]) -> set[str]:
+    """The resources whose silence rules wait for."""
+    silences = [leaf.parameters for rule in rules for leaf in rule.when.leaves() if leaf.kind == "silence"]
+    return {str(one.get("resource") or topics.get(str(one.get("topic")), "")) for one in silences} - {""}
 
 
 def load_reply(rules: OwnRules, path: str) -> tuple[Code, str]:

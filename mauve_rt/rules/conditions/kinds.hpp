@@ -77,10 +77,56 @@ inline const ParameterSpec kMessageType{.name = "type", .type = "message_type"};
 inline const ParameterSpec kResource{.name = "resource", .type = "resource"};
 inline const ParameterSpec kComponent{.name = "component", .type = "component", .required = true};
 
+/// Tells silence from an engine that stood still (a stall, a stopped process, a suspended machine): such an engine finds its
+/// instant due and the reports waiting alike. Nothing is proven before the engine has looked for a while without a break,
+/// but no longer than the silence is to be.
+///
+/// So the looks begin that long before the instant that counts: without a stall the proof costs no time.
+class Calm {
+ public:
+  static constexpr time_ns_t kUsual =
+      ms_to_ns(50);  // in which threads that were stopped with this one go on, too
+
+  explicit Calm(time_ns_t longest_ns = kUsual) : longest_ns_(longest_ns) {}
+  /// [rt]
+  void arm(time_ns_t now_ns) MAUVE_RT {
+    since_ns_ = looked_ns_ = now_ns;
+    doubts_ = 0;
+  }
+  /// Once a look; `silence_ns`: how long it is to be. [rt]
+  void look(time_ns_t now_ns, time_ns_t silence_ns) MAUVE_RT;
+  /// Whether what was not reported by an instant that is over did not happen. `reported_ns`: up to when all of it was
+  /// reported. Where breaks never end, doubts do. [rt]
+  bool proves(time_ns_t due_ns, time_ns_t reported_ns) MAUVE_RT;
+  /// When the silence until `due_ns` can be proven at the earliest, and when to look again for that. [rt]
+  time_ns_t next_ns(time_ns_t due_ns) const MAUVE_RT {
+    return looked_ns_ > due_ns ? looked_ns_ + step_ns() : later_by(due_ns, 1);
+  }
+  time_ns_t look_ns(time_ns_t due_ns) const MAUVE_RT {
+    return due_ns - looked_ns_ > step_ns() ? std::max(due_ns - calm_ns_, looked_ns_ + step_ns()) : kForever;
+  }
+
+ private:
+  static constexpr int kMostDoubts = 100;
+  static constexpr time_ns_t kBreak = ms_to_ns(15);
+  time_ns_t step_ns() const MAUVE_RT { return std::max<time_ns_t>(calm_ns_ / 10, 1); }
+  time_ns_t break_ns() const MAUVE_RT {
+    return std::max(kBreak, 3 * step_ns());
+  }  // longer without a look is one
+
+  const time_ns_t longest_ns_;
+  time_ns_t calm_ns_{0};
+  time_ns_t looked_ns_{0};
+  time_ns_t since_ns_{0};    // it has looked without a break
+  int doubts_{0};            // steps
+  time_ns_t doubted_ns_{0};  // the last one
+};
+
 /// Holds while nothing was told for longer than a time; before a first time, from arming on.
 class Age final : public Condition {
  public:
-  Age(Signal& signal, time_ns_t longer_than_ns) : signal_(signal), longer_than_ns_(longer_than_ns) {}
+  Age(Signal& signal, time_ns_t longer_than_ns, time_ns_t calm_ns = Calm::kUsual)
+      : signal_(signal), longer_than_ns_(longer_than_ns), calm_(calm_ns) {}
   void arm(time_ns_t now_ns) noexcept override;
   void assume() noexcept override;
   Look look(time_ns_t now_ns) noexcept override;
@@ -88,6 +134,7 @@ class Age final : public Condition {
  private:
   Signal& signal_;
   const time_ns_t longer_than_ns_;
+  Calm calm_;
   time_ns_t armed_ns_{0};
   std::uint64_t armed_count_{0};
   bool assumed_{false};
@@ -95,34 +142,68 @@ class Age final : public Condition {
   time_ns_t since_ns_{0};
 };
 
+/// Which side of its bounds a signal is on. Each look takes one crossing: a value that was beyond a bound between two looks
+/// makes one look of its own, and the next look follows at once. Of many pulses between two looks one is seen.
+class Side {
+ public:
+  /// [setup]
+  Side(Signal& signal, Signal::Bounds inner, Signal::Bounds outer, bool begins_outside)
+      : signal_(signal), begins_outside_(begins_outside), is_outside_(begins_outside) {
+    signal_.count_crossings(inner, outer, begins_outside);
+  }
+  /// Only the crossing to where it is now counts of those that were before. [rt]
+  void arm(time_ns_t now_ns) MAUVE_RT;
+  /// Takes the next crossing; false: there is none. [rt]
+  bool cross() MAUVE_RT;
+  /// Whether there is another one to take. [rt]
+  bool crosses_again() const MAUVE_RT { return newest() != seen_; }
+
+  bool is_outside() const MAUVE_RT { return is_outside_; }
+  time_ns_t since_ns() const MAUVE_RT { return since_ns_; }
+  double value() const MAUVE_RT { return value_; }  // of the last crossing that was taken
+
+ private:
+  std::uint64_t newest() const MAUVE_RT { return std::max(signal_.entered().count, signal_.left().count); }
+
+  Signal& signal_;
+  const bool begins_outside_;
+  bool is_outside_;
+  std::uint64_t seen_{0};  // crossings
+  time_ns_t since_ns_{0};
+  double value_{0.0};
+};
+
 /// Holds while the value told last is in a range, or outside of it; not before a first one.
 class Range final : public Condition {
  public:
   /// It begins to hold outside [low, high], and ends within what is left of that without `hysteresis` on either side.
   Range(Signal& signal, double low, double high, double hysteresis = 0.0)
-      : signal_(signal), low_(low), high_(high), hysteresis_(hysteresis) {}
-  void arm(time_ns_t now_ns) noexcept override;
+      : signal_(signal),
+        low_(low),
+        high_(high),
+        hysteresis_(hysteresis),
+        side_(signal, {.low = low + hysteresis, .high = high - hysteresis}, {.low = low, .high = high},
+              false) {}
+  void arm(time_ns_t now_ns) noexcept override { side_.arm(now_ns); }
   Look look(time_ns_t now_ns) noexcept override;
 
  private:
   Signal& signal_;
   const double low_, high_, hysteresis_;
-  bool holds_{false};
-  time_ns_t since_ns_{0};
+  Side side_;
 };
 
 /// Holds while the value told last is this one.
 class Equal final : public Condition {
  public:
-  Equal(Signal& signal, double value) : signal_(signal), value_(value) {}
-  void arm(time_ns_t now_ns) noexcept override;
+  Equal(Signal& signal, double value)
+      : signal_(signal), side_(signal, {.low = value, .high = value}, {.low = value, .high = value}, true) {}
+  void arm(time_ns_t now_ns) noexcept override { side_.arm(now_ns); }
   Look look(time_ns_t now_ns) noexcept override;
 
  private:
   Signal& signal_;
-  const double value_;
-  bool holds_{false};
-  time_ns_t since_ns_{0};
+  Side side_;
 };
 
 /// Holds while a count has grown by so many within the last so long; what happened before arming does not count.

@@ -12,8 +12,10 @@ class NoRelease final : public Condition {
   void arm(time_ns_t now_ns) noexcept override {
     armed_ns_ = since_ns_ = now_ns;
     holds_ = false;
+    calm_.arm(now_ns);
   }
   Look look(time_ns_t now_ns) noexcept override {
+    const bool held = holds_;
     for (;;) {
       const Signal::Last last = signal_.last();
       if (last.count == 0) {
@@ -21,15 +23,18 @@ class NoRelease final : public Condition {
         continue;
       }
       const time_ns_t from_ns = std::max(armed_ns_, last.time_ns);
-      const time_ns_t due_ns = later_by(from_ns, nanoseconds(periods_ * last.value));
-      const bool holds = now_ns > due_ns;
+      const time_ns_t longest_ns = nanoseconds(periods_ * last.value);
+      const time_ns_t due_ns = later_by(from_ns, longest_ns);
+      calm_.look(now_ns, longest_ns);
+      const bool holds = now_ns > due_ns && (held || calm_.proves(due_ns, kForever));
       if (holds != holds_) since_ns_ = std::max(since_ns_, holds ? due_ns : from_ns);
       holds_ = holds;
       const double edge = holds ? kInfinity : -kInfinity;  // while it does not hold every release is quiet
       if (!signal_.listen(edge, -edge, last)) continue;
       return {.holds = holds,
               .since_ns = since_ns_,
-              .next_ns = holds ? kForever : later_by(due_ns, 1),
+              .next_ns = holds ? kForever : calm_.next_ns(due_ns),
+              .look_ns = holds ? kForever : calm_.look_ns(due_ns),
               .measured = static_cast<double>(now_ns - from_ns) * 1e-9};
     }
   }
@@ -37,6 +42,7 @@ class NoRelease final : public Condition {
  private:
   Signal& signal_;
   const double periods_;
+  Calm calm_;
   time_ns_t armed_ns_{0};
   time_ns_t since_ns_{0};
   bool holds_{false};

@@ -3,6 +3,12 @@
 
 namespace mauve::rules {
 
+namespace {
+
+constexpr time_ns_t kPythonCalm = ms_to_ns(500);  // Python takes longer to go on than threads of C++
+
+}  // namespace
+
 ConditionKind node_silent_kind() {
   return {
       .name = "node_silent",
@@ -11,7 +17,8 @@ ConditionKind node_silent_kind() {
       .hears = [](const Parameters& /*told*/) { return std::vector{SignalSpec{SignalKind::node}}; },
       .make = [](const Parameters& parameters,
                  std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
-        return std::make_unique<Age>(*signals[0], nanoseconds(told<double>(parameters, "longer_than_s")));
+        return std::make_unique<Age>(*signals[0], nanoseconds(told<double>(parameters, "longer_than_s")),
+                                     kPythonCalm);
       }};
 }
 

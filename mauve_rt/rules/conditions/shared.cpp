@@ -20,44 +20,87 @@ Look look_and_listen(Signal& signal, Answer&& answer) noexcept {
 
 }  // namespace
 
+void Calm::look(time_ns_t now_ns, time_ns_t silence_ns) noexcept {
+  calm_ns_ = std::min(longest_ns_, silence_ns);
+  if (now_ns - looked_ns_ > break_ns()) since_ns_ = now_ns;
+  looked_ns_ = now_ns;
+}
+
+bool Calm::proves(time_ns_t due_ns, time_ns_t reported_ns) noexcept {
+  const bool is_calm = looked_ns_ - since_ns_ >= calm_ns_ && later_by(reported_ns, break_ns()) > due_ns;
+  if (is_calm || doubts_ == kMostDoubts) {
+    doubts_ = 0;
+    return true;
+  }
+  if (doubts_ == 0 || looked_ns_ - doubted_ns_ >= step_ns()) {  // others may look more often
+    ++doubts_;
+    doubted_ns_ = looked_ns_;
+  }
+  return false;
+}
+
 void Age::arm(time_ns_t now_ns) noexcept {
   armed_ns_ = since_ns_ = now_ns;
   armed_count_ = signal_.last().count;
   assumed_ = holds_ = false;
+  calm_.arm(now_ns);
 }
 
 void Age::assume() noexcept { assumed_ = true; }
 
 Look Age::look(time_ns_t now_ns) noexcept {
+  const bool held = holds_;
+  calm_.look(now_ns, longer_than_ns_);
+  const time_ns_t reported_ns = signal_.reported_until();  // before the last report is looked at
   return look_and_listen(signal_, [&](const Signal::Last& last, double& low, double& high) noexcept {
     const bool is_heard = last.count != armed_count_;
     const time_ns_t from_ns = is_heard ? std::max(last.time_ns, armed_ns_) : armed_ns_;
     const time_ns_t due_ns = later_by(from_ns, longer_than_ns_);
-    const bool holds = now_ns > due_ns || (assumed_ && !is_heard);
+    const bool is_assumed = assumed_ && !is_heard;
+    const bool holds = is_assumed || (now_ns > due_ns && (held || calm_.proves(due_ns, reported_ns)));
     if (holds != holds_) since_ns_ = std::max(since_ns_, holds ? std::min(now_ns, due_ns) : from_ns);
     holds_ = holds;
     if (!holds) std::swap(low, high);  // whatever comes, it is looked at when it is time
     return Look{.holds = holds,
                 .since_ns = since_ns_,
-                .next_ns = holds ? kForever : later_by(due_ns, 1),
+                .next_ns = holds ? kForever : calm_.next_ns(due_ns),
+                .look_ns = holds ? kForever : calm_.look_ns(due_ns),
                 .measured = static_cast<double>(now_ns - from_ns) * 1e-9,
                 .sample_ns = holds ? from_ns : since_ns_};
   });
 }
 
-void Range::arm(time_ns_t now_ns) noexcept {
-  holds_ = false;
+void Side::arm(time_ns_t now_ns) noexcept {
+  seen_ = newest();
+  is_outside_ = begins_outside_;
+  if (seen_ % 2 != 0) --seen_;  // it is on the other side now
   since_ns_ = now_ns;
+  value_ = signal_.last().value;
 }
 
-Look Range::look(time_ns_t /*now_ns*/) noexcept {
+bool Side::cross() noexcept {
+  const Signal::Last entered = signal_.entered();
+  const Signal::Last left = signal_.left();
+  const std::uint64_t unseen = std::max(entered.count, left.count) - seen_;
+  if (unseen == 0) return false;
+  if (unseen > 3) seen_ += (unseen - 2) / 2 * 2;  // two or three are left: one pulse, and where it is now
+  ++seen_;
+  is_outside_ = !is_outside_;
+  const Signal::Last& here = is_outside_ ? left : entered;
+  const Signal::Last& there = is_outside_ ? entered : left;
+  // Of the first of three crossings only that it was before the second is known.
+  const time_ns_t time_ns = here.count == seen_ ? here.time_ns : std::min(here.time_ns, there.time_ns);
+  since_ns_ = std::max(since_ns_, time_ns);
+  value_ = here.value;
+  return true;
+}
+
+Look Range::look(time_ns_t now_ns) noexcept {
+  bool crossed = false;
   return look_and_listen(signal_, [&](const Signal::Last& last, double& low, double& high) noexcept {
-    if (last.count == 0) return Look{.since_ns = since_ns_};
-    const double margin = holds_ ? hysteresis_ : 0.0;
-    const bool holds = !(last.value >= low_ + margin && last.value <= high_ - margin);  // a NaN is nowhere
-    if (holds != holds_) since_ns_ = std::max(since_ns_, last.time_ns);
-    holds_ = holds;
-    if (!holds) {
+    crossed = crossed || side_.cross();
+    const bool again = side_.crosses_again();
+    if (!side_.is_outside()) {
       low = low_;
       high = high_;
     } else if (last.value > high_ - hysteresis_) {
@@ -67,22 +110,23 @@ Look Range::look(time_ns_t /*now_ns*/) noexcept {
       low = -kInfinity;
       high = std::nextafter(low_ + hysteresis_, -kInfinity);
     }
-    return Look{.holds = holds, .since_ns = since_ns_, .measured = last.value};
+    return Look{.holds = side_.is_outside(),
+                .since_ns = side_.since_ns(),
+                .next_ns = again ? later_by(now_ns, 1) : kForever,
+                .measured = again ? side_.value() : last.value};
   });
 }
 
-void Equal::arm(time_ns_t now_ns) noexcept {
-  holds_ = false;
-  since_ns_ = now_ns;
-}
-
-Look Equal::look(time_ns_t /*now_ns*/) noexcept {
+Look Equal::look(time_ns_t now_ns) noexcept {
+  bool crossed = false;
   return look_and_listen(signal_, [&](const Signal::Last& last, double& low, double& high) noexcept {
-    const bool holds = last.count != 0 && last.value == value_;
-    if (holds != holds_) since_ns_ = std::max(since_ns_, last.time_ns);
-    holds_ = holds;
+    crossed = crossed || side_.cross();
+    const bool again = side_.crosses_again();
     if (last.count != 0) low = high = last.value;
-    return Look{.holds = holds, .since_ns = since_ns_, .measured = last.value};
+    return Look{.holds = !side_.is_outside(),
+                .since_ns = side_.since_ns(),
+                .next_ns = again ? later_by(now_ns, 1) : kForever,
+                .measured = again ? side_.value() : last.value};
   });
 }
 

@@ -35,6 +35,7 @@ class AtLeast final : public Condition {
         cause_ns = look.cause_ns();
       }
       answer.next_ns = std::min(answer.next_ns, look.next_ns);
+      answer.look_ns = std::min(answer.look_ns, look.look_ns);
       if (!is_measured) answer.measured = look.measured;  // of the first that holds, or else the last
       is_measured |= look.holds;
     }
@@ -98,7 +99,10 @@ class For final : public Condition {
       if (!is_assumed_) look.since_ns = due_ns;
       return look;
     }
-    return {.since_ns = ended_ns_, .next_ns = std::min(look.next_ns, due_ns), .measured = look.measured};
+    return {.since_ns = ended_ns_,
+            .next_ns = std::min(look.next_ns, due_ns),
+            .look_ns = look.look_ns,
+            .measured = look.measured};
   }
 
  private:
@@ -130,6 +134,7 @@ class Within final : public Condition {
       return {.holds = true,
               .since_ns = since_ns_,
               .next_ns = look.next_ns,
+              .look_ns = look.look_ns,
               .measured = look.measured,
               .sample_ns = cause_ns_};
     }
@@ -138,6 +143,7 @@ class Within final : public Condition {
       return {.holds = true,
               .since_ns = since_ns_,
               .next_ns = std::min(look.next_ns, ends_ns_),
+              .look_ns = look.look_ns,
               .measured = look.measured,
               .sample_ns = cause_ns_};
     }

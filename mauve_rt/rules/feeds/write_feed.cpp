@@ -5,7 +5,7 @@ namespace mauve::rules {
 
 namespace {
 
-/// The writes to a resource, by the clock of who receives them: what a writer says of its time counts for nothing.
+/// The writes to a resource and the messages that have arrived for it, by the clock of who receives them: what a writer says of its time counts for nothing.
 ///
 /// | member    | written by       | read by | under                                        |
 /// | --------- | ---------------- | ------- | -------------------------------------------- |
@@ -33,9 +33,12 @@ class WriteFeed final : public Feed, private EventListener {
 
  private:
   void on_event(time_ns_t /*written_ns*/) noexcept override { signal_.tell(clock_.now_ns(), 0); }
+  void on_arrival(time_ns_t /*arrived_ns*/) noexcept override { signal_.tell(clock_.now_ns(), 0); }
+  void on_caught_up(time_ns_t until_ns) noexcept override { signal_.set_reported_until(until_ns); }
 
   void let_go() noexcept {
     if (resource_ != nullptr) resource_->unlisten(*this);
+    signal_.set_reported_until(kForever);  // nobody writes it now
   }
 
   Architecture& architecture_;

@@ -26,7 +26,7 @@ def test_a_peer_that_never_spoke_is_silent_from_arming_on():
     assert world.said() == ["armed"]
     world.run(0.2)
     assert world.said() == ["armed", "condition_true", "do", "done"]
-    assert world.asked_at_s[0] - 100.0 == pytest.approx(1.1, abs=0.06)
+    assert world.asked_at_s[0] - 100.0 == pytest.approx(1.0, abs=0.06)
     assert world.decisions[1].reason.startswith("nothing on /in for 1.0")
 
 
@@ -475,15 +475,16 @@ def test_changes_are_heard_by_what_the_executor_tells(component: str, changed: s
 
 
 def test_nobody_polls():
-    """Between two things that are heard the rules are looked at once: when silence may be long enough."""
+    """Between two things that are heard the rules are looked at shortly before silence may be long enough."""
     world = started()
     world.run(1.0)
     world.hear()
     looks, due_ns = 0, world.engine.tick(world.now_ns)
     heard_ns = world.now_ns
     while due_ns <= heard_ns + 10**9:
+        assert due_ns >= heard_ns + 10**9 - 50_000_000
         looks, due_ns = looks + 1, world.engine.tick(due_ns)
-    assert looks == 0
+    assert looks <= 11
     assert due_ns == heard_ns + 10**9 + 1
     world.hear()
     assert not world.engine.is_stirred, "a sample in time is of no interest"

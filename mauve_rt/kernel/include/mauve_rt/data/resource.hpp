@@ -52,6 +52,11 @@ class EventListener {
   /// Called on the writer's thread with the writer's time, the data in place, under the listeners' lock.
   /// [rt] Short; writes to and listens to no resource.
   virtual void on_event(time_ns_t time_ns) MAUVE_RT = 0;
+  /// A message for the resource has arrived, by a way that may be earlier than its write; under the same lock.
+  /// [rt] Short, as on_event().
+  virtual void on_arrival(time_ns_t /*time_ns*/) MAUVE_RT {}
+  /// Who writes what arrives has written all that had arrived by then; under the same lock. [rt] Short, as on_event().
+  virtual void on_caught_up(time_ns_t /*until_ns*/) MAUVE_RT {}
 };
 
 /// The listeners of one resource, in the order they came; a write without any costs one load.
@@ -75,15 +80,19 @@ class EventListeners {
   void replace(EventListener& listener, EventListener& by) noexcept;
   /// Calls all. [rt]
   void call(time_ns_t time_ns) MAUVE_RT {
-    if (count_.load(std::memory_order_relaxed) != 0) call_all(time_ns);
+    if (count_.load(std::memory_order_relaxed) != 0) call_all(&EventListener::on_event, time_ns);
   }
+  /// As call(), of the others of EventListener. [rt]
+  void call_arrival(time_ns_t time_ns) MAUVE_RT { call_all(&EventListener::on_arrival, time_ns); }
+  void call_caught_up(time_ns_t until_ns) MAUVE_RT { call_all(&EventListener::on_caught_up, until_ns); }
   /// While who calls this holds it, no listener is called: for what must not be split by a write. [rt] Short.
   PiMutex& mutex() MAUVE_RT { return mutex_; }
 
  private:
   static constexpr std::size_t kFirst = 8;
 
-  void call_all(time_ns_t time_ns) MAUVE_RT;
+  using Call = void (EventListener::*)(time_ns_t) MAUVE_RT;
+  void call_all(Call what, time_ns_t time_ns) MAUVE_RT;
 
   std::mutex change_mutex_;
   PiMutex mutex_;
@@ -148,6 +157,10 @@ class Resource : public Configurable {
   /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
+  /// For who calls write_sample(): a message has arrived by another way, and may be written later, or never. [rt]
+  void arrived(time_ns_t time_ns) MAUVE_RT { listeners_.call_arrival(time_ns); }
+  /// All that had arrived by then was written; kForever: nobody says so any more. [rt]
+  void caught_up(time_ns_t until_ns) MAUVE_RT { listeners_.call_caught_up(until_ns); }
   /// Why write_sample() has just refused this message, in words. [non-rt]
   virtual std::string why_refused(std::span<const std::byte> message) const;
 

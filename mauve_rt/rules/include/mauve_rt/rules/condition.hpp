@@ -22,6 +22,7 @@ struct Look {
   bool holds{false};
   time_ns_t since_ns{0};        // the instant from which on it has been so
   time_ns_t next_ns{kForever};  // the first instant at which it can be otherwise though nothing is told
+  time_ns_t look_ns{kForever};  // when to look again before that, though it is as it is then, too
   double measured{0.0};         // what it looks at: s of silence, a value, how many
   std::optional<time_ns_t> sample_ns{};  // the last sample before a silence; empty: since_ns
 

@@ -42,22 +42,35 @@ struct SignalSpec {
   auto operator<=>(const SignalSpec&) const = default;
 };
 
-/// The last that was told of one thing: when, a value, and how often something was told. One writer at a time; it waits
-/// for nobody, and nobody for it.
+/// Reports of one thing: the last one, and the last crossing of a condition's bounds in each direction. One writer at a
+/// time; the writer waits for nobody, and nobody waits for the writer.
 ///
-/// | member       | written by   | read by          | order                                                            |
-/// | ------------ | ------------ | ---------------- | ---------------------------------------------------------------- |
-/// | count_       | the writer   | anyone           | release/acquire: hands over the place that it counts             |
-/// | places_      | the writer   | anyone           | relaxed: a reader looks at count_ again, after a fence           |
-/// | low_, high_  | the engine   | the writer       | seq_cst with count_: either the writer sees them, or the engine  |
-/// |              |              |                  | sees what it told (Signal::listen)                               |
-/// | word_ (futex)| writers      | the engine       | release/acquire: who sees it changed sees what was told          |
+/// The writer counts the crossings: a value that was beyond a bound between two looks of the engine is not lost.
+///
+/// | member          | written by   | read by    | order                                                             |
+/// | --------------- | ------------ | ---------- | ----------------------------------------------------------------- |
+/// | all_            | the writer   | anyone     | Record's; its count is seq_cst with low_ and high_: either the    |
+/// |                 |              |            | writer sees the bounds, or the engine sees the report (listen)    |
+/// | entered_, left_ | the writer   | the engine | Record's; written before all_: who sees a report in all_ sees     |
+/// |                 |              |            | its crossing                                                      |
+/// | inner_, outer_  | [setup]      | the writer | none: set before the signal is fed                                |
+/// | is_outside_,    | the writer,  | the writer | none                                                              |
+/// | crossings_      | [setup]      |            |                                                                   |
+/// | reported_ns_    | the writer   | the engine | release/acquire: who sees the instant sees what was told before   |
+/// | low_, high_     | the engine   | the writer | seq_cst, as all_                                                  |
+/// | word_ (futex)   | writers      | the engine | release/acquire: who sees it changed sees the report              |
 class Signal {
  public:
   struct Last {
     time_ns_t time_ns{0};
     double value{0.0};
-    std::uint64_t count{0};  // 0: nothing was told yet
+    std::uint64_t count{0};  // its number; 0: nothing was reported yet
+  };
+  /// A NaN is within no bounds.
+  struct Bounds {
+    double low{std::numeric_limits<double>::infinity()};
+    double high{-std::numeric_limits<double>::infinity()};
+    bool contains(double value) const MAUVE_RT { return value >= low && value <= high; }
   };
 
   /// `word` is bumped, and who sleeps on it woken, by what is of interest; it outlives the signal. [setup]
@@ -65,27 +78,66 @@ class Signal {
   Signal(const Signal&) = delete;
   Signal& operator=(const Signal&) = delete;
 
+  /// Counts from now on how often values leave `outer`, and come back into `inner`, which lies within it. Before the
+  /// signal is fed. [setup]
+  void count_crossings(Bounds inner, Bounds outer, bool begins_outside) {
+    inner_ = inner;
+    outer_ = outer;
+    is_outside_ = begins_outside;
+    counts_crossings_ = true;
+  }
+
   /// By the receiver's own clock. One writer at a time. [rt]
   void tell(time_ns_t time_ns, double value = 0.0) MAUVE_RT;
+  /// All that happened until then was told, so far as who tells can know. Not called: told as it happens. [rt]
+  void set_reported_until(time_ns_t until_ns) MAUVE_RT {
+    reported_ns_.store(until_ns, std::memory_order_release);
+  }
+  /// What was told by then last() shows, if it is called after this. [rt]
+  time_ns_t reported_until() const MAUVE_RT { return reported_ns_.load(std::memory_order_acquire); }
   /// [rt]
-  Last last() const MAUVE_RT;
+  Last last() const MAUVE_RT { return all_.read(); }
+  /// The last crossing inwards, and outwards; their counts number all crossings, from 1 on. [rt]
+  Last entered() const MAUVE_RT { return entered_.read(); }
+  Last left() const MAUVE_RT { return left_.read(); }
   /// A value from low to high wakes nobody from now on; anything else does, and a NaN always. False when something else
   /// came since `seen`: look again. [rt], the engine's thread
   bool listen(double low, double high, const Last& seen) MAUVE_RT;
 
  private:
-  struct Place {
-    std::atomic<time_ns_t> time_ns{0};
-    std::atomic<double> value{0.0};
+  void cross(time_ns_t time_ns, double value) MAUVE_RT;
+
+  /// The last report of some. One writer.
+  ///
+  /// | member  | written by | read by | order                                                                      |
+  /// | ------- | ---------- | ------- | -------------------------------------------------------------------------- |
+  /// | count_  | the writer | anyone  | seq_cst, for listen(); hands over the place that it counts                 |
+  /// | places_ | the writer | anyone  | release/acquire: who reads a report of the next round sees the count that  |
+  /// |         |            |         | came before it, and reads again                                            |
+  class Record {
+   public:
+    void write(const Last& report) MAUVE_RT;
+    Last read() const MAUVE_RT;
+    /// How many were written. [rt]
+    std::uint64_t written() const MAUVE_RT { return count_.load(std::memory_order_seq_cst); }
+
+   private:
+    struct Place {
+      std::atomic<time_ns_t> time_ns{0};
+      std::atomic<double> value{0.0};
+      std::atomic<std::uint64_t> count{0};
+    };
+    std::atomic<std::uint64_t> count_{0};
+    Place places_[2];  // NOLINT(modernize-avoid-c-arrays): atomics, which std::array would have to copy
   };
 
-  bool is_quiet(double value, double low, double high) const MAUVE_RT {
-    return value >= low && value <= high;
-  }
-
   std::atomic<std::uint32_t>& word_;
-  std::atomic<std::uint64_t> count_{0};
-  Place places_[2];  // NOLINT(modernize-avoid-c-arrays): atomics, which std::array would have to copy
+  Record all_, entered_, left_;
+  Bounds inner_, outer_;
+  bool counts_crossings_{false};
+  bool is_outside_{false};
+  std::uint64_t crossings_{0};
+  std::atomic<time_ns_t> reported_ns_{kForever};
   std::atomic<double> low_{std::numeric_limits<double>::infinity()};
   std::atomic<double> high_{-std::numeric_limits<double>::infinity()};
 };

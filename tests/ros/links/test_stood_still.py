@@ -1,0 +1,69 @@
+"""An executor that is stopped for a while tells that from silence; silence is found all the same."""
+
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # for listener
+
+from listener import Listener, Talker
+
+LIMIT_S, UNDO_S, PERIOD_S = 0.1, 0.1, 0.02
+LONGEST_S = 14.0
+
+
+@pytest.fixture
+def listener(tmp_path: Path, domain: int) -> Iterator[Listener]:
+    made = Listener(tmp_path, limit_s=LIMIT_S, undo_s=UNDO_S, environment={"ROS_DOMAIN_ID": str(domain)})
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def talker(domain: int) -> Iterator[Talker]:
+    made = Talker(PERIOD_S, environment={"ROS_DOMAIN_ID": str(domain)})
+    yield made
+    made.signal(signal.SIGKILL)
+
+
+def _sleep(talker_stalls: list[float], duration_s: float) -> None:
+    """Sleep, and note how late this process woke up: the talker may have been as late."""
+    due_s = time.monotonic() + duration_s
+    while (left_s := due_s - time.monotonic()) > 0:
+        step_s = min(left_s, 0.01)
+        began_s = time.monotonic()
+        time.sleep(step_s)
+        talker_stalls.append(time.monotonic() - began_s - step_s)
+
+
+def test_a_stop_of_the_executor_is_no_silence(listener: Listener, talker: Talker) -> None:
+    lengths = random.Random(1)  # noqa: S311 - no secret
+    listener.until(listener.is_usual, "the rule to be armed")
+    time.sleep(1.0)
+    listener.until(listener.is_usual, "both to find each other")
+    stalls: list[float] = []
+    stops = false_alarms = 0
+    ends_s = time.monotonic() + LONGEST_S
+    while time.monotonic() < ends_s:
+        before = listener.alarms()
+        stalls.clear()
+        os.kill(listener.process(), signal.SIGSTOP)
+        _sleep(stalls, lengths.choice((0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 2.0)) * lengths.uniform(0.8, 1.2))
+        os.kill(listener.process(), signal.SIGCONT)
+        _sleep(stalls, lengths.uniform(0.15, 0.35))
+        if max(stalls) < LIMIT_S / 4:  # else the talker itself may have been silent: proves nothing
+            stops += 1
+            false_alarms += listener.alarms() - before
+    assert stops > 5, "so it was asked something"
+    assert false_alarms == 0, listener.executor.output
+    before = listener.alarms()
+    talker.signal(signal.SIGSTOP)
+    listener.until(lambda: listener.alarms() > before, "silence that is real")
+    talker.signal(signal.SIGCONT)
+    listener.until(listener.is_usual, "the way back")
