@@ -191,7 +191,7 @@ def test_its_rules_replayed_do_what_they_did(mission: Demo, tmp_path: Path):
     assert (same.returncode, same.stderr) == (0, ""), same.stdout
     assert same.stdout.endswith("rules: 1, actions: 2, differing: 0\n")
     other = tmp_path / "other.yaml"
-    other.write_text(rules.read_text(encoding="utf-8").replace("longer_than_s: 1.25", "longer_than_s: 1.95"))
+    other.write_text(rules.read_text(encoding="utf-8").replace("longer_than_s: 1.75", "longer_than_s: 2.45"))
     differing = subprocess.run([*replay, other, bag], capture_output=True, text=True, check=False)
     assert differing.returncode == 1
     assert re.search(r"link_lost  do .* \+0\.700  differs$", differing.stdout, re.MULTILINE)

@@ -70,6 +70,7 @@ class Signal {
   struct Bounds {
     double low{std::numeric_limits<double>::infinity()};
     double high{-std::numeric_limits<double>::infinity()};
+    /// [rt]
     bool contains(double value) const MAUVE_RT { return value >= low && value <= high; }
   };
 
