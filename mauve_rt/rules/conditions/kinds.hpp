@@ -103,7 +103,9 @@ class Calm {
     return looked_ns_ > due_ns ? looked_ns_ + step_ns() : later_by(due_ns, 1);
   }
   time_ns_t look_ns(time_ns_t due_ns) const MAUVE_RT {
-    return due_ns - looked_ns_ > step_ns() ? std::max(due_ns - calm_ns_, looked_ns_ + step_ns()) : kForever;
+    if (due_ns - looked_ns_ <= step_ns()) return kForever;
+    return std::max(due_ns - calm_ns_ - step_ns(),
+                    looked_ns_ + step_ns());  // a step more: who wakes up is late
   }
 
  private:
