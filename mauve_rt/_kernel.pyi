@@ -754,6 +754,9 @@ def monotonic_ns() -> int: ...
 END_SIGNALS: set[int]
 """Signals that end a process in order: see wait_end_signal()."""
 
+STOP_TIMEOUT_NS: int
+"""How long a state may go on after a stop of all components, before its component is given up."""
+
 def wait_end_signal(*, grace_ns: int, dump_signal: int = 0) -> int:
     """Sleep until one of END_SIGNALS comes, which all threads have to block; returns it.
 

@@ -1,5 +1,6 @@
 """Typed errors. Every one is a `MauveError`: code, place, what was expected and found, what to do."""
 
+import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -130,6 +131,16 @@ def exception_text(error: BaseException) -> str:
     except BaseException as second:  # noqa: BLE001 - of an exception that somebody else wrote
         text = f"its text cannot be had ({type(second).__name__})"
     return one_line(f"{type(error).__name__}: {text}")
+
+
+def internal_error_text(error: BaseException) -> str:
+    """What a requester is told of an unforeseen exception; what the system lacks is no internal error."""
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return (
+            f"no file descriptor is left ({one_line(str(error))}): raise the limit of the process "
+            "(ulimit -n, LimitNOFILE= of systemd)"
+        )
+    return f"internal error: {exception_text(error)}"
 
 
 def one_line(text: str) -> str:

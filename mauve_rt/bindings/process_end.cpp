@@ -3,12 +3,15 @@
 
 #include <pybind11/stl.h>
 
+#include "mauve_rt/deploy/deployer.hpp"
+
 #include "translate.hpp"
 
 namespace mauve::bindings {
 
 void bind_process_end(py::module_& module) {
   module.attr("END_SIGNALS") = py::cast(std::set<int>(kEndSignals.begin(), kEndSignals.end()));
+  module.attr("STOP_TIMEOUT_NS") = Deployer::kStopTimeout;
   module.def(
       "wait_end_signal",
       [](time_ns_t grace_ns, int dump_signal) {

@@ -29,7 +29,7 @@ from mauve_rt.control.requests import (
 )
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Bound, Plan
-from mauve_rt.errors import MauveError, error_code, exception_text, one_line
+from mauve_rt.errors import MauveError, error_code, internal_error_text, one_line
 from mauve_rt.model.schema import ResourceModel
 
 DEFAULT_TIMEOUT_S = 1.0
@@ -156,8 +156,7 @@ class Control:
         except MauveError as error:
             outcome = Outcome(code=code_of(error), message=one_line(str(error)))
         except BaseException as error:  # noqa: BLE001 - whatever it is, it must not cost the requester the answer
-            text = f"internal error: {exception_text(error)}"
-            outcome = Outcome(code=Code.PREPARE_FAILED, message=text)
+            outcome = Outcome(code=Code.PREPARE_FAILED, message=internal_error_text(error))
         after = self._runtime.observe(
             changed_since=revision if outcome.success and request.steps and not request.dry_run else None
         )

@@ -2,13 +2,15 @@
 
 import os
 import stat
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.yaml.text import MAX_BYTES, Node, YamlError, parse_yaml
 
 Location = tuple[int | str, ...]
+READ_TIMEOUT_S = 2.0
 
 
 class YamlFile:
@@ -17,7 +19,8 @@ class YamlFile:
     def __init__(self, path: str | Path, *, text: str | None = None, waits: bool = True) -> None:
         """Read and parse a file, or parse `text` in its place.
 
-        With `waits=False` only a regular file will do: a pipe may keep its reader waiting for ever.
+        With `waits=False` only a regular file will do, which can be read within 2 s: a pipe, or the disk of
+        another machine, may keep its reader waiting for ever.
 
         Raises:
             ArchitectureFileError: no such file, too large, not UTF-8, not YAML, or a key given twice.
@@ -62,14 +65,22 @@ class YamlFile:
         """An error about the whole file or a given place in it."""
         return ArchitectureFileError(self.path, [Problem(line=line, column=column, what=what, **facts)])
 
+    def _read_in_time(self) -> bytes:
+        reading = _Reading(self._read_bytes)
+        reading.start()
+        return reading.result()
+
+    def _read_bytes(self) -> bytes:
+        opener = None if self._waits else _open_at_once
+        with open(self.path, "rb", opener=opener) as file:
+            if not self._waits and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                what, remedy = "not a regular file", "copy its contents into one"
+                raise self.error(what, expected="a regular file", code="io", remedy=remedy)
+            return file.read(MAX_BYTES + 1)
+
     def _read(self) -> str:
         try:
-            opener = None if self._waits else _open_at_once
-            with open(self.path, "rb", opener=opener) as file:
-                if not self._waits and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                    what, remedy = "not a regular file", "copy its contents into one"
-                    raise self.error(what, expected="a regular file", code="io", remedy=remedy)
-                raw = file.read(MAX_BYTES + 1)
+            raw = self._read_bytes() if self._waits else self._read_in_time()
         except OSError as error:
             reason = error.strerror or str(error)
             raise self.error(f"cannot read the file: {reason}", code="io", remedy="check the path") from None
@@ -84,6 +95,29 @@ class YamlFile:
             raise self.error(
                 "not text in UTF-8", line=line, column=column, code="io", remedy=remedy
             ) from None
+
+
+class _Reading(threading.Thread):
+    """Reads a file, or finds out why not; where the disk hangs it stays behind."""
+
+    def __init__(self, read: Callable[[], bytes]) -> None:
+        super().__init__(daemon=True)
+        self._read = read
+        self._raw = b""
+        self._error: BaseException | None = TimeoutError(f"it was not read within {READ_TIMEOUT_S:g} s")
+
+    def run(self) -> None:
+        try:
+            self._raw = self._read()
+            self._error = None
+        except BaseException as error:  # noqa: BLE001 - handed to who waits
+            self._error = error
+
+    def result(self) -> bytes:
+        self.join(READ_TIMEOUT_S)
+        if self._error is not None:
+            raise self._error
+        return self._raw
 
 
 def _open_at_once(path: str, flags: int) -> int:

@@ -14,7 +14,6 @@ namespace mauve {
 
 namespace {
 
-constexpr time_ns_t kStopTimeout = ms_to_ns(500);
 constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 
 /// The deployers of the process, for its end.

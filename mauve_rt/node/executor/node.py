@@ -10,6 +10,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mauve_rt._bridge import NodeWatch
+from mauve_rt._kernel import STOP_TIMEOUT_NS
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
@@ -30,6 +31,10 @@ from mauve_rt.trace.errors import TraceError
 
 NODE_NAME = "executor"
 _HEALTH_S = 1.0
+_SAFE_STOP = (
+    "a signal makes outputs safe within 5 ms and the longest state that runs; a state that runs on for "
+    f"{STOP_TIMEOUT_NS / 1e6:g} ms is given up"
+)
 
 
 class ExecutorNode(LifecycleNode):
@@ -207,6 +212,7 @@ class ExecutorNode(LifecycleNode):
             if self._node_watch is not None:  # else it is not open yet
                 NodeWatch.notify("READY=1")
         self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
+        self.get_logger().info(_SAFE_STOP)
 
     def _clean_up(self) -> None:
         self._release()

@@ -14,7 +14,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 from mauve_rt.control.requests import Code
-from mauve_rt.errors import exception_text
+from mauve_rt.errors import exception_text, internal_error_text
 from mauve_rt.node.shared.watch import Watch
 
 PATIENCE_S = 10.0  # of a change, for those before it
@@ -222,7 +222,7 @@ class _Call:
 def refused_reply(request: Any, filled: Any, error: BaseException) -> Any:
     """A response that says no, as far as it has words for that, to a request whose handler raised."""
     response = type(filled)()  # nothing of what the handler filled in already
-    return refusing(request, response, Code.PREPARE_FAILED, f"internal error: {exception_text(error)}")
+    return refusing(request, response, Code.PREPARE_FAILED, internal_error_text(error))
 
 
 def refusing(request: Any, response: Any, code: Code, text: str) -> Any:

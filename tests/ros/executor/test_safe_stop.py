@@ -19,6 +19,7 @@ from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, LoadRules, Reconfigure
+from mauve_rt._kernel import STOP_TIMEOUT_NS
 from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
@@ -63,6 +64,16 @@ def test_a_console_that_nobody_reads_holds_up_nothing(
     assert graph.ask(ListComponents, f"{NODE}/list_components").components
     assert executor.end(signal.SIGTERM)[0] == 0
     await_safe(graph, counts)
+
+
+def test_the_bound_of_a_safe_stop_is_told(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    executor = start_executor("-p", f"architecture:={architecture}")
+    counts_of(graph)
+    assert executor.end(signal.SIGTERM)[0] == 0
+    assert "a signal makes outputs safe within 5 ms and the longest state that runs" in executor.output
+    assert f"runs on for {STOP_TIMEOUT_NS / 1e6:g} ms is given up" in executor.output
 
 
 def test_a_signal_waits_for_no_lock_of_the_interpreter(

@@ -20,6 +20,9 @@ struct DeployerOptions {
 /// All members are written and read by deploy(), shutdown() and end(), under life_mutex_.
 class Deployer final : public Host {
  public:
+  /// How long a state may go on after a stop of all, before its component is given up.
+  static constexpr time_ns_t kStopTimeout = ms_to_ns(500);
+
   explicit Deployer(Architecture& architecture, DeployerOptions options = {});
   /// Shuts down, and waits for a change that is being prepared.
   ~Deployer() override;
@@ -29,10 +32,10 @@ class Deployer final : public Host {
   /// Creates the threads, meets them at a barrier, publishes epoch = now + 20 ms,
   /// starts all. [setup] Throws Error as Host::deploy(); no thread is left then.
   void deploy() override;
-  /// Also ends the threads: those that execute a state for half a second more are left behind. [non-rt]
+  /// Also ends the threads: those that execute a state for longer than kStopTimeout are left behind. [non-rt]
   void shutdown() noexcept override;
-  /// The same, for good: it cannot be deployed again. A component whose state does not end within half a second is given up:
-  /// its outputs are safe on return, too. [non-rt]
+  /// The same, for good: it cannot be deployed again. A component whose state does not end within kStopTimeout is given
+  /// up: its outputs are safe on return, too. [non-rt]
   void end() noexcept;
   /// end() of every deployer of the process, those to come included. [non-rt]
   static void end_all() noexcept;
