@@ -3,7 +3,8 @@
 // usual one back when it is written again. Beside it: a bare thread that watches the same deadline, and a bare 1 kHz
 // loop that looks at each release whether that has passed.
 //   bench_rules [--who component|bare] [--count 1000] [--priority 80] [--cpu 0] [--cpus 2] [--silence-ms 10]
-//                [--work-us 100] [--seed 1]
+//                [--work-us 100] [--hung 0] [--seed 1]
+// With --hung 1 another rule, of lower priority, wants the same of a component whose state does not end.
 // The input is written every 1 to 3 ms, at any phase of the component's, until it falls silent.
 // Prints {"reaction_ns": from the deadline of silence to the first release that follows it with the other core, one a
 // round; "stalled_ns": of it, how long CPU 0 ... cpus-1 ran nothing of ours, as witnesses noticed}.
@@ -38,6 +39,7 @@ struct Settings {
         cpus(static_cast<int>(options.number("cpus", 2))),
         silence_ns(mauve::ms_to_ns(options.number("silence-ms", 10))),
         work_us(options.number("work-us", 100)),
+        has_hung(options.number("hung", 0) != 0),
         seed(options.seed()) {}
 
   std::int64_t count;
@@ -46,6 +48,7 @@ struct Settings {
   int cpus;
   time_ns_t silence_ns;
   std::int64_t work_us;
+  bool has_hung;
   std::uint64_t seed;
 };
 
@@ -132,19 +135,27 @@ class Witnesses {
 
 struct SafeWorker : bench::Worker {};
 
+/// Its state ends when all is over.
+struct HungWorker : bench::Worker {
+  void work() override {
+    while (!is_over.load(std::memory_order_relaxed)) bench::sleep_until(mauve::monotonic_now_ns() + kSettle);
+  }
+  static inline std::atomic<bool> is_over{false};
+};
+
 constexpr const char* kUsual = "bench/Worker";
 constexpr const char* kSafe = "bench/SafeWorker";
+constexpr const char* kHung = "bench/HungWorker";
 
-mauve::rules::ActionSteps core(const char* implementation) {
-  return {{.kind = "replace_core", .target = "worker", .name = implementation}};
+mauve::rules::ActionSteps core(const char* implementation, const char* target = "worker") {
+  return {{.kind = "replace_core", .target = target, .name = implementation}};
 }
 
-/// The rule at work.
+/// The rule at work, and where a component hangs the one about that.
 class Rule {
  public:
-  Rule(mauve::Host& host, time_ns_t silence_ns)
-      : runner_(host, std::make_unique<mauve::rules::Engine>(rules(silence_ns)),
-                {{.do_steps = core(kSafe), .undo_steps = core(kUsual)}}) {
+  Rule(mauve::Host& host, const Settings& settings)
+      : runner_(host, std::make_unique<mauve::rules::Engine>(rules(settings)), actions(settings)) {
     runner_.start();
   }
 
@@ -163,7 +174,8 @@ class Rule {
   time_ns_t await_release(mauve::rules::Act act, time_ns_t since_ns) {
     for (const time_ns_t until = mauve::monotonic_now_ns() + kGiveUp; mauve::monotonic_now_ns() < until;) {
       for (const mauve::rules::Told& told : runner_.wait_told(mauve::ms_to_ns(100))) {
-        const bool is_it = told.decision.decided == mauve::rules::Decided::done && told.decision.act == act;
+        const bool is_it = told.decision.rule == 0 && told.decision.decided == mauve::rules::Decided::done &&
+                           told.decision.act == act;
         if (!is_it || told.decision.stamp_ns < since_ns) continue;
         const mauve::time_ns_t released_ns = told.action.report.value().steps.front().released_ns;
         if (released_ns == mauve::kNotMeasured) throw std::runtime_error("no release followed");
@@ -174,15 +186,27 @@ class Rule {
   }
 
  private:
-  static std::vector<mauve::rules::Rule> rules(time_ns_t silence_ns) {
+  static mauve::rules::Rule rule(const char* about, time_ns_t silence_ns, std::int64_t priority) {
     const double longer_than_s = static_cast<double>(silence_ns) / static_cast<double>(mauve::s_to_ns(1));
-    mauve::rules::Rule rule;
-    rule.name = "quiet";
-    rule.when.kind = "silence";
-    rule.when.parameters = {{"resource", "input"}, {"longer_than_s", longer_than_s}};
-    rule.undoes = true;
-    rule.about = {"worker"};
-    return {rule};
+    mauve::rules::Rule made;
+    made.name = about;
+    made.when.kind = "silence";
+    made.when.parameters = {{"resource", "input"}, {"longer_than_s", longer_than_s}};
+    made.undoes = true;
+    made.priority = priority;
+    made.about = {about};
+    return made;
+  }
+  static std::vector<mauve::rules::Rule> rules(const Settings& settings) {
+    std::vector<mauve::rules::Rule> all{rule("worker", settings.silence_ns, 1)};
+    if (settings.has_hung)
+      all.push_back(rule("hung", settings.silence_ns / 2, 0));  // its commit is posted by then
+    return all;
+  }
+  static std::vector<mauve::rules::RuleActions> actions(const Settings& settings) {
+    std::vector<mauve::rules::RuleActions> all{{.do_steps = core(kSafe), .undo_steps = core(kUsual)}};
+    if (settings.has_hung) all.push_back({.do_steps = core(kSafe, "hung")});
+    return all;
   }
 
   mauve::rules::RuleRunner runner_;
@@ -194,6 +218,7 @@ void measure_component(const Settings& settings) {
   registry.shell<bench::WorkerShell>("bench/WorkerShell");
   registry.core<bench::Worker>(kUsual, "bench/WorkerShell");
   registry.core<SafeWorker>(kSafe, "bench/WorkerShell");
+  registry.core<HungWorker>(kHung, "bench/WorkerShell");
   registry.fsm<bench::WorkerFsm>("bench/WorkerFsm", "bench/WorkerShell");
   mauve::Architecture architecture{&registry};
   auto& input = architecture.add_resource<mauve::LatestValue<bench::Small>>("input");
@@ -203,11 +228,17 @@ void measure_component(const Settings& settings) {
   component.allow({kSafe}, true);
   component.set_property("period_us", kPeriodUs);
   component.set_property("work_us", settings.work_us);
+  if (settings.has_hung) {
+    architecture
+        .add_component("hung", "bench/WorkerShell", kHung, "bench/WorkerFsm",
+                       mauve::TaskSettings{.priority = settings.priority, .cpus = {settings.cpu}})
+        .allow({kSafe}, true);
+  }
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
   Feeder feeder(settings, [&input] { input.write.write({}, mauve::monotonic_now_ns()); });
-  Rule rule(deployer, settings.silence_ns);
+  Rule rule(deployer, settings);
   Witnesses witnesses(settings.cpus);
   bench::sleep_until(deployer.epoch_ns() + kSettle);
   std::vector<Reaction> reactions;
@@ -220,6 +251,7 @@ void measure_component(const Settings& settings) {
     feeder.speak();
     rule.await_release(mauve::rules::Act::undo, deadline_ns);
   }
+  HungWorker::is_over.store(true, std::memory_order_relaxed);
   witnesses.print(reactions);
 }
 

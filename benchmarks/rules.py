@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from mauve_rt.supervision.rules import RulesFile
 
 _WHAT = "from the deadline of an input's silence to the first release of the safe core at 1 kHz"
 _LOAD = "stress-ng, rclpy busy, supervisor killed"
+_HUNG = "the same beside a lower rule whose component hangs"
 _BESIDE = "a thread that sets a flag at the deadline, a 1 kHz loop that reads it"
 _NS_PER_US, _NS_PER_MS, _NS_PER_S = 1_000, 1_000_000, 1_000_000_000
 _PERIOD_S, _SILENCE_S = 0.001, 0.010
@@ -35,6 +36,7 @@ rules:
 
 def rule_rows(settings: Settings) -> Iterator[Row]:
     """Rounds of a rule beside the components of its process, and of two bare threads."""
+    yield _beside_hung(settings)
     what = f"{_WHAT}, {_LOAD}"
     if missing := stress.available():
         yield not_available(what, missing)
@@ -60,6 +62,35 @@ def rule_rows(settings: Settings) -> Iterator[Row]:
     ours, bare = ([ns / _NS_PER_US for one in rounds for ns in one[who]["reaction_ns"]] for who in (0, 1))
     yield pooled(f"{what}, p99.9", ours, 99.9, unit="us", reference=bare, beside=_BESIDE)
     yield from _bounds(what, [component for component, _ in rounds])
+
+
+def _beside_hung(settings: Settings) -> Row:
+    """Whether a rule waits for one whose target does not come to a wait; on a machine at rest."""
+
+    def side(hung: int) -> Callable[[int], dict[str, Any]]:
+        return lambda number: native.run(
+            "bench_rules",
+            who="component",
+            hung=hung,
+            seed=number,
+            count=settings.reactions,
+            priority=settings.priority,
+            cpu=settings.cpu,
+            cpus=len(os.sched_getaffinity(0)),
+            silence_ms=round(_SILENCE_S * 1e3),
+        )
+
+    rounds = native.interleaved(settings.rounds, side(1), side(0))
+    pairs = [(_us(hung, 50), _us(alone, 50)) for hung, alone in rounds]
+    worst_ms = max(max(_own_ns(hung)) for hung, _ in rounds) / _NS_PER_MS
+    return compared(
+        f"{_WHAT}, {_HUNG}",
+        pairs,
+        unit="us",
+        beside="the same without that rule",
+        ratio_limit=1.2,
+        note=f"p50; worst beside it {worst_ms:.2f} ms, stalls of the machine left out",
+    )
 
 
 def _bounds(what: str, found: list[dict[str, Any]]) -> Iterator[Row]:
