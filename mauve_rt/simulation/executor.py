@@ -1,5 +1,6 @@
 """An executor in virtual time: topics, ~/state, ~/events, requests and the bag, without node and threads."""
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -78,7 +79,8 @@ class SimulatedExecutor:
         self._published_revision = -1
         self._faults = FaultWatch()
         self._waiting: list[SentMessage] = []
-        self._refused = 0
+        self._received: Counter[str] = Counter()  # by topic
+        self._refused: Counter[str] = Counter()
         self._architecture = b""
         self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
         self._rules_file = RulesFile(rules) if rules is not None else None
@@ -181,8 +183,10 @@ class SimulatedExecutor:
         drain = self._runtime.host.drain_trace()
         if self._architecture:
             self._bag.tell_architecture(self._architecture, drain)
+        self._received.update(message.topic for message in waiting)
         self._refused += self._bag.write(drain, waiting, whole=True)
-        self._bag.tell_dropped(self._refused)
+        self._bag.tell_ledger(self._received, self._refused)
+        self._bag.tell_dropped(self._refused.total())
 
     def flush(self) -> None:
         """Make the bag a finished one of what was recorded; waits for the disk."""

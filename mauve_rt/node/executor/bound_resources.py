@@ -189,6 +189,13 @@ class BoundResources:
         names = self.bindings()
         return {sides["subscribes"]: name for name, sides in names.items() if "subscribes" in sides}
 
+    def types(self) -> dict[str, str]:
+        """The type of each bound topic."""
+        present = {number for numbers in list(self._numbers.values()) for number in numbers}
+        return {
+            bound.topic: bound.type_name for number, bound in list(self._topics.items()) if number in present
+        }
+
     def topics(self) -> list[TopicReport]:
         """How each bound topic fares."""
         bridge = self._bridge

@@ -327,6 +327,7 @@ class ExecutorNode(LifecycleNode):
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
         self._topic_watch.look(self._bound.topics(), self._bound.other_types())
+        self._recording.look()
         self._name_watch.look()
 
     def _log_realtime(self) -> None:

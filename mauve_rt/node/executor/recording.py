@@ -1,15 +1,17 @@
 """The bags of an executor: its trace, messages it sends and receives, topics it is asked to record."""
 
+import functools
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import monotonic_ns
@@ -31,11 +33,22 @@ _DEPTH = 100  # of the topics recorded beside the executor's own
 _BEST_EFFORT = "best_effort"
 
 
+_OWN = {  # recorded in any case
+    "~/state": "mauve_msgs/msg/ArchitectureState",
+    "~/events": "mauve_msgs/msg/ReconfigurationEvent",
+    "~/decisions": "mauve_msgs/msg/SupervisorDecision",
+    "~/trace/batches": "mauve_msgs/msg/TraceBatch",
+    "~/trace/names": "mauve_msgs/msg/TraceNames",
+    "~/trace/architecture": "mauve_msgs/msg/TraceArchitecture",
+}
+
+
 class ChosenTopic(NamedTuple):
     """A topic to record beside the executor's own."""
 
     name: str
     """As it was given; the node resolves it."""
+    full_name: str
     type_name: str
     message: type
     qos: str
@@ -62,6 +75,8 @@ class Recording:
     | ---------------- | ---------------- | --------------- |
     | `_recorder`      | start(), stop()  | exchanged whole |
     | `_subscriptions` | start(), stop()  | `_lock`         |
+    | `_chosen`        | start(), stop()  | exchanged whole |
+    | `_told`          | look()           |                 |
     | `_last`          | stop()           | exchanged whole |
     """
 
@@ -77,6 +92,8 @@ class Recording:
         self._recorder: Recorder | None = None
         self._last: RecordingStatus | None = None
         self._subscriptions: list[Any] = []
+        self._chosen: tuple[ChosenTopic, ...] = ()
+        self._told: set[tuple[str, str]] = set()  # topics, and types of others on them
 
     def start(self, bag: Path, topics: Sequence[str], *, split: Split) -> Path:
         """Create the bag and record from now on; returns its folder, absolute. Another recording ends.
@@ -85,18 +102,21 @@ class Recording:
             bag: the folder, which must not exist yet.
             topics: further ones, each as `name`, `name:package/msg/Type` or `name:package/msg/Type:qos`. Best
                 effort, the default, hears every publisher; transient_local also hears what was said before.
+                What the executor sends, and what its resources are bound to, is recorded anyhow, and once.
             split: when to go on in a new file.
 
         Raises:
-            ParameterError: a topic is written otherwise, nobody knows its type, or that is not installed.
+            ParameterError: a topic is written otherwise, nobody knows its type, that is not installed, or the
+                topic is used with another one.
             TraceError: the folder exists already or cannot be written.
 
         """
         from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415 - a start without a bag needs none
 
-        chosen = [self._chosen(topic) for topic in topics]
+        chosen = tuple(self._choose(topics))
         with self._lock:
             self.stop()
+            self._subscribe(chosen)  # first: what is refused here leaves no folder behind
             recorder = Recorder(
                 self._runtime.host,
                 bag.absolute(),
@@ -107,22 +127,14 @@ class Recording:
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
             recorder.start(discard=self._runtime.active)
-            self._recorder = recorder
-            try:
-                for topic in chosen:
-                    self._subscribe(topic)
-            except Exception:
-                self.stop()
-                raise
+            self._recorder, self._chosen = recorder, chosen
             return recorder.directory
 
     def stop(self) -> RecordingStatus | None:
         """Seal the bag; returns how it went, None when nothing was recorded. May be called again."""
         with self._lock:
             recorder = self._recorder
-            for subscription in self._subscriptions:
-                self._node.destroy_subscription(subscription)
-            self._subscriptions.clear()
+            self._unsubscribe()
             if recorder is not None:
                 recorder.stop()
                 self._last = self.status()
@@ -155,6 +167,17 @@ class Recording:
             offered = None if qos is None else recorded_qos(qos)
             recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
 
+    def look(self) -> None:
+        """Warn of nodes that use another type on a topic to record. One thread at a time."""
+        if not (chosen := self._chosen):
+            return
+        known = dict(self._node.get_topic_names_and_types())
+        for topic in chosen:
+            for other in set(known.get(topic.full_name, ())) - {topic.type_name}:
+                if (topic.full_name, other) not in self._told:
+                    self._told.add((topic.full_name, other))
+                    self._warn(topic, f"other nodes use {other} on it, and none of that is recorded")
+
     def tell_architecture(self, observed: Observed) -> None:
         """Record what runs now."""
         recorder = self._recorder
@@ -164,44 +187,95 @@ class Recording:
     def _architecture(self, observed: Observed) -> bytes:
         return bytes(serialize_message(trace_architecture(self._runtime, observed)))
 
-    def _chosen(self, topic: str) -> ChosenTopic:
+    def _choose(self, topics: Sequence[str]) -> Iterator[ChosenTopic]:
+        """Each topic once; those that are recorded in any case are left out."""
+        anyhow = {self._node.resolve_topic_name(name): type_name for name, type_name in _OWN.items()}
+        anyhow |= self._bound.types()
+        found: dict[str, ChosenTopic] = {}
+        for text in topics:
+            topic = self._parse(text, anyhow)
+            before = found.setdefault(topic.full_name, topic)
+            if before[1:] != topic[1:]:
+                what = f"{before.type_name}:{before.qos} and {topic.type_name}:{topic.qos}"
+                raise ParameterError(
+                    f"topic {topic.full_name} to record: named twice, as {what}; name it once"
+                )
+        return (topic for name, topic in found.items() if name not in anyhow)
+
+    def _parse(self, topic: str, anyhow: Mapping[str, str]) -> ChosenTopic:
         name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]
         try:
             full_name = self._node.resolve_topic_name(name)
         except Exception as error:  # rclpy has an exception class of its own for each mistake
             expected = f"expected a name, found '{name}': {one_line(str(error))}"
             raise ParameterError(f"topic to record: {expected}") from error
+        known = dict(self._node.get_topic_names_and_types()).get(full_name, [])
+        known = [anyhow[full_name]] if full_name in anyhow else known
         if not type_name:
-            known = dict(self._node.get_topic_names_and_types()).get(full_name, [])
             if len(known) != 1:
                 found = f"used with the types {' and '.join(known)}" if known else "used by nobody now"
                 raise ParameterError(
                     f"topic {full_name} to record: {found}; give its type, {name}:package/msg/Type"
                 )
             type_name = known[0]
+        elif known and type_name not in known:
+            raise ParameterError(
+                f"topic {full_name} to record: used as {' and '.join(known)}, found {type_name}"
+            )
         message = message_class(type_name)
         if message is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
             expected = "name, name:package/msg/Type of an installed message, and perhaps one of"
             expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
             raise ParameterError(f"topic to record: expected {expected}; found '{topic}'")
-        return ChosenTopic(name, type_name, message, qos or _BEST_EFFORT)
+        return ChosenTopic(name, full_name, type_name, message, qos or _BEST_EFFORT)
 
-    def _subscribe(self, topic: ChosenTopic) -> None:
-        full_name = self._node.resolve_topic_name(topic.name)
-        profile = qos_profile(topic.qos, capacity=_DEPTH)
-        # Not by its full name: resolved twice, it might be another.
-        subscription = self._node.create_subscription(
-            topic.message,
-            topic.name,
-            self._callback(full_name, topic.type_name, profile),
-            profile,
-            raw=True,
-            callback_group=self._data_group,
-        )
-        self._subscriptions.append(subscription)
+    def _subscribe(self, topics: Sequence[ChosenTopic]) -> None:
+        try:
+            for topic in topics:
+                profile = qos_profile(topic.qos, capacity=_DEPTH)
+                # Not by its full name: resolved twice, it might be another.
+                subscription = self._node.create_subscription(
+                    topic.message,
+                    topic.name,
+                    functools.partial(self._hear, topic, profile),
+                    profile,
+                    raw=True,
+                    callback_group=self._data_group,
+                    event_callbacks=self._event_callbacks(topic),
+                )
+                self._subscriptions.append(subscription)
+        except Exception as error:  # rclpy has an exception class of its own for each mistake
+            self._unsubscribe()
+            raise ParameterError(f"topic {topic.full_name} to record: {one_line(str(error))}") from error
 
-    def _callback(self, topic: str, type_name: str, qos: QoSProfile) -> Callable[[bytes], None]:
-        return lambda data: self.record(topic, type_name, data, qos=qos)
+    def _unsubscribe(self) -> None:
+        self._chosen = ()
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def _hear(self, topic: ChosenTopic, qos: QoSProfile, data: bytes) -> None:
+        if (
+            topic.full_name not in self._bound.types()
+        ):  # else a resource was bound to it since, and records it
+            self.record(topic.full_name, topic.type_name, data, qos=qos)
+
+    def _event_callbacks(self, topic: ChosenTopic) -> SubscriptionEventCallbacks:
+        def lost(event: Any) -> None:
+            recorder = self._recorder
+            if recorder is not None:
+                recorder.lose(topic.full_name, event.total_count_change)
+
+        def misfits(event: Any) -> None:
+            policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+            self._warn(
+                topic, f"a publisher's quality of service does not fit, in {policy}: it is not recorded"
+            )
+
+        return SubscriptionEventCallbacks(incompatible_qos=misfits, message_lost=lost)
+
+    def _warn(self, topic: ChosenTopic, what: str) -> None:
+        self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
 
 
 class RecordingOrders:

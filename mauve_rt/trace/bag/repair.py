@@ -36,6 +36,10 @@ class BagState:
         files_are = all(file.is_finished for file in self.files)
         return files_are and not self.metadata_damage and not self.unreadable
 
+    def topics(self) -> list[BagTopic]:
+        """Each topic, with its messages in all files."""
+        return _topics(self.files)
+
     def damages(self) -> list[str]:
         """What is wrong, a line for each file."""
         lines = [_damage(file) for file in self.files if not file.is_finished]

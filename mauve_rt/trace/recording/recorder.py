@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,7 +43,7 @@ class Recorder:
     | member          | written by                     | guarded by |
     | --------------- | ------------------------------ | ---------- |
     | `_waiting` ...  | record(), the recorder thread  | `_lock`    |
-    | `_dropped`      | record(), the recorder thread  | `_lock`    |
+    | `_received`, `_lost` | record(), lose(), the recorder thread | `_lock` |
     | `_recording`    | start(), the recorder thread   | `_lock`    |
     | `_error`        | the recorder thread            | `_lock`    |
     | `_architecture` | tell_architecture()            | `_lock`    |
@@ -90,7 +91,8 @@ class Recorder:
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
         self._waiting_bytes = 0
-        self._dropped = 0
+        self._received: Counter[str] = Counter()  # by topic
+        self._lost: Counter[str] = Counter()
         self._recording = False
         self._error = ""
         self._architecture = b""
@@ -124,7 +126,7 @@ class Recorder:
         """Messages that were to be recorded and did not get into the bag."""
         elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
         with self._lock:
-            return self._dropped + elsewhere - self._dropped_before
+            return self._lost.total() + elsewhere - self._dropped_before
 
     def start(self, *, discard: bool = False) -> None:
         """Start the thread. Once only.
@@ -164,12 +166,19 @@ class Recorder:
 
         """
         with self._lock:
+            self._received[topic] += 1
             if not self._recording or self._waiting_bytes + len(data) > self._queue_bytes:
-                self._dropped += 1
+                self._lost[topic] += 1
                 return False
             self._waiting.append(SentMessage(topic, type_name, data, monotonic_ns, qos))
             self._waiting_bytes += len(data)
             return True
+
+    def lose(self, topic: str, count: int) -> None:
+        """Messages of a topic were sent, and lost before they came here. From any thread."""
+        with self._lock:
+            self._received[topic] += count
+            self._lost[topic] += count
 
     def stop(self) -> None:
         """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
@@ -205,14 +214,21 @@ class Recorder:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
             architecture = self._architecture
-        if self._messages is not None:
-            waiting += self._messages.take_messages()
+            received, lost = (
+                self._received.copy(),
+                self._lost.copy(),
+            )  # with what waits: the bag tells of no more
+        taken = self._messages.take_messages() if self._messages is not None else ()
+        more = Counter(message.topic for message in taken)
+        waiting += taken
         drain = self._source.drain_trace()
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)
         with self._lock:
-            self._dropped += refused
+            self._received += more
+            self._lost += refused
+        self._bag.tell_ledger(received + more, lost + refused)
         self._bag.tell_dropped(self.dropped_messages)
 
     def _report(self, text: str) -> None:

@@ -1,6 +1,8 @@
 """The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
 
-from collections.abc import Callable, Sequence
+import json
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -14,6 +16,10 @@ NAMES = "trace/names"
 ARCHITECTURE = "trace/architecture"
 DROPPED_MESSAGES = "mauve_dropped_messages"
 """Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
+LEDGER = "mauve_topics"
+"""Key in the custom data of metadata.yaml: a JSON object of each topic's Entry. What is in the bag of it is
+`received - lost + repeated` messages."""
+_KEPT_MESSAGES, _KEPT_BYTES = 16, 8 * 1024 * 1024  # of a latched topic of others, for the files to come
 _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
 _ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
@@ -74,6 +80,22 @@ class TraceSource(TraceWords, Protocol):
         """Take everything out of the rings, and what was collected."""
 
 
+class Entry(NamedTuple):
+    """One topic in the ledger of a bag."""
+
+    received: int = 0
+    """Messages that were to be recorded."""
+    lost: int = 0
+    """Of these, not in the bag."""
+    repeated: int = 0
+    """Messages of a latched topic that later files begin with, as well."""
+
+    @property
+    def recorded(self) -> int:
+        """What the bag has of it."""
+        return self.received - self.lost + self.repeated
+
+
 class MessageSource(Protocol):
     """Messages kept elsewhere until the recorder takes them."""
 
@@ -92,8 +114,10 @@ class TraceBag:
 
     Publish times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain. Log times
     are the same, but never run backwards: after that clock was set back they stay ahead of it by as much,
-    since readers play a bag by its log times. Each file begins with the words, the architecture, and a batch
-    without records where there were records before it: so it can be read alone.
+    since readers play a bag by its log times. Each file begins with the words, the architecture, a batch
+    without records where there were records before it, and what latched topics said last: so it can be read
+    alone. Nobody is told who sent a message, so of a latched topic the last 16 different ones count, 8 MiB at
+    most.
     """
 
     def __init__(
@@ -133,6 +157,8 @@ class TraceBag:
             raise
         self._names: tuple[Sequence[str], Sequence[str]] | None = None
         self._latched: dict[str, bytes] = {}  # each file begins with these
+        self._latched_of_others: dict[str, deque[SentMessage]] = {}
+        self._repeated: Counter[str] = Counter()
         self._last: Drain | None = None
         self._ahead_ns: int | None = None  # log time - monotonic time
         self._refused_types: set[tuple[str, str]] = set()
@@ -147,8 +173,8 @@ class TraceBag:
         """Messages in it, the trace's own among them."""
         return self._bag.message_count
 
-    def write(self, drain: Drain, messages: Sequence[SentMessage], *, whole: bool) -> int:
-        """Move what was drained, and messages from before, into the buffer; returns how many were refused.
+    def write(self, drain: Drain, messages: Sequence[SentMessage], *, whole: bool) -> Counter[str]:
+        """Move what was drained, and messages from before, into the buffer; returns what was refused.
 
         A batch without records (it tells of losses) is written if `whole`.
         """
@@ -156,7 +182,7 @@ class TraceBag:
         self._write_names(drain)
         if drain.records or messages or whole:
             self._write_batch(drain, drain.records)
-        return sum(not self._write_message(message, drain) for message in messages)
+        return Counter(message.topic for message in messages if not self._write_message(message, drain))
 
     def discard(self, drain: Drain) -> None:
         """Leave out what was recorded before this bag; only how much it was gets into it."""
@@ -172,6 +198,14 @@ class TraceBag:
         """Note with the next flush how many messages did not get into the bag."""
         self._bag.set_custom_data(DROPPED_MESSAGES, str(messages))
 
+    def tell_ledger(self, received: Mapping[str, int], lost: Mapping[str, int]) -> None:
+        """Note with the next flush what became of the messages of each topic."""
+        entries = {
+            topic: Entry(count, lost.get(topic, 0), self._repeated[topic])._asdict()
+            for topic, count in received.items()
+        }
+        self._bag.set_custom_data(LEDGER, json.dumps(entries))
+
     def flush(self) -> None:
         """Make the bag a finished one of all that was written; go on in a new file when it is time."""
         self._bag.flush()
@@ -181,6 +215,10 @@ class TraceBag:
             for topic, data in self._latched.items():
                 self._write(self._topic(topic), data, last, last.monotonic_ns)
             self._write_batch(last, b"")
+            for topic, kept in self._latched_of_others.items():
+                for message in kept:
+                    self._write(topic, message.data, last, last.monotonic_ns)
+                self._repeated[topic] += len(kept)
 
     def close(self) -> None:
         """Flush a last time."""
@@ -220,7 +258,17 @@ class TraceBag:
                 self._on_error(f"topic {message.topic} is not recorded: {error}")
             return False
         self._write(message.topic, message.data, drain, message.monotonic_ns)
+        if message.qos is not None and message.qos.transient_local:
+            self._keep(message)
         return True
+
+    def _keep(self, message: SentMessage) -> None:
+        kept = self._latched_of_others.setdefault(message.topic, deque(maxlen=_KEPT_MESSAGES))
+        for same in [one for one in kept if one.data == message.data]:
+            kept.remove(same)
+        kept.append(message)
+        while len(kept) > 1 and sum(len(one.data) for one in kept) > _KEPT_BYTES:
+            kept.popleft()
 
     def _write(self, topic: str, data: bytes, drain: Drain, monotonic_ns: int) -> None:
         """Write what was sent at a time, mapped by a drain's clock pair."""

@@ -1,5 +1,6 @@
 """The recorder: what it is given is in the bag, on one time base; nothing it meets harms the executor."""
 
+import json
 import resource
 import shutil
 import threading
@@ -11,10 +12,14 @@ import pytest
 import yaml
 
 from mauve_rt.trace import TraceError
+from mauve_rt.trace.bag.recorded import Split, TopicQos
+from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import DROPPED_MESSAGES, Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import LEDGER
 
 NODE = "/robot_1/executor"
 TEXT = "mauve_test_msgs/msg/Text"
@@ -129,7 +134,7 @@ def test_what_exceeds_the_queue_is_dropped_and_counted(tmp_path: Path, source: S
     assert taken == [True, True, False, False, False]
     assert recorder.dropped_messages == 3
     assert len(list(open_trace(recorder.directory).messages())) == 2
-    assert custom_data(recorder.directory) == {DROPPED_MESSAGES: "3"}
+    assert custom_data(recorder.directory)[DROPPED_MESSAGES] == "3"
 
 
 def test_a_type_that_is_not_installed_is_told_once_and_the_rest_is_recorded(
@@ -190,3 +195,42 @@ def test_stop_may_come_twice_or_without_a_start(tmp_path: Path, source: Syntheti
     assert not recorder.recording
     with pytest.raises(TraceError, match="exists already"):
         Recorder(source, tmp_path / "bag", node_name=NODE)
+
+
+def test_what_latched_topics_said_last_is_in_every_file(tmp_path: Path, source: SyntheticSource) -> None:
+    made = Recorder(
+        source, tmp_path / "bag", node_name=NODE, flush_period_s=0.02, split=Split(after_s=0, after_bytes=1)
+    )
+    made.start()
+    latched = TopicQos(depth=1, transient_local=True)
+    for text in (b"a", b"b", b"a"):
+        made.record("/description", TEXT, HELLO + text, monotonic_ns=time.monotonic_ns(), qos=latched)
+    made.record("/said_once", TEXT, HELLO, monotonic_ns=time.monotonic_ns())
+    wait_until(lambda: len([*(tmp_path / "bag").glob("*.mcap")]) > 3)
+    made.stop()
+    state = examine_bag(tmp_path / "bag")
+    assert state.is_finished
+    assert {finding.kind for finding in check_bag(tmp_path / "bag")} == {"note"}
+    with_messages = [file for file in state.files if file.counts.messages]
+    by_topic = [
+        {channel.topic: file.counts.by_channel.get(channel.id, 0) for channel in file.channels}
+        for file in with_messages
+    ]
+    first = next(place for place, counts in enumerate(by_topic) if counts.get("/description"))
+    assert by_topic[first]["/description"] == 3
+    assert [counts["/description"] for counts in by_topic[first + 1 :]] == [2] * (len(by_topic) - first - 1)
+    assert sum(counts.get("/said_once", 0) for counts in by_topic) == 1
+    ledger = json.loads(state.custom_data[LEDGER])
+    assert ledger["/said_once"] == {"received": 1, "lost": 0, "repeated": 0}
+    assert ledger["/description"]["received"] == 3
+    assert ledger["/description"]["repeated"] == 2 * (len(by_topic) - first - 1)
+
+
+def test_what_is_lost_of_a_topic_is_told(recorder: Recorder, source: SyntheticSource) -> None:
+    recorder.start()
+    assert recorder.record("/text", TEXT, HELLO, monotonic_ns=time.monotonic_ns())
+    assert not recorder.record("/text", TEXT, bytes(20_000), monotonic_ns=time.monotonic_ns())
+    recorder.lose("/text", 2)
+    recorder.stop()
+    found = {finding.kind: finding.text for finding in check_bag(recorder.directory)}
+    assert found["loss"] == "topic /text: 3 of 4 messages that came are not in the bag"

@@ -1,5 +1,6 @@
 """Bags begun and ended while the executor runs, by service; and what is refused."""
 
+import json
 import resource
 from collections.abc import Callable
 from pathlib import Path
@@ -16,8 +17,10 @@ import mauve_rt.trace
 from mauve_msgs.msg import ReconfigurationStep, ReplyCode
 from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording
 from mauve_rt.trace.bag.repair import examine_bag
+from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
+from mauve_rt.trace.recording.trace_bag import LEDGER
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
@@ -119,6 +122,21 @@ REFUSED = [
     ({"topics": ["nobody_knows"]}, "INVALID", "used by nobody now; give its type"),
     ({"topics": ["talk:std_msgs/msg/Flaot64"]}, "INVALID", "found 'talk:std_msgs/msg/Flaot64'"),
     ({"topics": ["talk:std_msgs/msg/Float64:wrong"]}, "INVALID", "found 'talk:std_msgs/msg/Float64:wrong'"),
+    (
+        {"topics": ["count:std_msgs/msg/String"]},
+        "INVALID",
+        "as std_msgs/msg/Float64, found std_msgs/msg/String",
+    ),
+    (
+        {"topics": [f"{EXECUTOR}/decisions:std_msgs/msg/String"]},
+        "INVALID",
+        "used as mauve_msgs/msg/SupervisorDecision, found std_msgs/msg/String",
+    ),
+    (
+        {"topics": ["x:std_msgs/msg/String", "x:std_msgs/msg/Bool"]},
+        "INVALID",
+        "/robot_1/x to record: named twice",
+    ),
     ({"topics": ["a b"]}, "INVALID", "'a b'"),
     ({"topics": [""]}, "INVALID", "expected a name, found ''"),
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
@@ -166,6 +184,37 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     assert examine_bag(tmp_path / "bag").is_finished
     assert_rosbag2_reads(tmp_path / "bag")
     assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0
+
+
+def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    voice = graph.node.create_publisher(Float64, "/robot_1/talk", 10)
+    named = ["talk:std_msgs/msg/Float64", "/robot_1/talk:std_msgs/msg/Float64", "count", f"{EXECUTOR}/events"]
+    reply = start(graph, bag="bag", topics=named)
+    assert reply.success, reply.message
+    graph.spin_until(lambda: voice.get_subscription_count() == 1, "one subscription")
+    counts = graph.hear(Float64, "/robot_1/count")
+    for number in range(20):
+        voice.publish(Float64(data=float(number)))
+    graph.spin_until(lambda: len(counts) > 20, "counts")
+    assert stop(graph).success
+    trace = mauve_rt.trace.open(tmp_path / "bag")
+    heard = {
+        topic: [message.msg.data for message in trace.messages(topic)]
+        for topic in ("/robot_1/talk", "/robot_1/count")
+    }
+    assert heard["/robot_1/talk"] == [float(number) for number in range(20)]
+    assert len(heard["/robot_1/count"]) == len({*heard["/robot_1/count"]}) > 10
+    assert check_bag(tmp_path / "bag") == []
+    ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
+    assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0}
+
+
+def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):
+    assert start(graph, bag="bag", topics=["later:std_msgs/msg/String"]).success
+    graph.node.create_publisher(Float64, "/robot_1/later", 10)
+    said = "topic /robot_1/later to record: other nodes use std_msgs/msg/Float64 on it, and none of that is"
+    graph.spin_until(lambda: said in executor.output, "the warning")
+    assert stop(graph).success
 
 
 @pytest.fixture
