@@ -66,9 +66,13 @@ class Band:
         path.write_text(rules, encoding="utf-8")
         self.supervisor_process = self._start("supervisor", f"rules:={path}")
 
-    def kill_supervisor(self) -> str:
-        """What it had written to stderr."""
+    def kill_supervisor(self) -> None:
         self.supervisor_process.kill()
+        self.supervisor_process.communicate()
+
+    def end_supervisor(self) -> str:
+        """What it has written to stderr: all, as it ends in order."""
+        self.supervisor_process.send_signal(signal.SIGINT)
         return self.supervisor_process.communicate()[1]
 
     def _start(self, node: str, parameter: str) -> subprocess.Popen[str]:
@@ -158,7 +162,7 @@ def test_a_supervisor_started_anew_undoes_what_the_one_before_did(band: Band):
     band.playing = True
     band.until(lambda: band.said()[3:] == ["condition_false", "undo", "done"])
     band.until(lambda: band.core() == "mauve_examples/Metronome")
-    assert "quiet: adopted: " in band.kill_supervisor()
+    assert "quiet: adopted: " in band.end_supervisor()
 
 
 def test_an_executor_started_anew_while_degraded_is_as_its_file_says(band: Band):
@@ -183,7 +187,7 @@ def test_rules_that_the_executor_would_refuse_are_told_at_arming(band: Band):
     refused = next(decision for decision in band.decisions if decision.decision == "refused")
     assert "would refuse to do: replace_core metronome mauve_examples/NoSuchCore" in refused.reason
     assert refused.message.startswith("core 'mauve_examples/NoSuchCore' is not installed")
-    errors = band.kill_supervisor()
+    errors = band.end_supervisor()
     assert "[ERROR]" in errors
     assert "quiet: refused: " in errors
 
