@@ -88,8 +88,7 @@ bool Action::prepare(Host& host, std::uint64_t revision) {
   }
 }
 
-void Action::try_after(const ActionSteps& before, Host& host, std::uint64_t revision) {
-  if (std::exchange(tried_after_at_, revision) == revision) return;
+void Action::try_after(const ActionSteps& before, Host& host) {
   ActionSteps both = before;
   both.insert(both.end(), steps_.begin(), steps_.end());
   try {

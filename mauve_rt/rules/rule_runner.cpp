@@ -306,22 +306,26 @@ bool RuleRunner::prepare(std::size_t index) {
     work_.bump();
     engine_->wake();
   }
-  const bool is_other = make_ready(rule);
+  const bool is_other = make_ready(rule, changed);
   keep(rule);
   if (is_other) engine_->wake();
   return changed || is_other;
 }
 
-/// What is in effect can be undone, what is not can be done; would it be possible to undo that?
-bool RuleRunner::make_ready(Rule& rule) {
+/// What is in effect can be undone, what is not can be done; would it be possible to undo that? To find out claims the
+/// components, and what is ready cannot be committed meanwhile: so that is tried only where somebody else has changed them, or
+/// the structure.
+bool RuleRunner::make_ready(Rule& rule, bool after_own) {
   const std::uint64_t revision = host_.architecture().revision();
   const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
   Action& next = rule.action(in_effect ? Act::undo : Act::do_);
   Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
-  bool changed = other.put_away();
-  if (next.exists()) changed = next.prepare(host_, revision) || changed;
-  if (other.exists()) other.try_after(next.steps(), host_, revision);
-  return changed;
+  const bool was_ready = other.put_away();
+  const bool is_anew = next.exists() && next.prepare(host_, revision);
+  const std::uint32_t structure = host_.architecture().commit_gate().structure();
+  const bool is_restructured = std::exchange(rule.structure, structure) != structure;
+  if (other.exists() && ((is_anew && !after_own) || is_restructured)) other.try_after(next.steps(), host_);
+  return was_ready || is_anew;
 }
 
 /// For facts().

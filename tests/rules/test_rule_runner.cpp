@@ -271,6 +271,25 @@ TYPED_TEST(RuleRunnerTest, CallsOffTheActionOfALowerRule) {
   EXPECT_EQ("t/Counted", this->watched->shown().core);
 }
 
+/// Whether it could be undone is found out by claiming the component: not at every change of something else.
+TYPED_TEST(RuleRunnerTest, IsReadyBesideChangesOfOthers) {
+  this->add_rule(too_high(), core("t/Counted"), core("t/Counting"));
+  this->deploy();
+  this->begin();
+  this->await_ready();
+  const int made = CountedCore::made.load();
+  EXPECT_EQ(1, made) << "it could be undone";
+  for (int i = 0; i < 50; ++i) {
+    this->host().set_property("w", "gain", 1.0 + i % 2);
+    this->live(us_to_ns(500));
+  }
+  EXPECT_EQ(made, CountedCore::made.load());
+  EXPECT_TRUE(this->runner->facts()[0].ready);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
 TYPED_TEST(RuleRunnerTest, PreparesWhileAnothersPartIsSlow) {
   if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
   this->add_rule(too_high(), core("t/Core", "w"), core("t/Counted", "w"));

@@ -35,7 +35,7 @@ def test_a_rule_does_and_undoes() -> None:
     engine.arm(0)
     due = engine.step(0)
     while due < 1000 * MS:  # it looks before that, to see that it does not stand still itself
-        assert due >= 950 * MS
+        assert due >= 945 * MS
         due = engine.step(due)
         assert engine.pending is None
     due = engine.step(due) if due == 1000 * MS else due

@@ -70,8 +70,8 @@ class Action {
 
   /// Prepares it, where it is not prepared, or was before something changed; whether that changed anything. [non-rt]
   bool prepare(Host& host, std::uint64_t revision);
-  /// Finds out whether it could be prepared once `before` is done, where that was done at another revision. [non-rt]
-  void try_after(const ActionSteps& before, Host& host, std::uint64_t revision);
+  /// Finds out whether it could be prepared once `before` is done. [non-rt]
+  void try_after(const ActionSteps& before, Host& host);
   /// It is not to be wanted now; whether it was ready. [non-rt]
   bool put_away();
   /// Completes what was committed; carries out what was begun and cannot be prepared: whether there was such a thing. [non-rt]
@@ -113,8 +113,7 @@ class Action {
   std::unique_ptr<TransactionCommit> committed_;
   std::optional<ActionReport> report_;
   std::string problem_;
-  std::uint64_t tried_at_{0};        // the revision; 0: not yet
-  std::uint64_t tried_after_at_{0};  // the same of try_after()
+  std::uint64_t tried_at_{0};  // the revision; 0: not yet
   Ended how_{Ended::done};
   std::atomic<Stage> stage_{Stage::idle};
 };

@@ -132,6 +132,7 @@ class RuleRunner {
     bool was_present{false};   // once, so far as the decision thread knows
     std::deque<Told> held{};   // decisions behind one whose report is not there yet, that one first
     std::array<std::deque<ActionReport>, kActs> reports{};  // by Act
+    std::uint32_t structure{UINT32_MAX};                    // the preparation thread's: at its last look
     Kept kept{};
   };
 
@@ -147,7 +148,7 @@ class RuleRunner {
   bool commit(std::size_t index) noexcept;
   bool reserve(std::size_t index) noexcept;
   bool prepare(std::size_t index);
-  bool make_ready(Rule& rule);
+  bool make_ready(Rule& rule, bool after_own);
   void keep(Rule& rule);
   void report(std::size_t index);
   void deliver(Rule& rule, Act act, ActionReport report);
