@@ -81,11 +81,17 @@ def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
     from mauve_examples.mission.cable import open_cable  # noqa: PLC0415
+    from mauve_examples.mission.demo_errors import BadInputError  # noqa: PLC0415
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
+    from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine  # noqa: PLC0415
 
     interrupts.begin()
     with open_cable(options) as cable:
+        try:
+            keep_to_this_machine()
+        except LoopbackError as error:
+            raise BadInputError(str(error)) from None
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
             with open_progress() as progress:

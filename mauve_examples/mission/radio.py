@@ -7,13 +7,17 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr
 
 import sys
 
-from mauve_rt.node.shared.discovery import limit_discovery
-from mauve_rt.node.shared.process import Stop, run_until_signalled
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.process import BAD_INPUT, Stop, complain, run_until_signalled
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
-    limit_discovery()
+    try:
+        keep_to_this_machine()
+    except LoopbackError as error:
+        complain(f"radio: {error}")
+        return BAD_INPUT
     return run_until_signalled(lambda stop: _work(arguments, stop))
 
 

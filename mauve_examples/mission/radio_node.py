@@ -24,6 +24,7 @@ from std_srvs.srv import SetBool
 
 from mauve_examples.mission.medium import Counts, Medium
 from mauve_msgs.msg import PeerMessage
+from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 
 DEPTH = 50
@@ -131,8 +132,10 @@ class Radio(Node):
 def run_node(arguments: list[str] | None, stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad parameters (one line on stderr)."""
     try:
+        sockets = udp_sockets()
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Radio()
+        reach(sockets).log(node.get_logger())
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"radio: {error}")
         try_shutdown()

@@ -2,16 +2,22 @@
 
     python -m mauve_examples.mission.world --ros-args -p robots:="[robot_1,robot_2]"
 
-Exit status: 0 after SIGINT or SIGTERM.
+Exit status: 0 after SIGINT or SIGTERM, 2 where it cannot be kept to this machine as asked.
 """
 
 import sys
 
-from mauve_rt.node.shared.process import Stop, run_until_signalled
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.process import BAD_INPUT, Stop, complain, run_until_signalled
 
 
 def main() -> int:
     """Run the node until signalled; returns the exit status."""
+    try:
+        keep_to_this_machine()
+    except LoopbackError as error:
+        complain(f"world: {error}")
+        return BAD_INPUT
     return run_until_signalled(_work)
 
 

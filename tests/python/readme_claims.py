@@ -162,7 +162,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
     ),
     "says how robots on several hosts are set up": (
-        "ros/links/test_peers.py::test_it_is_enough_that_one_names_the_other",
+        "ros/links/test_peers.py::test_it_is_enough_that_one_names_the_other_if_that_one_is_open",
         "ros/links/test_links.py::test_who_hears_nothing_acts_once_and_comes_back",
         "ros/cli/test_other_account.py::test_an_ordinary_user_reaches_an_executor_of_root",
     ),

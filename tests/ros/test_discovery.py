@@ -3,7 +3,6 @@
 import contextlib
 import os
 import random
-import re
 import shutil
 import subprocess
 import sys
@@ -13,14 +12,18 @@ from pathlib import Path
 
 import pytest
 from ros_processes import PATIENCE_S
+from udp_sockets import udp_sockets
 
-RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+from mauve_rt.parts.ament_index import share_folder
+
+RANGE, PROFILES = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
 EXECUTOR = ("-m", "mauve_rt.node.executor.main", "--ros-args", "-p", "architecture:=FILE")
 PROGRAMS = {
     "executor": EXECUTOR,
     "supervisor": ("-m", "mauve_rt.node.supervisor.main", "--ros-args", "-p", "rules:=RULES"),
     "mauve": ("-m", "mauve_rt.cli", "events", "/executor"),
     "radio": ("-m", "mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[robot_1,robot_2]"),
+    "world": ("-m", "mauve_examples.mission.world", "--ros-args", "-p", "robots:=[robot_1,robot_2]"),
 }
 RELAY = """\
 mauve: 1
@@ -40,6 +43,13 @@ rules:
     when: {silence: {topic: spoken, type: std_msgs/msg/Empty, longer_than_s: 60.0}}
     do: [{kind: stop, target: relay}]
 """
+OWN_PROFILE = """\
+<dds xmlns="http://www.eprosima.com">
+  <profiles>
+    <participant profile_name="own" is_default_profile="true"><rtps><name>own</name></rtps></participant>
+  </profiles>
+</dds>
+"""
 OBSERVER = """\
 import rclpy
 rclpy.init(args=[])
@@ -56,7 +66,7 @@ def _running(
     folder: Path, words: Sequence[str], said: dict[str, str], *, wrapper: Sequence[str] = ()
 ) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     """A program in an environment that says of discovery only what is `said`, and what it prints."""
-    unsaid = {RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"}
+    unsaid = {RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", PROFILES}
     environment = {name: value for name, value in os.environ.items() if name not in unsaid}
     log = folder / f"{time.monotonic_ns()}.log"
     with log.open("wb") as output:
@@ -74,42 +84,99 @@ def _running(
         process.wait()
 
 
-def _udp_ports(process_id: int) -> set[int]:
-    """The ports of all UDP sockets that a process holds."""
-    links = []
-    for descriptor in Path(f"/proc/{process_id}/fd").iterdir():
-        with contextlib.suppress(OSError):  # closed meanwhile
-            links.append(str(descriptor.readlink()))
-    sockets = {match[1] for link in links if (match := re.match(r"socket:\[(\d+)\]", link))}
-    table = Path(f"/proc/{process_id}/net/udp").read_text("ascii").splitlines()[1:]
-    rows = [line.split() for line in table]
-    return {int(row[1].rpartition(":")[2], 16) for row in rows if row[9] in sockets}
+def _begin(process: subprocess.Popen[bytes], log: Path, domain: int) -> tuple[set[str], set[int]]:
+    """The addresses and ports of a program's UDP sockets, as soon as it has a participant."""
+    deadline = time.monotonic() + PATIENCE_S
+    # The port of its data, which it opens last: the odd ones from 11 on.
+    first = 7400 + 250 * domain
+    data = set(range(first + 11, first + 250, 2))
+    ports: set[int] = set()
+    while not ports & data:
+        assert time.monotonic() < deadline, f"no participant in domain {domain}: {ports}"
+        time.sleep(0.02)
+        assert process.poll() is None, log.read_text("utf-8")
+        ports = {port for _, port in udp_sockets(process.pid)}
+    time.sleep(0.3)  # and those that it sends by
+    sockets = udp_sockets(process.pid)
+    return {address for address, _ in sockets}, {port for _, port in sockets}
+
+
+def _words(program: str, folder: Path) -> list[str]:
+    (folder / "relay.yaml").write_text(RELAY, encoding="utf-8")
+    (folder / "rules.yaml").write_text(RULES, encoding="utf-8")
+    return [word.replace("FILE", "relay.yaml").replace("RULES", "rules.yaml") for word in PROGRAMS[program]]
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize(
     ("said", "reaches_out"),
-    [({}, False), ({RANGE: "SUBNET"}, True), ({RANGE: "SUBNET", "ROS_LOCALHOST_ONLY": "1"}, False)],
+    [
+        ({}, False),
+        ({RANGE: "LOCALHOST"}, False),
+        ({RANGE: "SUBNET"}, True),
+        ({RANGE: "SUBNET", "ROS_LOCALHOST_ONLY": "1"}, False),
+    ],
 )
 def test_only_who_is_told_so_listens_to_the_network(
     program: str, said: dict[str, str], *, reaches_out: bool, domain: int, tmp_path: Path
 ) -> None:
-    """A participant that is discovered from elsewhere is so by multicast, at a port that DDS prescribes."""
-    (tmp_path / "relay.yaml").write_text(RELAY, encoding="utf-8")
-    (tmp_path / "rules.yaml").write_text(RULES, encoding="utf-8")
-    words = [word.replace("FILE", "relay.yaml").replace("RULES", "rules.yaml") for word in PROGRAMS[program]]
-    multicast = 7400 + 250 * domain
+    """Each UDP socket of a program that stays on this machine is bound to loopback, and to no group."""
+    words = _words(program, tmp_path)
     with _running(tmp_path, words, said | {"ROS_DOMAIN_ID": str(domain)}) as (process, log):
-        deadline = time.monotonic() + PATIENCE_S
-        # The port of its data, which it opens last: the odd ones from 11 on.
-        data = set(range(multicast + 11, multicast + 250, 2))
-        ports: set[int] = set()
-        while not ports & data:
-            assert time.monotonic() < deadline, f"no participant in domain {domain}: {ports}"
-            time.sleep(0.02)
-            assert process.poll() is None, log.read_text("utf-8")
-            ports = _udp_ports(process.pid)
-        assert (multicast in ports) == reaches_out
+        addresses, ports = _begin(process, log, domain)
+        if reaches_out:
+            assert "0.0.0.0" in addresses  # noqa: S104 - as Fast DDS has it
+            assert 7400 + 250 * domain in ports  # of multicast
+        else:
+            assert addresses == {"127.0.0.1"}
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {RANGE: "OFF"},
+        {RANGE: "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"},
+        {RANGE: "SYSTEM_DEFAULT", PROFILES: "local.xml"},
+        {RANGE: "LOCALHOST", PROFILES: "local_udp.xml"},
+    ],
+)
+def test_an_executor_is_bound_to_loopback_however_it_was_told_to_stay(
+    said: dict[str, str], domain: int, tmp_path: Path
+) -> None:
+    if PROFILES in said:
+        said = said | {PROFILES: f"{share_folder('mauve_rt')}/dds/{said[PROFILES]}"}
+    words = _words("executor", tmp_path)
+    with _running(tmp_path, words, said | {"ROS_DOMAIN_ID": str(domain)}) as (process, log):
+        assert _begin(process, log, domain)[0] == {"127.0.0.1"}
+        _wait_until_logged("on this machine only: UDP bound to 127.0.0.1", process, log)
+
+
+def test_a_profile_of_the_users_own_is_kept_and_what_is_open_is_told(domain: int, tmp_path: Path) -> None:
+    own = tmp_path / "own.xml"
+    own.write_text(OWN_PROFILE, encoding="utf-8")
+    said = {RANGE: "LOCALHOST", PROFILES: str(own), "ROS_DOMAIN_ID": str(domain)}
+    with _running(tmp_path, _words("executor", tmp_path), said) as (process, log):
+        assert "0.0.0.0" in _begin(process, log, domain)[0]  # noqa: S104 - as Fast DDS has it
+        _wait_until_logged(f"as {PROFILES}={own} takes the place of the project's profile", process, log)
+        assert "not on this machine only: UDP bound to 0.0.0.0" in log.read_text("utf-8")
+
+
+@pytest.mark.parametrize("program", sorted(PROGRAMS.keys() - {"mauve"}))  # loads the middleware before
+def test_another_middleware_is_refused_with_what_to_set(program: str, domain: int, tmp_path: Path) -> None:
+    said = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp", "ROS_DOMAIN_ID": str(domain)}
+    with _running(tmp_path, _words(program, tmp_path), said) as (process, log):
+        assert process.wait(PATIENCE_S) == 2
+        [line] = log.read_text("utf-8").splitlines()
+        assert line.startswith(f"{program}: RMW_IMPLEMENTATION=rmw_cyclonedds_cpp cannot be bound")
+        assert line.endswith(f"or {RANGE}=SUBNET to let other machines in.")
+
+
+def _wait_until_logged(text: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while text not in log.read_text("utf-8"):
+        assert process.poll() is None, log.read_text("utf-8")
+        assert time.monotonic() < deadline, log.read_text("utf-8")
+        time.sleep(0.05)
 
 
 @pytest.fixture
@@ -175,5 +242,5 @@ def test_another_machine_sees_an_executor_only_where_it_was_opened(
             _wait_until_seen({"/opened/executor"}, *stranger)
             time.sleep(1.0)  # what discovers one does not take longer for the other
             assert "/untold/executor" not in _seen(stranger[1])
-        assert untold_says.read_text("utf-8").count("discovery on this machine only") == 1
+        assert untold_says.read_text("utf-8").count("on this machine only: UDP bound to 127.0.0.1;") == 1
         assert opened_says.read_text("utf-8").count(f"discovery beyond this machine ({RANGE}=SUBNET)") == 1

@@ -12,11 +12,11 @@ stderr, nothing started), 1 otherwise.
 import gc
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from mauve_rt.node.shared.discovery import limit_discovery
 from mauve_rt.node.shared.lean_start import leave_out_unused
+from mauve_rt.node.shared.loopback import LoopbackError, Reach, keep_to_this_machine, reach, udp_sockets
 from mauve_rt.node.shared.process import (
     BAD_INPUT,
     FAILED,
@@ -45,14 +45,18 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
         sys.stdout.write(help_text())
         leave_now(0)
-    discovery = limit_discovery()
+    try:
+        keep_to_this_machine()
+    except LoopbackError as error:
+        complain(f"executor: {error}")
+        leave_now(BAD_INPUT)
     leave_out_unused()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work
-    leave_now(run_until_signalled(lambda stop: _work(words, stop, discovery)))
+    leave_now(run_until_signalled(lambda stop: _work(words, stop)))
 
 
-def _work(words: list[str], stop: Stop, discovery: str) -> int:
+def _work(words: list[str], stop: Stop) -> int:
     # Imported here so that a signal while modules load is handled; what takes long comes before begin().
     import mauve_rt.node.executor.node  # noqa: F401, PLC0415
     from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
@@ -67,10 +71,10 @@ def _work(words: list[str], stop: Stop, discovery: str) -> int:
     except MauveError as error:
         complain(f"executor: {error}")
         return FAILED if error_code(error) == "realtime_denied" else BAD_INPUT
-    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop, discovery)
+    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop)
 
 
-def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event, discovery: str) -> int:
+def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event) -> int:
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
@@ -78,31 +82,34 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     from mauve_rt.node.shared.background_console import init_logging_apart, last_lines  # noqa: PLC0415
     from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
 
-    node, opens_late = None, False
-    addresses = usable_addresses()
+    node, discovery, opens_late = None, None, False
+    addresses, sockets = usable_addresses(), udp_sockets()
     try:
         init_logging_apart(words, signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
         node = ExecutorNode(runtime, namespace=namespace)
+        discovery = reach(sockets)
         # Components in Python would wait for the interpreter while modules load: then these come first.
         waits_for_python = any(map(runtime.has_python_parts, runtime.components()))
         opens_late = settings.autostart and not waits_for_python
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"executor: {error}")
-    if node is None or not (opens_late or _open(node)):
+    if discovery is None or node is None or not (opens_late or _open(node)):
         node = None
         gc.collect()  # what there is of the node holds itself alone, and the DDS participant with it
         last_lines()
         try_shutdown()
         return BAD_INPUT
-    if discovery:
-        node.get_logger().info(discovery)
     for remark in settings.remarks:
         node.get_logger().warning(remark)
     status = FAILED
     interfaces = NetworkInterfaces(node, node.watch, before=addresses)
     try:
-        status = _autostart(node, stop) if settings.autostart else 0
+        if settings.autostart:
+            status = _autostart(node, stop, discovery)
+        else:
+            discovery.log(node.get_logger())
+            status = 0
         if status == 0 and opens_late and not _open(node):
             status = BAD_INPUT
         if status == 0:
@@ -127,14 +134,21 @@ def _open(node: Any) -> bool:
     return True
 
 
-def _autostart(node: Any, stop: threading.Event) -> int:
+def _autostart(node: Any, stop: threading.Event, discovery: Reach) -> int:
+    status = _change_state(node.trigger_configure, stop, refused=BAD_INPUT)
+    if status == 0:
+        discovery.log(node.get_logger())  # before anything runs; bad input has one line of its own
+        status = _change_state(node.trigger_activate, stop, refused=FAILED)
+    return status
+
+
+def _change_state(transition: Callable[[], Any], stop: threading.Event, *, refused: int) -> int:
     from rclpy.lifecycle import TransitionCallbackReturn  # noqa: PLC0415
 
-    for transition, status in ((node.trigger_configure, BAD_INPUT), (node.trigger_activate, FAILED)):
-        result = TransitionCallbackReturn.SUCCESS if stop.is_set() else transition()
-        if result != TransitionCallbackReturn.SUCCESS:
-            return FAILED if result == TransitionCallbackReturn.ERROR else status
-    return 0
+    result = TransitionCallbackReturn.SUCCESS if stop.is_set() else transition()
+    if result == TransitionCallbackReturn.SUCCESS:
+        return 0
+    return FAILED if result == TransitionCallbackReturn.ERROR else refused
 
 
 def _spin(node: Any, stop: threading.Event) -> int:

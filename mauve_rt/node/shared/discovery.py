@@ -1,32 +1,63 @@
 """How far ROS discovery reaches: this machine, unless the environment says otherwise."""
 
+import filecmp
 import os
+from pathlib import Path
 
-_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+RANGE, LOCALHOST_ONLY = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_PEERS, _SERVER = "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"
 _BEYOND = ("SUBNET", "SYSTEM_DEFAULT")
+# Profiles of Fast DDS that bind to loopback: with shared memory, and without it.
+PROFILE, UDP_PROFILE = (Path(__file__).with_name(name) for name in ("local.xml", "local_udp.xml"))
 
 
-def limit_discovery() -> str:
-    """Stay on this machine unless the environment says how far to reach; returns what to tell, or nothing.
+def limit_discovery() -> None:
+    """Stay on this machine unless the environment says how far to reach; so do the children of this process.
 
-    For each of our programs, at its start: `rclpy.init` reads what this sets, and no thread may be there that
-    reads the environment meanwhile. rcl takes an empty value for none, and ROS_LOCALHOST_ONLY=1 is above all
-    others to it.
+    At the start of a program: `rclpy.init` reads what this sets, and no thread may be there that reads the
+    environment while this runs. rcl takes an empty value for none.
     """
-    if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
+    if not _is_localhost_only() and not os.environ.get(RANGE):
+        os.environ[RANGE] = "LOCALHOST"
+
+
+def opened_by() -> str:
+    """The settings that let discovery reach beyond this machine; "" where there are none."""
+    reach = os.environ.get(RANGE) or "LOCALHOST"
+    if has_own_profile():
         return ""
-    chosen = not os.environ.get(_RANGE)
-    if chosen:
-        os.environ[_RANGE] = "LOCALHOST"
-    reach = os.environ[_RANGE]
-    peers = os.environ.get("ROS_STATIC_PEERS") if reach != "OFF" else None
-    if reach in _BEYOND or peers:
-        where = f"{_RANGE}={reach}" + (f", ROS_STATIC_PEERS={peers}" if peers else "")
-        return f"discovery beyond this machine ({where}): without DDS Security anyone there can reconfigure"
-    return f"discovery on this machine only; {_RANGE} can widen it" if chosen else ""
+    server = [f"{_SERVER}={os.environ[_SERVER]}"] if os.environ.get(_SERVER) else []
+    if _is_localhost_only() or reach == "OFF":
+        return ", ".join(server)
+    peers = [f"{_PEERS}={os.environ[_PEERS]}"] if os.environ.get(_PEERS) else []
+    is_open = reach in _BEYOND or peers or server
+    return ", ".join([f"{RANGE}={reach}", *peers, *server]) if is_open else ""
 
 
 def stays_on_this_machine() -> bool:
-    """Whether the environment keeps discovery to this machine, and to nothing else."""
-    is_local = os.environ.get(_RANGE) == "LOCALHOST" or os.environ.get("ROS_LOCALHOST_ONLY") == "1"
-    return is_local and not (os.environ.get("ROS_STATIC_PEERS") or os.environ.get("ROS_DISCOVERY_SERVER"))
+    """Whether discovery finds the participants of this machine, and no others."""
+    is_local = _is_localhost_only() or os.environ.get(RANGE) == "LOCALHOST" or has_own_profile()
+    return is_local and not (is_off() or opened_by())
+
+
+def is_off() -> bool:
+    """Whether discovery finds nobody at all."""
+    return os.environ.get(RANGE) == "OFF" and not _is_localhost_only()
+
+
+def has_own_profile() -> bool:
+    """Whether the environment names one of the project's profiles of Fast DDS, by the user or a parent."""
+    path = os.environ.get(PROFILES, "")
+    return path != "" and any(_is_same(path, own) for own in (PROFILE, UDP_PROFILE))
+
+
+def _is_localhost_only() -> bool:
+    return os.environ.get(LOCALHOST_ONLY) == "1"  # to rcl this one is above all others
+
+
+def _is_same(path: str, own: Path) -> bool:
+    try:
+        return filecmp.cmp(path, own, shallow=False)  # the installed one is a copy
+    except OSError:
+        return False

@@ -9,9 +9,9 @@ stderr).
 import sys
 from collections.abc import Sequence
 
-from mauve_rt.node.shared.discovery import limit_discovery
 from mauve_rt.node.shared.lean_start import leave_out_unused
-from mauve_rt.node.shared.process import Stop, asks_for_help, run_until_signalled
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.process import BAD_INPUT, Stop, asks_for_help, complain, run_until_signalled
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,7 +22,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         sys.stdout.write(help_text())
         return 0
-    limit_discovery()
+    try:
+        keep_to_this_machine()
+    except LoopbackError as error:
+        complain(f"supervisor: {error}")
+        return BAD_INPUT
     leave_out_unused()
     return run_until_signalled(lambda stop: _work(words, stop))
 

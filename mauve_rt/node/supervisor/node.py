@@ -30,6 +30,7 @@ from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
 from mauve_rt.interfaces.outside_feeds import OutsideFeeds
 from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
+from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.setting_parameters import declare_settings
@@ -176,9 +177,10 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
         remarks = check_arguments(arguments)
-        addresses = usable_addresses()
+        addresses, sockets = usable_addresses(), udp_sockets()
         init_logging_apart(arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Node(NODE_NAME)
+        discovery = reach(sockets)
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"supervisor: {error}")
         try_shutdown()
@@ -189,6 +191,7 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         supervisor = Supervisor(node, RulesFile(_rules_path(node)))
         interfaces = NetworkInterfaces(node, supervisor.watch, before=addresses)
         executor.add_node(node)
+        discovery.log(node.get_logger())
         for remark in remarks:
             node.get_logger().warning(remark)
         while not stop.is_set():

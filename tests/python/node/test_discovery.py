@@ -1,45 +1,97 @@
-"""How far discovery reaches, as the environment says it."""
+"""How far discovery reaches, as the environment says it, and what binds a program to loopback."""
 
 import os
+from pathlib import Path
 
 import pytest
 
-from mauve_rt.node.shared.discovery import limit_discovery
+from mauve_rt.node.shared import loopback
+from mauve_rt.node.shared.discovery import PROFILE, PROFILES, UDP_PROFILE, opened_by, stays_on_this_machine
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine, reach
 
-RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-HERE = f"discovery on this machine only; {RANGE} can widen it"
-BEYOND = "discovery beyond this machine"
+RANGE, PEERS, SERVER = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"
+ONLY, TRANSPORTS = "ROS_LOCALHOST_ONLY", "FASTDDS_BUILTIN_TRANSPORTS"
+OTHERS = ("FASTDDS_DEFAULT_PROFILES_FILE", "RMW_IMPLEMENTATION")
+BOUND = {RANGE: "SYSTEM_DEFAULT", PROFILES: str(PROFILE)}
+BOUND_BY_UDP = {RANGE: "SYSTEM_DEFAULT", PROFILES: str(UDP_PROFILE)}
+
+
+@pytest.fixture
+def environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.MonkeyPatch:
+    """Without a word of discovery; what the case sets is undone."""
+    for name in (RANGE, PEERS, SERVER, ONLY, TRANSPORTS, PROFILES, *OTHERS):
+        monkeypatch.setenv(name, "")  # so that what the code sets is undone
+        monkeypatch.delenv(name)
+    monkeypatch.chdir(tmp_path)
+    return monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("said", "reach", "told"),
+    ("said", "bound", "opened"),
     [
-        ({}, "LOCALHOST", HERE),
-        ({RANGE: ""}, "LOCALHOST", HERE),
-        ({"ROS_LOCALHOST_ONLY": "0"}, "LOCALHOST", HERE),
-        ({RANGE: "LOCALHOST"}, "LOCALHOST", ""),
-        ({RANGE: "OFF", "ROS_STATIC_PEERS": "10.0.0.7"}, "OFF", ""),
-        ({RANGE: "SUBNET"}, "SUBNET", f"{BEYOND} ({RANGE}=SUBNET)"),
-        ({RANGE: "SYSTEM_DEFAULT"}, "SYSTEM_DEFAULT", f"{BEYOND} ({RANGE}=SYSTEM_DEFAULT)"),
-        (
-            {"ROS_STATIC_PEERS": "10.0.0.7"},
-            "LOCALHOST",
-            f"{BEYOND} ({RANGE}=LOCALHOST, ROS_STATIC_PEERS=10.0.0.7)",
-        ),
+        ({}, BOUND, ""),
+        ({RANGE: ""}, BOUND, ""),
+        ({ONLY: "0"}, BOUND, ""),
+        ({RANGE: "LOCALHOST"}, BOUND, ""),
+        ({RANGE: "LOCALHOST", TRANSPORTS: "UDPv4"}, BOUND_BY_UDP, ""),
+        ({RANGE: "OFF", PEERS: "10.0.0.7"}, {RANGE: "OFF", PROFILES: str(PROFILE)}, ""),
+        ({RANGE: "SUBNET"}, {RANGE: "SUBNET"}, f"{RANGE}=SUBNET"),
+        ({RANGE: "SYSTEM_DEFAULT"}, {RANGE: "SYSTEM_DEFAULT"}, f"{RANGE}=SYSTEM_DEFAULT"),
+        ({PEERS: "10.0.0.7"}, {RANGE: "LOCALHOST"}, f"{RANGE}=LOCALHOST, {PEERS}=10.0.0.7"),
+        ({SERVER: "10.0.0.7:11811"}, {RANGE: "LOCALHOST"}, f"{RANGE}=LOCALHOST, {SERVER}=10.0.0.7:11811"),
         # To rcl this one is above all others.
-        ({"ROS_LOCALHOST_ONLY": "1", RANGE: "SUBNET"}, "SUBNET", ""),
-        ({"ROS_LOCALHOST_ONLY": "1"}, None, ""),
+        ({ONLY: "1", RANGE: "SUBNET", PEERS: "10.0.0.7"}, BOUND, ""),
+        ({ONLY: "1"}, BOUND, ""),
+        # As a parent leaves it to its children.
+        (BOUND, BOUND, ""),
+        (BOUND_BY_UDP, BOUND, ""),
     ],
 )
-def test_what_the_environment_says_holds(
-    said: dict[str, str], reach: str | None, told: str, monkeypatch: pytest.MonkeyPatch
+def test_who_stays_on_this_machine_is_bound_to_loopback(
+    said: dict[str, str], bound: dict[str, str], opened: str, environment: pytest.MonkeyPatch
 ) -> None:
-    for name in (RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv(RANGE, "")  # so that what the call sets is undone
-    monkeypatch.delenv(RANGE)
     for name, value in said.items():
-        monkeypatch.setenv(name, value)
-    answer = limit_discovery()
-    assert (told in answer) if told else answer == ""
-    assert os.environ.get(RANGE) == reach
+        environment.setenv(name, value)
+    keep_to_this_machine()
+    found = {name: os.environ[name] for name in (RANGE, PROFILES) if name in os.environ}
+    assert found == bound
+    assert opened_by() == opened
+    assert stays_on_this_machine() == (bound in (BOUND, BOUND_BY_UDP))
+    if stays_on_this_machine():
+        assert os.environ.get(ONLY) != "1"
+
+
+@pytest.mark.parametrize("name", [PROFILES, "FASTDDS_DEFAULT_PROFILES_FILE"])
+def test_a_profile_of_the_users_own_is_left_alone(name: str, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv(name, "own.xml")
+    keep_to_this_machine()
+    assert os.environ[RANGE] == "LOCALHOST"
+    assert os.environ[name] == "own.xml"
+
+
+def test_so_is_one_in_the_current_folder(environment: pytest.MonkeyPatch) -> None:
+    Path("DEFAULT_FASTRTPS_PROFILES.xml").touch()
+    keep_to_this_machine()
+    assert PROFILES not in os.environ
+    assert os.environ[RANGE] == "LOCALHOST"
+
+
+@pytest.mark.parametrize("middleware", ["rmw_cyclonedds_cpp", "rmw_zenoh_cpp", "rmw_connextdds"])
+def test_a_middleware_that_cannot_be_bound_is_refused(
+    middleware: str, environment: pytest.MonkeyPatch
+) -> None:
+    environment.setenv("RMW_IMPLEMENTATION", middleware)
+    expected = f"{middleware} cannot .* Set RMW_IMPLEMENTATION=rmw_fastrtps_cpp, or {RANGE}=SUBNET to let "
+    with pytest.raises(LoopbackError, match=expected):
+        keep_to_this_machine()
+    environment.setenv(RANGE, "SUBNET")
+    keep_to_this_machine()
+
+
+def test_a_profile_that_binds_nothing_ends_the_program(environment: pytest.MonkeyPatch) -> None:
+    """Whatever the reason, such as another Fast DDS, which reads another variable."""
+    keep_to_this_machine()
+    environment.setattr(loopback, "udp_sockets", lambda: {"7": "0.0.0.0"})  # noqa: S104 - as of Fast DDS
+    with pytest.raises(LoopbackError, match=r"UDP bound to 0\.0\.0\.0 in spite of"):
+        reach({})
+    assert not reach({"7": "0.0.0.0"}).is_warning  # noqa: S104 - it was there before

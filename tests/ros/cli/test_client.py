@@ -18,6 +18,7 @@ from mauve_msgs.srv import ListComponents, Stop
 from mauve_rt.cli import client as client_module
 from mauve_rt.cli.client import NoExecutorError, connected
 from mauve_rt.cli.discovery import Discovery
+from mauve_rt.errors import ParameterError
 
 
 class Peer:
@@ -166,3 +167,13 @@ def test_beyond_this_machine_nobody_can_be_counted(domain: int, monkeypatch: pyt
     with connected() as client:
         assert client.find_executors(wait_s=1.0) == []
     assert time.monotonic() - began_s >= 1.0
+
+
+def test_a_middleware_that_cannot_be_bound_to_loopback_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")  # the one that is loaded stays
+    with (
+        pytest.raises(ParameterError, match="Set RMW_IMPLEMENTATION=rmw_fastrtps_cpp"),
+        connected(first=True),
+    ):
+        pass

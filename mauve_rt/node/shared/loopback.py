@@ -1,0 +1,160 @@
+"""Programs that stay on this machine bind their UDP sockets to its loopback interface, 127.0.0.1.
+
+The range LOCALHOST alone does not: rmw_fastrtps asks nobody elsewhere then, but listens on every address and
+answers anyone who asks. A white list of Fast DDS binds the sockets, and only a profile can give it. With the
+range LOCALHOST rmw_fastrtps adds a transport without the white list to every profile. So the range becomes
+SYSTEM_DEFAULT, and the profile `local.xml` does all that LOCALHOST does. Nodes of this machine that reach
+further still find the program: it announces itself to the ports of 127.0.0.1, where they listen, too.
+"""
+
+import os
+import re
+import socket
+import struct
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mauve_rt.node.shared.discovery import (
+    LOCALHOST_ONLY,
+    PROFILE,
+    PROFILES,
+    RANGE,
+    UDP_PROFILE,
+    has_own_profile,
+    is_off,
+    limit_discovery,
+    opened_by,
+    stays_on_this_machine,
+)
+
+_OTHER_PROFILES, _TRANSPORTS = "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS"
+_FILE_HERE = Path("DEFAULT_FASTRTPS_PROFILES.xml")  # which Fast DDS reads from the current folder
+_MIDDLEWARE, _FAST_DDS = "RMW_IMPLEMENTATION", "rmw_fastrtps"
+_SELF = Path("/proc/self")
+_IPV4_DIGITS = 8
+
+
+class LoopbackError(Exception):
+    """A program that stays on this machine cannot bind its sockets to loopback; says what to set."""
+
+
+class Reach(NamedTuple):
+    """How far a program reaches, as its sockets have it."""
+
+    text: str
+    is_warning: bool
+
+    def log(self, logger: Any) -> None:
+        """Write it to the log of a node."""
+        (logger.warning if self.is_warning else logger.info)(self.text)
+
+
+def keep_to_this_machine() -> None:
+    """Stay on this machine, bound to loopback, unless the environment says how far to reach.
+
+    Once, at the start of a program, before its first ROS context; for every context after it, and for the
+    children of this process, too. No thread may be there that reads the environment while this runs.
+
+    Raises:
+        LoopbackError: the middleware cannot be bound so.
+    """
+    limit_discovery()
+    set_environment(loopback_environment())
+
+
+def loopback_environment(*, shared_memory: bool = True) -> dict[str, str | None]:
+    """The variables that bind to loopback (None: to be removed); none where the program reaches further.
+
+    A profile of the user's own is left alone: `reach` reports what is bound then.
+
+    Raises:
+        LoopbackError: the middleware cannot be bound so.
+    """
+    if not (stays_on_this_machine() or is_off()):
+        return {}
+    middleware = os.environ.get(_MIDDLEWARE) or _FAST_DDS
+    if not middleware.startswith(_FAST_DDS):
+        if is_off():
+            return {}
+        raise LoopbackError(
+            f"{_MIDDLEWARE}={middleware} cannot be bound to loopback from here, so other machines could "
+            f"reconfigure in spite of {RANGE}=LOCALHOST. Set {_MIDDLEWARE}=rmw_fastrtps_cpp, or "
+            f"{RANGE}=SUBNET to let other machines in."
+        )
+    if users_profile():
+        return {}
+    by_udp = not shared_memory or os.environ.get(_TRANSPORTS) == "UDPv4"
+    profile: dict[str, str | None] = {PROFILES: str(UDP_PROFILE if by_udp else PROFILE)}
+    return profile if is_off() else profile | {RANGE: "SYSTEM_DEFAULT", LOCALHOST_ONLY: None}
+
+
+def users_profile() -> str:
+    """The user's own profile of Fast DDS, by what sets it; "" where there is none."""
+    for name in (PROFILES, _OTHER_PROFILES):
+        if os.environ.get(name) and not (name == PROFILES and has_own_profile()):
+            return f"{name}={os.environ[name]}"
+    return str(_FILE_HERE.absolute()) if _FILE_HERE.exists() else ""
+
+
+def set_environment(variables: dict[str, str | None]) -> None:
+    """Set variables of the environment, and remove those that are None."""
+    for name, value in variables.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
+
+
+def udp_sockets(process: Path = _SELF) -> dict[str, str]:
+    """The addresses that the UDP sockets of a process are bound to, by inode; none where /proc is missing."""
+    try:
+        held = {_target(link) for link in (process / "fd").iterdir()}
+        tables = [process / "net" / name for name in ("udp", "udp6")]
+        lines = [line for table in tables if table.exists() for line in table.read_text("ascii").splitlines()]
+    except OSError:
+        return {}
+    rows = [line.split() for line in lines]  # a heading has no socket of ours
+    return {row[9]: _address(row[1].partition(":")[0]) for row in rows if f"socket:[{row[9]}]" in held}
+
+
+def reach(before: dict[str, str]) -> Reach:
+    """How far the program reaches by the sockets that it has, but for those it had before its node.
+
+    Raises:
+        LoopbackError: they are to be bound to loopback and are not.
+    """
+    now = udp_sockets()
+    addresses = sorted({now[inode] for inode in now.keys() - before.keys()})
+    bound = f"UDP bound to {', '.join(addresses) or 'no address'}"
+    if addresses and all(address.startswith("127.") for address in addresses):
+        return Reach(
+            f"on this machine only: {bound}; {RANGE}=SUBNET lets other machines in", is_warning=False
+        )
+    if has_own_profile() and addresses:
+        raise LoopbackError(
+            f"{bound} in spite of {PROFILES}={os.environ[PROFILES]}; is this file readable XML?"
+        )
+    opened = opened_by()
+    if opened:
+        text = f"discovery beyond this machine ({opened}): without DDS Security anyone there can reconfigure"
+        return Reach(f"{text}; {bound}", is_warning=False)
+    profile = users_profile()
+    if profile and addresses:
+        remedy = f"To close it, set {RANGE}=SYSTEM_DEFAULT and a profile as share/mauve_rt/dds/local.xml"
+        text = f"not on this machine only: {bound}, as {profile} takes the place of the project's profile"
+        return Reach(f"{text}. Other machines can reconfigure. {remedy}.", is_warning=True)
+    return Reach(f"discovery stays on this machine; {bound}", is_warning=False)
+
+
+def _target(link: Path) -> str:
+    try:
+        return str(link.readlink())
+    except OSError:  # closed since
+        return ""
+
+
+def _address(digits: str) -> str:
+    if len(digits) == _IPV4_DIGITS:
+        return socket.inet_ntop(socket.AF_INET, struct.pack("=I", int(digits, 16)))
+    words = [int(word, 16) for word in re.findall("." * _IPV4_DIGITS, digits)]
+    return socket.inet_ntop(socket.AF_INET6, struct.pack("=4I", *words))
