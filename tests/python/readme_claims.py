@@ -373,6 +373,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "stay on this machine unless `ROS_AUTOMATIC_DISCOVERY_RANGE` says otherwise": (
         "ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",
         "ros/test_discovery.py::test_another_machine_sees_an_executor_only_where_it_was_opened",
+        "ros/links/test_closed_door.py::test_nothing_from_another_machine_comes_through_a_closed_door",
     ),
     # ---- record a run
     "From the start with `-p bag:=DIR`": ("ros/executor/test_process.py::test_signal_seals_the_bag",),
