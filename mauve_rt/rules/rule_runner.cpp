@@ -415,10 +415,16 @@ std::string RuleRunner::follow() {
   }
 }
 
-void RuleRunner::tell() {
+/// Takes the engine's decisions; how many were left out, because those of their rule wait for a report.
+std::uint64_t RuleRunner::collect() {
+  std::uint64_t left_out = 0;
   while (const std::optional<Decision> decision = engine_->take()) {
     Rule& rule = *rules_[static_cast<std::size_t>(decision->rule)];
-    rule.held.push_back({.decision = *decision, .action = {}, .number = made_++});
+    if (rule.held.size() < kMostTold || is_outcome(*decision)) {
+      rule.held.push_back({.decision = *decision, .action = {}, .number = made_++});
+    } else {
+      ++left_out;
+    }
     host_.architecture().record({.sequence = 0,
                                  .time_ns = decision->stamp_ns,
                                  .a = trace_code(*decision),
@@ -428,7 +434,13 @@ void RuleRunner::tell() {
                                  .kind = static_cast<std::uint16_t>(TraceKind::decision),
                                  .component = trace_number_});
   }
+  return left_out;
+}
+
+void RuleRunner::tell() {
+  const std::uint64_t left_out = collect();
   const std::lock_guard lock(told_mutex_);
+  left_out_ += left_out;
   std::vector<Told> all;
   for (const auto& rule : rules_) {
     while (!rule->held.empty()) {

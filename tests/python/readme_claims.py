@@ -302,6 +302,15 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "RuleRunnerTest.ActsWhileNothingCanBePrepared",
         "ros/executor/test_rules.py::test_what_cannot_be_made_ready_is_an_error_at_once",
     ),
+    "No rule waits for a component that another rule is about": (
+        "bench: the same beside a lower rule whose component hangs",
+        "RuleRunnerTest.ActsWhileAnothersComponentDoesNotComeToAWait",
+        "RuleRunnerTest.PreparesWhileAnothersPartIsSlow",
+    ),
+    "one whose own target hangs can stop that (`otherwise`)": (
+        "RuleRunnerTest.MakesOutputsSafeWhereItsComponentHangs",
+        "RuleRunnerTest.StopsWhereWhatItDoesCannotBeMadeReady",
+    ),
     "`mauve rules list` shows how those of an executor fare": (
         "ros/executor/test_rules.py::test_the_command_lists_and_loads",
     ),

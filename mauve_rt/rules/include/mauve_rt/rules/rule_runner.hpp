@@ -153,6 +153,7 @@ class RuleRunner {
   void report(std::size_t index);
   void deliver(Rule& rule, Act act, ActionReport report);
   bool look_around();
+  std::uint64_t collect();
   void tell();
   std::string follow();
   void start_workers();
