@@ -5,7 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mauve_rt._kernel import MauveError
+try:
+    from mauve_rt._kernel import MauveError
+except ImportError:  # who reads a bag needs no native library; whoever does is told by its own import
+
+    class MauveError(Exception):  # type: ignore[no-redef]
+        """Any error of the project."""
+
 
 __all__ = [
     "ArchitectureFileError",

@@ -43,3 +43,37 @@ def test_a_bag_is_read_and_shown(tmp_path: Path):
     assert done.stdout == f"{mauve_rt.__version__} a\n"
     assert "</html>" in page.read_text(encoding="utf-8")
     assert list(tables.glob("*.csv"))
+
+
+COMMAND = """
+import sys
+
+for name in ("mauve_rt._kernel", "mauve_rt._bridge", "mauve_msgs", "rclpy", "std_msgs", "builtin_interfaces"):
+    sys.modules[name] = None  # an import of it fails
+
+from mauve_rt.cli.main import main
+
+sys.exit(main())
+"""
+
+
+def _mauve(*words: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", COMMAND, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_command_reads_bags_without_it(tmp_path: Path):
+    bag = record_small_bag(tmp_path / "bag")
+    for words in (("--help",), ("trace", "stats", bag), ("trace", "check", bag)):
+        done = _mauve(*words)
+        assert (done.returncode, done.stderr) == (0, ""), words
+    done = _mauve("report", bag, "--out", tmp_path / "report.html")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "report.html").is_file()
+
+
+def test_what_cannot_be_loaded_is_told_in_one_line(tmp_path: Path):
+    done = _mauve("check", tmp_path / "robot.yaml")
+    assert done.returncode == 2
+    assert done.stderr.startswith("mauve: check cannot load what it needs: ")
+    assert len(done.stderr.splitlines()) == 1
