@@ -57,6 +57,7 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
 
     """
     files = bag_files(Path(path))
+    files = [file for file in files if file.stat().st_size] or files  # a kill leaves one just begun empty
     content = _Content(Path(path))
     sizes = [file.stat().st_size for file in files]
     done = 0

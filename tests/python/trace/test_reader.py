@@ -33,6 +33,17 @@ def record(source: SyntheticSource, directory: Path) -> Trace:
     return open_trace(directory)
 
 
+def test_a_last_file_that_a_kill_left_empty_is_passed_over(tmp_path: Path) -> None:
+    source = SyntheticSource(["a"])
+    source.add("a", Kind.MARK, 7, name="hello", a=1, b=-2, c=3)
+    record(source, tmp_path / "bag")
+    (tmp_path / "bag" / "bag_1.mcap").touch()
+    assert len(open_trace(tmp_path / "bag").of("a")) == 1
+    (tmp_path / "bag" / "bag_0.mcap").unlink()
+    with pytest.raises(TraceError, match="not an MCAP file"):
+        open_trace(tmp_path / "bag")
+
+
 def test_a_bag_moved_elsewhere_needs_nothing_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     source = SyntheticSource(["a"])
     source.add("a", Kind.MARK, 7, name="hello", a=1, b=-2, c=3)
