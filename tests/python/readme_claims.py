@@ -408,6 +408,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "each of which can be read alone": (
         "python/trace/test_repair.py::test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone",
+        "python/trace/test_recorder.py::test_what_latched_topics_said_last_is_in_every_file",
     ),
     "Ten times a second it becomes a finished bag": (
         "python/trace/test_bag.py::test_every_flush_leaves_a_finished_bag",
