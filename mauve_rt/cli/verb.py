@@ -36,11 +36,5 @@ def _run(verb: Verb, args: argparse.Namespace) -> int:
     except (MauveError, TraceError) as error:
         print(f"mauve: {one_line(str(error))}", file=sys.stderr)
         return BAD_USAGE
-    except ImportError as error:  # to read and to show a bag needs neither the native library nor ROS
-        remedy = "source the workspace's setup file (install/setup.bash), or build it (scripts/setup)"
-        print(
-            f"mauve: {verb.name} cannot load what it needs: {one_line(str(error))}; {remedy}", file=sys.stderr
-        )
-        return BAD_USAGE
     except KeyboardInterrupt:
         return INTERRUPTED

@@ -70,10 +70,3 @@ def test_the_command_reads_bags_without_it(tmp_path: Path):
     done = _mauve("report", bag, "--out", tmp_path / "report.html")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "report.html").is_file()
-
-
-def test_what_cannot_be_loaded_is_told_in_one_line(tmp_path: Path):
-    done = _mauve("check", tmp_path / "robot.yaml")
-    assert done.returncode == 2
-    assert done.stderr.startswith("mauve: check cannot load what it needs: ")
-    assert len(done.stderr.splitlines()) == 1
