@@ -159,7 +159,7 @@ def test_acts_undoes_and_tells(start: Start, graph: Any):
     robot = start()
     events = graph.hear(ReconfigurationEvent, f"{NODE}/events")
     robot.await_said("armed")
-    graph.spin_until(lambda: list(robot.states[-1].rules) == ["quiet"], "the state of the activation")
+    graph.spin_until(lambda: [list(each.rules) for each in robot.states[-1:]] == [["quiet"]], "activation")
     robot.await_core(USUAL)
     robot.voice.off()
     robot.await_core(SAFE)
