@@ -84,7 +84,7 @@ def _swap(swap: dict[str, Any]) -> str:
         words.append(f"{swap['silence_ms']:.0f} ms after the last sample")
     if swap.get("took_ms") is not None:
         bound = f" (at most {swap['bound_ms']:.1f} ms)" if swap["bound_ms"] is not None else ""
-        words.append(f"at work {swap['took_ms']:.1f} ms after the condition became so{bound}")
+        words.append(f"at work {swap['took_ms']:.1f} ms after the cause{bound}")
     if swap["prepare_us"] is not None:
         words.append(f"prepared in {swap['prepare_us']:.0f} us")
     if swap["blackout_us"] is not None:

@@ -124,7 +124,7 @@ def _costs(swap: Swap) -> list[str]:
     costs = [f"parked for {time_text(one.blackout_ns)}"]
     if swap.took_ms is not None:
         bound = f", {time_text(swap.bound_ms * 1e6)} at most" if swap.bound_ms is not None else ""
-        costs.append(f"released {time_text(swap.took_ms * 1e6)} after the condition became so{bound}")
+        costs.append(f"released {time_text(swap.took_ms * 1e6)} after the cause{bound}")
     if swap.prepare_us:  # nothing in simulated time
         costs.insert(0, f"prepared in {time_text(swap.prepare_us * 1e3)} while the old core ran on")
     if one.missed_releases is not None:
