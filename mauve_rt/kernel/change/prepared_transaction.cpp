@@ -34,8 +34,6 @@ const char* to_string(PreparedOutcome outcome) noexcept {
 
 namespace {
 
-constexpr time_ns_t kLook = ms_to_ns(20);
-
 std::size_t allocated_bytes() noexcept {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
@@ -86,13 +84,9 @@ class PreparedTransaction::State {
     phase.store(kCommitting, std::memory_order_release);
     return std::nullopt;
   }
-  /// Whoever calls the change off cannot wake who waits for a lock.
   bool lock_structure(time_ns_t until_ns) noexcept {
-    for (;;) {
-      const time_ns_t now = monotonic_now_ns();
-      if (architecture.commit_gate().structural.try_lock_until(std::min(until_ns, now + kLook))) return true;
-      if (now >= until_ns || is_called_off.load(std::memory_order_relaxed)) return false;
-    }
+    return lock_unless(architecture.commit_gate().structural, until_ns,
+                       [this]() MAUVE_RT { return is_called_off.load(std::memory_order_relaxed); });
   }
   void call_off() MAUVE_RT {
     const std::lock_guard gate(architecture.commit_gate().mutex);

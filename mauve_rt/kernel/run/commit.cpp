@@ -182,24 +182,14 @@ Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexce
 }
 
 bool Commit::lock(time_ns_t until_ns) noexcept {
+  const auto is_off = [this]() MAUVE_RT { return !cut_.look().is_open(); };
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    if (lock(*order_[i]->task, until_ns)) continue;
+    if (lock_unless(order_[i]->task->command_mutex(), until_ns, is_off)) continue;
+    if (!is_off()) locked_out_ = order_[i]->task;
     while (i-- > 0) order_[i]->task->command_mutex().unlock();
     return false;
   }
   return true;
-}
-
-/// Whoever calls the change off cannot wake who waits for a lock.
-bool Commit::lock(Task& task, time_ns_t until_ns) noexcept {
-  for (;;) {
-    const time_ns_t now = monotonic_now_ns();
-    if (task.command_mutex().try_lock_until(std::min(until_ns, now + kLook))) return true;
-    if (!cut_.look().is_open()) return false;
-    if (now < until_ns) continue;
-    locked_out_ = &task;
-    return false;
-  }
 }
 
 void Commit::unlock() noexcept {

@@ -217,7 +217,6 @@ class Commit {
  private:
   Participant* find(const Task& task) const MAUVE_RT;
   bool lock(time_ns_t until_ns) noexcept;
-  bool lock(Task& task, time_ns_t until_ns) noexcept;
   void unlock() noexcept;
   const Task* find_unfit() const noexcept;
   void begin() noexcept;

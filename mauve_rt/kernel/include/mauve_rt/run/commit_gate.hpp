@@ -2,17 +2,31 @@
 // What keeps changes apart: the gate that commits are known to, and what of an architecture changed when.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace mauve {
 
 class Commit;
 class Task;
+
+/// Locks until the instant, unless the commit that needs the lock is called off: a thread that waits for a lock cannot be woken
+/// for that, so it looks every 20 ms. Whether it has the lock. [rt]
+template <typename IsOff>
+bool lock_unless(PiMutex& mutex, time_ns_t until_ns, IsOff&& is_off) MAUVE_RT {
+  constexpr time_ns_t kLook = ms_to_ns(20);
+  for (;;) {
+    const time_ns_t now = monotonic_now_ns();
+    if (mutex.try_lock_until(std::min(until_ns, now + kLook))) return true;
+    if (now >= until_ns || is_off()) return false;
+  }
+}
 
 /// What a prepared commit is about, while it comes to be made. Ordinary commits that would keep it from that are called off.
 struct UrgentCommit {
