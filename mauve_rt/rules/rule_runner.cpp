@@ -63,36 +63,34 @@ void RuleRunner::start() {
   host_.architecture().changes().set_listener(&work_);
   look_around();
   for (std::size_t i = 0; i < rules_.size(); ++i) prepare(i);
-  const auto deciding = [](void* self) -> void* {
-    static_cast<RuleRunner*>(self)->run_decisions();
-    return nullptr;
-  };
   const auto following = [](void* self) -> void* {
     static_cast<RuleRunner*>(self)->run_follower();
     return nullptr;
   };
-  const auto refused = [this](const char* what) {
-    end();
-    join_workers();
-    throw Error(ErrorCode::internal, std::string("the system refuses the thread that ") + what);
+  const auto deciding = [](void* self) -> void* {
+    static_cast<RuleRunner*>(self)->run_decisions();
+    return nullptr;
   };
+  const ThreadSettings decisions{.name = "rules", .priority = kPriority, .stack_bytes = kStackBytes};
+  bool has_follower = false;
   try {
     start_workers();
+    start_thread(follower_, {.name = "rules follower"}, following);
+    has_follower = true;
+    start_thread(decision_thread_, decisions, deciding);
   } catch (...) {
     end();
+    if (has_follower) follower_.join();
     join_workers();
     throw;
   }
-  if (follower_.start({.name = "rules follower"}, following, this) != 0)
-    refused("follows the architecture for the rules");
-  if (decision_thread_.start({.name = "rules", .priority = kPriority, .stack_bytes = kStackBytes}, deciding,
-                             this) != 0) {
-    end();
-    follower_.join();
-    refused("rules decide on");
-  }
   decision_thread_.prefault_stack();
   runs_ = true;
+}
+
+void RuleRunner::start_thread(Thread& thread, const ThreadSettings& settings, void* (*entry)(void*)) {
+  if (thread.start(settings, entry, this) != 0)
+    throw Error(ErrorCode::internal, "the system refuses a thread of the rules", {.element = settings.name});
 }
 
 void RuleRunner::start_workers() {

@@ -156,6 +156,7 @@ class RuleRunner {
   std::uint64_t collect();
   void tell();
   std::string follow();
+  void start_thread(Thread& thread, const ThreadSettings& settings, void* (*entry)(void*));
   void start_workers();
   void join_workers() noexcept;
   void end() noexcept;
