@@ -129,6 +129,18 @@ class RuleRunnerTest : public Hosted<Way> {
       whole.push_back(std::move(told));
     }
   }
+  /// Both rules are ready; then the first one acts, and the second one after it, while "w" does not come to a wait.
+  void let_both_act_while_held() {
+    gate.guard(this->core(*watched));
+    this->deploy();
+    begin();
+    await_ready(0);
+    await_ready(1);
+    gate.close(this->way);
+    beat.write.write({.value = 4.0}, 1);
+    see("do");
+    beat.write.write({.value = 20.0}, 2);
+  }
   void await_ready(std::size_t rule = 0) {
     const auto is_ready = [&] {
       take();
@@ -223,15 +235,7 @@ TYPED_TEST(RuleRunnerTest, ActsWhileAnothersComponentDoesNotComeToAWait) {
   this->add_rule(too_high(3.0), {}, core("t/Counting", "w"));
   this->rules.back().about = {"w"};
   this->add_rule(too_high(10.0), {});
-  this->gate.guard(this->core(*this->watched));
-  this->deploy();
-  this->begin();
-  this->await_ready(0);
-  this->await_ready(1);
-  this->gate.close(this->way);
-  this->beat.write.write({.value = 4.0}, 1);
-  this->see("do");
-  this->beat.write.write({.value = 20.0}, 2);
+  this->let_both_act_while_held();
   this->see("done");
   EXPECT_EQ(1, this->last(Decided::done).decision.rule);
   EXPECT_EQ("t/Counting", this->present());
@@ -248,15 +252,7 @@ TYPED_TEST(RuleRunnerTest, CallsOffTheActionOfALowerRule) {
   this->add_rule(too_high(10.0), {}, core("t/Counted", "w"));
   for (auto& rule : this->rules) rule.about = {"w"};
   this->rules.back().priority = 1000;
-  this->gate.guard(this->core(*this->watched));
-  this->deploy();
-  this->begin();
-  this->await_ready(0);
-  this->await_ready(1);
-  this->gate.close(this->way);
-  this->beat.write.write({.value = 4.0}, 1);
-  this->see("do");
-  this->beat.write.write({.value = 20.0}, 2);
+  this->let_both_act_while_held();
   this->see("failed");
   EXPECT_EQ(0, this->last(Decided::failed).decision.rule);
   EXPECT_EQ(Why::withdrawn, this->last(Decided::failed).decision.why);
