@@ -7,7 +7,7 @@ from pathlib import Path
 
 try:
     from mauve_rt._kernel import MauveError
-except ImportError:  # who reads a bag needs no native library; whoever does is told by its own import
+except ImportError:  # reading a bag needs no native library; other modules fail at their own import
 
     class MauveError(Exception):  # type: ignore[no-redef]
         """Any error of the project."""

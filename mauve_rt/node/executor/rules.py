@@ -49,7 +49,7 @@ class OwnRules:
     ) -> None:
         """`topics`: those that resources are bound to; `publish` sends and records a message.
 
-        `listen` is told the resources whose silence rules wait for.
+        `listen` takes the resources for whose silence rules listen.
 
         `event` tells of what was done; `follow` lets parameters follow it.
         """

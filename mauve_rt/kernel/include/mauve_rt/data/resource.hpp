@@ -159,7 +159,7 @@ class Resource : public Configurable {
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
   /// For who calls write_sample(): a message has arrived by another way, and may be written later, or never. [rt]
   void arrived(time_ns_t time_ns) MAUVE_RT { listeners_.call_arrival(time_ns); }
-  /// All that had arrived by then was written; kForever: nobody says so any more. [rt]
+  /// All that had arrived by then was written; kForever: no receiver reports that any more. [rt]
   void caught_up(time_ns_t until_ns) MAUVE_RT { listeners_.call_caught_up(until_ns); }
   /// Why write_sample() has just refused this message, in words. [non-rt]
   virtual std::string why_refused(std::span<const std::byte> message) const;
