@@ -10,6 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 PATIENCE_S = 100.0
+RELAY = """\
+mauve: 1
+components:
+  relay: {shell: mauve_rt/Float64RelayShell, core: mauve_rt/Float64Relay, fsm: mauve_rt/Float64RelayFsm}
+resources:
+  given: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: given, direction: subscribe}}
+  passed: {kind: shared_data, type: std_msgs/msg/Float64}
+connections:
+  - [relay.input, given.read]
+  - [relay.output, passed.write]
+"""
 
 
 def wait_for_signals(process_id: int) -> None:

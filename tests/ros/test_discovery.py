@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from ros_processes import PATIENCE_S
+from ros_processes import PATIENCE_S, RELAY
 from udp_sockets import udp_sockets
 
 from mauve_rt.parts.ament_index import share_folder
@@ -25,17 +25,6 @@ PROGRAMS = {
     "radio": ("-m", "mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[robot_1,robot_2]"),
     "world": ("-m", "mauve_examples.mission.world", "--ros-args", "-p", "robots:=[robot_1,robot_2]"),
 }
-RELAY = """\
-mauve: 1
-components:
-  relay: {shell: mauve_rt/Float64RelayShell, core: mauve_rt/Float64Relay, fsm: mauve_rt/Float64RelayFsm}
-resources:
-  given: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: given, direction: subscribe}}
-  passed: {kind: shared_data, type: std_msgs/msg/Float64}
-connections:
-  - [relay.input, given.read]
-  - [relay.output, passed.write]
-"""
 RULES = """\
 mauve: 1
 rules:

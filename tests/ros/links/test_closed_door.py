@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ros_processes import PATIENCE_S, ExecutorProcess
+from ros_processes import PATIENCE_S, RELAY, ExecutorProcess
 from udp_sockets import udp_sockets
 
 from mauve_examples.mission.hosts import ADDRESS, Hosts, HostsError
@@ -22,18 +22,6 @@ RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 OPEN = {RANGE: "SUBNET"}
 FOLDER = Path(__file__).parent
 SERVICES = ["executor/stop", "executor/set_parameters", "executor/change_state"]
-ARCHITECTURE = """\
-mauve: 1
-executor: {namespace: NAME}
-components:
-  relay: {shell: mauve_rt/Float64RelayShell, core: mauve_rt/Float64Relay, fsm: mauve_rt/Float64RelayFsm}
-resources:
-  given: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: given, direction: subscribe}}
-  passed: {kind: shared_data, type: std_msgs/msg/Float64}
-connections:
-  - [relay.input, given.read]
-  - [relay.output, passed.write]
-"""
 
 
 class Robot:
@@ -52,7 +40,7 @@ class Robot:
 
     def _start(self, folder: Path, name: str, environment: dict[str, str]) -> ExecutorProcess:
         file = folder / f"{name}.yaml"
-        file.write_text(ARCHITECTURE.replace("NAME", f"/{name}"), encoding="utf-8")
+        file.write_text(f"{RELAY}executor: {{namespace: /{name}}}\n", encoding="utf-8")
         return ExecutorProcess(
             folder,
             {"ROS_DOMAIN_ID": str(self._domain), **environment},
