@@ -51,6 +51,7 @@ struct Engine::Life {
   std::optional<Act> under_way{};                     // do or undo
   Look begun{};                                       // the condition, as the last action began
   bool gives_way{false};                              // that is to be called off
+  bool acts_soon{false};                              // `do` is due, and what keeps it from it passes
   bool otherwise_begun{false};                        // since the condition has held
   std::optional<time_ns_t> waits_since_ns{};          // since when `do` may be done and is not in effect
   std::array<std::optional<bool>, kActs> in_place{};  // by Act; empty: nobody knows
@@ -160,7 +161,8 @@ void Engine::forget() noexcept {
 void Engine::forget(std::size_t rule) noexcept {
   if (pending_ && pending_->rule == rule) pending_.reset();
   Life& life = *lives_[rule];
-  life.armed = life.in_effect = life.changed_by_another = life.gives_way = life.otherwise_begun = false;
+  life.armed = life.in_effect = life.changed_by_another = life.gives_way = life.acts_soon = false;
+  life.otherwise_begun = false;
   life.under_way.reset();
   life.in_place = {};
   life.ready = {true, true, true};
@@ -176,6 +178,7 @@ void Engine::forget(std::size_t rule) noexcept {
 time_ns_t Engine::step(time_ns_t now_ns) noexcept {
   pending_.reset();
   for (const auto& life : lives_) {
+    life->acts_soon = false;
     if (life->armed) look(*life, now_ns);
   }
   for (Life* life : by_rank_) {
@@ -228,9 +231,8 @@ time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
   if (life.waits_since_ns) look_at(later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns));
   if (life.due_ns() > now_ns) {
     look_at(life.due_ns());
-  } else if (life.unready_since_ns && !life.excused) {
-    look_at(later_by(*life.unready_since_ns, kMakingReady));
   } else {
+    if (life.unready_since_ns) look_at(later_by(*life.unready_since_ns, kMakingReady));
     look_at(life.not_before_ns);
   }
   return next_ns;
@@ -258,14 +260,20 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
     return;
   }
   if (act == Act::do_ && want_otherwise(life, now_ns)) return;
-  if (!is_late_enough || pending_) return;  // in the next step, after what is pending
+  if (!is_late_enough || pending_) {  // in the next step, after what is pending
+    life.acts_soon = act == Act::do_ && life.not_before_ns <= later_by(now_ns, kMakingReady);
+    return;
+  }
   if (const Life* other = in_the_way(life)) {
     suppress(life, act, Why::in_flight, now_ns, other);
+    life.acts_soon = act == Act::do_;
     return;
   }
   if (!life.ready[index_of(act)]) {
     if (!life.unready_since_ns) life.unready_since_ns = now_ns;
-    if (now_ns >= later_by(*life.unready_since_ns, kMakingReady)) suppress(life, act, Why::not_ready, now_ns);
+    const bool is_late = now_ns >= later_by(*life.unready_since_ns, kMakingReady);
+    if (is_late) suppress(life, act, Why::not_ready, now_ns);
+    life.acts_soon = act == Act::do_ && !is_late;
     return;
   }
   pending_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
@@ -298,14 +306,14 @@ const Engine::Life* Engine::in_the_way(const Life& life) noexcept {
 }
 
 /// A rule of higher rank that is about one of the same components, and has done or is about to do what it does. One that
-/// cannot leaves the way free: something else than nothing.
+/// cannot for longer than a moment leaves the way free: something else than nothing.
 const Engine::Life* Engine::outranking(const Life& life) const noexcept {
   for (const Life* other : by_rank_) {
     if (other == &life) return nullptr;
     if (!other->armed || !life.contends[other->index]) continue;
     const bool begins = other->under_way == Act::do_;
     const bool is_next = pending_ && pending_->rule == other->index && pending_->act == Act::do_;
-    if (other->in_effect || begins || is_next) return other;
+    if (other->in_effect || begins || is_next || other->acts_soon) return other;
   }
   return nullptr;
 }
@@ -368,6 +376,12 @@ void Engine::otherwise_ended(Life& life, Ended how, time_ns_t now_ns) noexcept {
 std::optional<Act> Engine::gives_way(std::size_t rule) const noexcept {
   const Life& life = *lives_[rule];
   return life.gives_way ? life.under_way : std::nullopt;
+}
+
+bool Engine::may_prepare(std::size_t rule) const noexcept {
+  return std::none_of(lives_.begin(), lives_.end(), [&](const auto& other) {
+    return other->contends[rule] && (other->under_way || other->acts_soon);
+  });
 }
 
 bool Engine::contend(std::size_t one, std::size_t other) const noexcept {

@@ -222,7 +222,7 @@ void RuleRunner::ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) 
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     if (i == index || engine_->contend(i, index)) rules_[i]->ends.fetch_add(1, std::memory_order_release);
   }
-  rules_[index]->prepares.ask();
+  rules_[index]->has_ended = true;
 }
 
 /// What was found while an action about the same is under way, or before it ended, is of yesterday.
@@ -266,8 +266,12 @@ void RuleRunner::show_status() noexcept {
     Rule& rule = *rules_[i];
     const RuleStatus status = engine_->status(i);
     if (is_locked) rule.status = status;
-    // relaxed: the thread that reads it is asked after it
-    if (rule.in_effect.exchange(status.in_effect, std::memory_order_relaxed) != status.in_effect)
+    // relaxed: the thread that reads them is asked after it
+    const bool is_other =
+        rule.in_effect.exchange(status.in_effect, std::memory_order_relaxed) != status.in_effect;
+    const bool may_prepare = engine_->may_prepare(i);
+    const bool could_prepare = rule.may_prepare.exchange(may_prepare, std::memory_order_relaxed);
+    if (std::exchange(rule.has_ended, false) || is_other || (may_prepare && !could_prepare))
       rule.prepares.ask();
   }
   if (is_locked) status_mutex_.unlock();
@@ -314,6 +318,7 @@ bool RuleRunner::prepare(std::size_t index) {
 /// components, and what is ready cannot be committed meanwhile: so that is tried only where somebody else has changed them, or
 /// the structure.
 bool RuleRunner::make_ready(Rule& rule, bool after_own) {
+  if (!rule.may_prepare.load(std::memory_order_relaxed)) return false;
   const std::uint64_t revision = host_.architecture().revision();
   const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
   Action& next = rule.action(in_effect ? Act::undo : Act::do_);

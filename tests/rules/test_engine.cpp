@@ -465,6 +465,43 @@ TEST(Rules, ARuleOfHigherRankHasTheLowerOnesActionCalledOff) {
   EXPECT_FALSE(tried.engine.gives_way(0));
 }
 
+TEST(Rules, ARuleOfHigherRankKeepsItsPlaceWhileItIsMadeReady) {
+  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1000, {"c"})});
+  tried.acts = false;
+  tried.engine.set_ready(1, Act::do_, false);
+  tried.run_to(ms(1100));
+  EXPECT_FALSE(tried.engine.pending());
+  EXPECT_FALSE(tried.engine.may_prepare(0)) << "that would be in the way of the higher one";
+  EXPECT_TRUE(tried.engine.may_prepare(1));
+  tried.run_to(ms(1101));
+  ASSERT_TRUE(tried.engine.pending()) << "one that cannot leaves the way free";
+  EXPECT_EQ(0U, tried.engine.pending()->rule);
+  EXPECT_TRUE(tried.engine.may_prepare(0));
+}
+
+TEST(Rules, ARuleOfHigherRankKeepsItsPlaceWhereItsActionWasStale) {
+  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1000, {"c"})});
+  tried.acts = false;
+  tried.run_to(ms(1001));
+  time_ns_t wait_ns = ms(10);
+  for (; wait_ns <= ms(80); wait_ns *= 2) {
+    ASSERT_TRUE(tried.engine.pending());
+    EXPECT_EQ(1U, tried.engine.pending()->rule);
+    tried.engine.begun(tried.now_ns);
+    EXPECT_FALSE(tried.engine.may_prepare(0));
+    tried.engine.ended(1, Act::do_, Ended::stale, tried.now_ns);
+    tried.run_to(tried.now_ns + wait_ns - 1);
+    EXPECT_FALSE(tried.engine.pending());
+    EXPECT_FALSE(tried.engine.may_prepare(0));
+    tried.run_to(tried.now_ns + 1);
+  }
+  tried.engine.begun(tried.now_ns);
+  tried.engine.ended(1, Act::do_, Ended::stale, tried.now_ns);
+  tried.run_to(tried.now_ns);
+  ASSERT_TRUE(tried.engine.pending()) << "one that cannot leaves the way free";
+  EXPECT_EQ(0U, tried.engine.pending()->rule);
+}
+
 TEST(Rules, OfTwoThatDoTheSameTheHigherOneHasDoneIt) {
   Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1, {"c"})});
   tried.acts = false;

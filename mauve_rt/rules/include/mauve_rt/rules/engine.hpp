@@ -124,6 +124,9 @@ class Engine {
   /// The rule's `do` or `undo` that is under way, which is to be called off: a rule of higher rank, or its own reserve action,
   /// comes before it. [rt]
   std::optional<Act> gives_way(std::size_t rule) const MAUVE_RT;
+  /// Whether its next action may be prepared now: that claims components, so it keeps another rule's action, under way or
+  /// about to begin, from being committed. [rt]
+  bool may_prepare(std::size_t rule) const MAUVE_RT;
   /// Whether the two are about one component. [rt]
   bool contend(std::size_t one, std::size_t other) const MAUVE_RT;
 

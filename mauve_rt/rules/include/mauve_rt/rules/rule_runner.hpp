@@ -67,7 +67,7 @@ struct RuleFacts {
 /// | Rule::acts, reserve | several       | several         | their own: action.hpp, reserve.hpp                          |
 /// | Rule::found       | follower        | decision thread | release/acquire: what was found lies in it                  |
 /// | Rule::ends        | decision thread | follower        | release/acquire: what was done before lies in the architecture |
-/// | Rule::in_effect   | decision thread | preparation thread | relaxed: the thread is asked after it                    |
+/// | Rule::in_effect, may_prepare | decision thread | preparation thread | relaxed: the thread is asked after it         |
 /// | Rule::status      | decision thread | facts()         | status_mutex_, which the decision thread only tries         |
 /// | Rule::held        | follower        | the same        | -                                                           |
 /// | Rule::reports, kept | preparation thread, reserve thread | follower, facts() | told_mutex_                            |
@@ -127,6 +127,8 @@ class RuleRunner {
     std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
     std::atomic<std::uint64_t> ends{0};   // of actions of this rule, and of those that contend with it
     std::atomic<bool> in_effect{false};
+    std::atomic<bool> may_prepare{true};
+    bool has_ended{false};  // an action of it, in this step of the decision thread
     RuleStatus status{};
     std::uint64_t applied{0};  // of found, by the decision thread
     bool was_present{false};   // once, so far as the decision thread knows
