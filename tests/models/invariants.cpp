@@ -12,6 +12,16 @@ void Model::check_record(const State& state, int change) {
   require(!state.changes[change].record_freed, "a change's record is used after it is freed");
 }
 
+/// A component that sleeps does not oversleep a change that was posted to it.
+void Model::check_notice(const State& state, int i) {
+  const Component& component = state.components[i];
+  if (component.slot != Slot::kPosted || component.voted) return;
+  const Change& change = state.changes[component.slot_change];
+  const bool is_to_be_notified = change.step == Request::kNotifying && change.at == i;
+  require(component.notified || is_to_be_notified || !change.cut().is_open(),
+          "the notice of a change is lost");
+}
+
 /// An execution begins: it has new parts if and only if its clock is T or later.
 void Model::check_begin(const State& state, int i) {
   const Component& component = state.components[i];

@@ -35,6 +35,7 @@ class Model {
   // invariants.cpp
   void require(bool holds, const char* invariant);
   void check_record(const State& state, int change);
+  void check_notice(const State& state, int i);
   void check_begin(const State& state, int i);
   void check_parts(const State& state, int i);
   void check_adopt(const State& state, int i);
@@ -45,6 +46,7 @@ class Model {
   // participant.cpp: the thread of a component
   void step_component(const State& from, int i);
   void wait(const State& from, int i);
+  void notice(State state, int i);
   void release(State state, int i);
   void adopt(State state, int i);
   void vote(State state, int i);

@@ -15,6 +15,7 @@ enum class Twin {
   kInstantIsFrontier,
   // Weakened participants.
   kChooseThenPublish,
+  kLooksBeforeNotice,
   kVoteDoesNotRaise,
   kReleaseDoesNotRaise,
   kStopWithoutTake,

@@ -14,6 +14,9 @@ void Model::step_component(const State& from, int i) {
   switch (component.step) {
     case Step::kWaiting:
       return wait(from, i);
+    case Step::kNoticed:
+    case Step::kLooked:
+      return notice(from, i);
     case Step::kAdopting:
       return adopt(from, i);
     case Step::kVoting:
@@ -53,10 +56,11 @@ void Model::wait(const State& from, int i) {
   const Component& component = from.components[i];
   State state = from;
   if (component.stop) return go(state, i, Step::kParking);
-  if (component.slot == Slot::kPosted && component.notified) {
-    Component& awake = state.components[i];
-    awake.notified = false, awake.slot = Slot::kBusy;
-    go(state, i, component.voted ? Step::kLooking : Step::kAdopting);
+  check_notice(from, i);
+  if (component.notified) {
+    const bool keeps_notice = is(Twin::kLooksBeforeNotice) && component.slot == Slot::kEmpty;
+    state.components[i].notified = keeps_notice;
+    go(state, i, keeps_notice ? Step::kLooked : Step::kNoticed);
   }
   if (waits_for_events(i)) {
     for (int stamp = component.entered + 1; stamp <= from.now; ++stamp) {
@@ -67,6 +71,18 @@ void Model::wait(const State& from, int i) {
   } else if (component.clock <= options_.last_instant && from.now >= component.clock) {
     release(from, i);
   }
+}
+
+/// The notice went before the look: one that comes after it stays.
+void Model::notice(State state, int i) {
+  Component& component = state.components[i];
+  if (component.step == Step::kLooked) {
+    component.notified = false;
+    return go(state, i, Step::kWaiting);
+  }
+  if (component.slot != Slot::kPosted) return go(state, i, Step::kWaiting);
+  component.slot = Slot::kBusy;
+  go(state, i, component.voted ? Step::kLooking : Step::kAdopting);
 }
 
 /// A release, before the guards of the wait are tested.

@@ -14,6 +14,8 @@ inline constexpr int kMostComponents = 3, kMostChanges = 2;
 /// What a component's thread does next. Each is one atomic operation on a shared word.
 enum class Step : std::uint8_t {
   kWaiting,     // wakes up when it is notified, or for a release
+  kNoticed,     // has taken the notice, is about to look at its slot
+  kLooked,      // of a twin only: has found its slot empty, is about to take the notice
   kAdopting,    // runs the adopt of its core
   kAdoptHung,   // an adopt that does not end
   kVoting,      // raises the cut by its last clock

@@ -94,6 +94,7 @@ INSTANTIATE_TEST_SUITE_P(
 INSTANTIATE_TEST_SUITE_P(
     TwinOfAParticipant, WeakenedChangeModel,
     ::testing::Values(
+        Weakening{"LooksBeforeNotice", {.twin = Twin::kLooksBeforeNotice}, "the notice of a change is lost"},
         Weakening{"VoteDoesNotRaise", {.twin = Twin::kVoteDoesNotRaise}, kEarlyT},
         Weakening{"ReleaseDoesNotRaise", {.parked = true, .twin = Twin::kReleaseDoesNotRaise}, kOldFromT},
         Weakening{"StopWithoutTake", {.hang = true, .twin = Twin::kStopWithoutTake}, kNotTaken},

@@ -74,10 +74,8 @@ void Task::leave_slot(std::uint32_t to) noexcept {
 /// Votes, and takes a change that is made. False when the component has parked.
 /// Throws when adopt and take of the new core took longer than it declared: the change is in, and its first fault.
 bool Task::visit_posted() {
-  if (slot_.load(std::memory_order_acquire) == kEmpty) {
-    control_.fetch_and(~kCommit, std::memory_order_acq_rel);
-    return true;
-  }
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // before the look: a later notice is not lost
+  if (slot_.load(std::memory_order_acquire) == kEmpty) return true;
   return settle_visit(visit_slot());
 }
 
@@ -94,7 +92,6 @@ bool Task::settle_visit(Visit visit) {
 }
 
 Task::Visit Task::visit_slot() noexcept {
-  control_.fetch_and(~kCommit, std::memory_order_acq_rel);  // before the look: a later notice is not lost
   if (!enter_slot()) return Visit::goes_on;
   Participant& participant = *participant_;
   if (participant.in_flight && !machine_.is_started()) {  // posted just before the park
