@@ -1,6 +1,6 @@
 """Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import overload
 
 def start_console() -> None:
@@ -24,6 +24,38 @@ class NodeWatch:
     @staticmethod
     def notify(state: str) -> None:
         """Report a state, such as READY=1, to the service manager that NOTIFY_SOCKET names, if it does."""
+
+class StopGuard:
+    """Takes requests to stop, deactivate or shut down that the node leaves unread for 200 ms.
+
+    A stop is carried out and answered; for a transition outputs are made safe, and the node answers it.
+    """
+
+    def __init__(
+        self,
+        node: int,
+        *,
+        stop: int,
+        change_state: int,
+        news: int,
+        logger: str,
+        instance_id: str,
+        codes: Mapping[str, int],
+    ) -> None:
+        """Guard from now on. Addresses of the node, the two services and a guard condition outlive it.
+
+        `news` is triggered when there is something to take; `codes` are the constants of ReplyCode.
+        """
+    def set_architecture(self, architecture: int) -> None:
+        """Stop components of this one, by its address, from now on; 0: of none."""
+    def take_answered(self) -> list[tuple[bytes, bytes]]:
+        """(request, response) of each stop that was answered here since the last call, as CDR."""
+    def take_transitions(self) -> list[tuple[int, bytes]]:
+        """(number, request) of each transition that is to be made and answered, as CDR."""
+    def answer(self, number: int, response: bytes) -> None:
+        """Send the response, CDR, to a transition of take_transitions()."""
+    def stop(self) -> None:
+        """End the guard; may be called again."""
 
 class Qos:
     """Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none."""

@@ -139,6 +139,11 @@ class Control:
                 self._under_way.pop(identity, None)
                 self._answered.notify_all()
 
+    def remember(self, request: Request, outcome: Outcome) -> None:
+        """Note what came of a request that somebody else carried out: who repeats it gets that."""
+        with self._answered:
+            self._log.add(request, outcome)
+
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
         kernel_revision = self._runtime.kernel_revision()

@@ -144,13 +144,20 @@ class PyPatient(PyCounter):
 
 
 class PyKeeping(PyCounter):
-    """Keeps the interpreter for 5 s, once there is a file of the process; says in it that it does."""
+    """Keeps the interpreter as a file of the process says, and says in it that it does.
+
+    For as many s, or until somebody opens a pipe to write.
+    """
 
     def act(self) -> None:
         """Count once, or keep it: a PyDLL's functions are called without letting go of the interpreter."""
         awaited = Path(tempfile.gettempdir()) / f"mauve_keeping_{os.getpid()}"
-        if awaited.exists() and not awaited.stat().st_size:
+        if awaited.exists() and (how := awaited.read_text("utf-8")) not in ("keeping", "over"):
             awaited.write_text("keeping", encoding="utf-8")
-            ctypes.PyDLL(None).usleep(5_000_000)
+            libc = ctypes.PyDLL(None)
+            if how.isdigit():
+                libc.usleep(int(how) * 1_000_000)
+            else:
+                libc.close(libc.open(how.encode(), os.O_RDONLY))
             awaited.write_text("over", encoding="utf-8")
         super().act()

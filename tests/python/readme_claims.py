@@ -66,6 +66,13 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "When an executor's Python side is silent for `node_silent_after_s` (5 s), its C++ side logs an error": (
         "ros/executor/test_safe_stop.py::test_a_node_whose_python_is_silent_says_so",
     ),
+    "What Python leaves unread for 0.2 s of `~/stop`, C++ carries out and answers": (
+        "ros/executor/test_stop_guard.py::test_a_stop_is_carried_out_and_told_later",
+        "ros/executor/test_stop_guard.py::test_what_hangs_is_stopped_by_force",
+    ),
+    "for a deactivation or shutdown it makes outputs safe, and the transition follows": (
+        "ros/executor/test_stop_guard.py::test_a_transition_makes_outputs_safe_at_once_and_follows",
+    ),
     "a rule (`node_silent`) can act on that": (
         "ros/executor/test_safe_stop.py::test_a_rule_acts_on_a_silent_python",
     ),

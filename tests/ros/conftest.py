@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile
 
 sys.path.insert(0, str(Path(__file__).parent))  # for ros_processes
 
-from ros_processes import PATIENCE_S, ExecutorProcess
+from ros_processes import PATIENCE_S, ExecutorProcess, keep_interpreter
 
 from mauve_msgs.msg import ReconfigurationEvent
 from mauve_msgs.srv import Stop
@@ -157,6 +157,16 @@ def start_executor(
             except subprocess.TimeoutExpired:
                 executor.process.kill()
                 executor.process.wait()
+
+
+@pytest.fixture
+def kept(architecture: Path) -> Callable[..., Path]:
+    """`keep_interpreter`, once component sleepy may keep it."""
+    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
+    before, after = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/", "PyKeeping,"
+    architecture.write_text(text.replace(f"{before}Counter,", f"{before}{after}", 1), encoding="utf-8")
+
+    return keep_interpreter
 
 
 @pytest.fixture

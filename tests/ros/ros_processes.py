@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,6 +46,17 @@ def _blocked_signals(process_id: int) -> set[int]:
         with contextlib.suppress(OSError):  # a thread that has just ended
             blocked.add(int(status.read_text("ascii").partition("SigBlk:")[2].split()[0], 16))
     return blocked
+
+
+def keep_interpreter(executor: "ExecutorProcess", how: str = "5") -> Path:
+    """Let the executor's core PyKeeping keep the interpreter; returns a file, to be removed, that says so.
+
+    For `how` seconds, or until the pipe of that path is opened to write.
+    """
+    file = Path(tempfile.gettempdir()) / f"mauve_keeping_{executor.process.pid}"
+    new = file.with_suffix(".new")
+    new.write_text(how, encoding="utf-8")
+    return new.replace(file)
 
 
 class ExecutorProcess:

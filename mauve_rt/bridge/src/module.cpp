@@ -8,6 +8,7 @@
 #include "bridge.hpp"
 #include "console.hpp"
 #include "node_watch.hpp"
+#include "stop_guard.hpp"
 
 namespace py = pybind11;
 
@@ -41,13 +42,35 @@ std::size_t open_topic(Bridge& self, const std::string& resource, const std::str
   return (self.*open)({.resource = resource, .name = topic, .type = type, .qos = qos});
 }
 
+py::bytes python_bytes(const std::vector<std::byte>& data) {
+  return {reinterpret_cast<const char*>(data.data()), data.size()};
+}
+
 py::list take_log(Bridge& self) {
   py::list all;
   for (const LoggedMessage& message : self.log().take()) {
-    const py::bytes data(reinterpret_cast<const char*>(message.data.data()), message.data.size());
-    all.append(py::make_tuple(message.topic, message.time_ns, data));
+    all.append(py::make_tuple(message.topic, message.time_ns, python_bytes(message.data)));
   }
   return all;
+}
+
+py::list take_answered(StopGuard& self) {
+  py::list all;
+  for (const auto& each : self.take_answered())
+    all.append(py::make_tuple(python_bytes(each.request), python_bytes(each.response)));
+  return all;
+}
+
+py::list take_transitions(StopGuard& self) {
+  py::list all;
+  for (const auto& each : self.take_transitions())
+    all.append(py::make_tuple(each.number, python_bytes(each.request)));
+  return all;
+}
+
+void answer_transition(StopGuard& self, std::uint64_t number, std::string_view response) {
+  const auto* const begin = reinterpret_cast<const std::byte*>(response.data());
+  self.answer(number, {begin, begin + response.size()});
 }
 
 }  // namespace
@@ -63,6 +86,31 @@ PYBIND11_MODULE(_bridge, module) {
       .def("beat", &NodeWatch::beat)
       .def("stop", &NodeWatch::stop, Unlocked())
       .def_static("notify", &NodeWatch::notify, py::arg("state"));
+  py::class_<StopGuard>(module, "StopGuard")
+      .def(py::init([](std::uintptr_t node, std::uintptr_t stop, std::uintptr_t change_state,
+                       std::uintptr_t news, const std::string& logger, const std::string& instance_id,
+                       const std::map<std::string, std::uint16_t>& codes) {
+             return std::make_unique<StopGuard>(
+                 GuardedNode{.node = *std::bit_cast<rcl_node_t*>(node),
+                             .stop = *std::bit_cast<rcl_service_t*>(stop),
+                             .change_state = *std::bit_cast<rcl_service_t*>(change_state),
+                             .news = *std::bit_cast<rcl_guard_condition_t*>(news),
+                             .logger = logger,
+                             .instance_id = instance_id,
+                             .codes = codes});
+           }),
+           py::arg("node"), py::kw_only(), py::arg("stop"), py::arg("change_state"), py::arg("news"),
+           py::arg("logger"), py::arg("instance_id"), py::arg("codes"))
+      .def(
+          "set_architecture",
+          [](StopGuard& self, std::uintptr_t architecture) {
+            self.set_architecture(std::bit_cast<Architecture*>(architecture));
+          },
+          py::arg("architecture"), Unlocked())
+      .def("take_answered", &take_answered)
+      .def("take_transitions", &take_transitions)
+      .def("answer", &answer_transition, py::arg("number"), py::arg("response"))
+      .def("stop", &StopGuard::stop, Unlocked());
   py::class_<rmw_qos_profile_t>(module, "Qos")
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,

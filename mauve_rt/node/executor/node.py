@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -28,6 +28,9 @@ from mauve_rt.node.shared.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.errors import TraceError
+
+if TYPE_CHECKING:
+    from mauve_rt.node.executor.stop_guard import StopGuard
 
 NODE_NAME = "executor"
 _HEALTH_S = 1.0
@@ -79,6 +82,7 @@ class ExecutorNode(LifecycleNode):
         )
         self._state.rules = self._rules.names
         self._node_watch: NodeWatch | None = None
+        self._guard: StopGuard | None = None
 
     def open(self) -> None:
         """Offer services and diagnostics. Once, before anything spins the node.
@@ -90,6 +94,7 @@ class ExecutorNode(LifecycleNode):
         from mauve_rt.node.executor.diagnostics import Diagnostics  # noqa: PLC0415
         from mauve_rt.node.executor.parameter_services import ParameterServices  # noqa: PLC0415
         from mauve_rt.node.executor.services import Services  # noqa: PLC0415
+        from mauve_rt.node.executor.stop_guard import StopGuard  # noqa: PLC0415
 
         query_group = MutuallyExclusiveCallbackGroup()
         self._diagnostics = Diagnostics(self, self._runtime, self._bound, self._recording, self._rules)
@@ -116,6 +121,15 @@ class ExecutorNode(LifecycleNode):
             control_group=self.control_group,
             query_group=query_group,
         )
+        self._guard = services.guard = StopGuard(
+            self,
+            self._runtime,
+            self.watch,
+            stop=services.stop_service,
+            change_state=self._service_change_state,
+            tell=services.tell_answered,
+        )
+        self._guard.follow(self._runtime)
         ParameterServices(
             self,
             self._properties,
@@ -189,6 +203,8 @@ class ExecutorNode(LifecycleNode):
 
     def _configure(self) -> None:
         self._runtime.configure()
+        if self._guard is not None:
+            self._guard.follow(self._runtime)
         self._properties.follow()
         self._bound.configure(self._runtime.model, self._runtime.architecture)
         with self._properties.lock:
@@ -287,6 +303,8 @@ class ExecutorNode(LifecycleNode):
                 self._rules.close()
                 self._bound.close()
         finally:
+            if self._guard is not None:
+                self._guard.stop()
             if self._node_watch is not None:
                 self._node_watch.stop()
             self._state.close()
@@ -307,6 +325,8 @@ class ExecutorNode(LifecycleNode):
         self._recording.stop()
         self._rules.close()
         self._bound.close()
+        if self._guard is not None:
+            self._guard.release()
         self._runtime.cleanup()
         self._properties.follow()
 

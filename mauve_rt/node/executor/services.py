@@ -20,7 +20,7 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.control.control import Control
-from mauve_rt.control.requests import Code, Outcome, RecordingOrder, Request
+from mauve_rt.control.requests import Code, Outcome, RecordingOrder, Report, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
 from mauve_rt.model.step_kinds import STEP_KINDS
@@ -31,6 +31,7 @@ from mauve_rt.node.executor.events import Event
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.rules import OwnRules
 from mauve_rt.node.executor.state import StatePublisher
+from mauve_rt.node.executor.stop_guard import StopGuard
 from mauve_rt.node.shared.watch import Watch
 
 
@@ -85,7 +86,11 @@ class Services:
             (StopRecording, "~/stop_recording", _stop_recording),
         ):
             handler = self._handler(translate)
-            self._tell_after(node.create_service(service, name, handler, callback_group=control_group))
+            opened = node.create_service(service, name, handler, callback_group=control_group)
+            self._tell_after(opened)
+            if service is Stop:
+                self.stop_service = opened
+        self.guard: StopGuard | None = None
 
     def handle(self, request: Request) -> Outcome:
         """Carry out a request, and tell of it."""
@@ -93,7 +98,27 @@ class Services:
         self._tell()
         return outcome
 
+    def note_answered(self) -> None:
+        """Take over the stops that were answered while Python did not work: they are told as any others."""
+        for ros_request, response in self.guard.take_answered() if self.guard is not None else ():
+            request = _stop(ros_request)
+            report = (Report(step="stop", component=ros_request.component),) if response.success else ()
+            outcome = Outcome(
+                code=Code(response.code),
+                message=response.message,
+                revision=self._runtime.observe().revision,
+                report=report,
+            )
+            self._control.remember(request, outcome)
+            self._untold.events.append(self._state.take_down(request, outcome))
+
+    def tell_answered(self) -> None:
+        """As note_answered(), and tell at once."""
+        self.note_answered()
+        self._tell()
+
     def _carry_out(self, request: Request) -> Outcome:
+        self.note_answered()
         if request.recording is not None and not request.recording.start:
             self._state.flush()  # the bag that ends tells of all that was in it
         outcome = self._control.handle(request)

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
@@ -190,8 +190,7 @@ def test_acts_while_a_component_in_python_keeps_the_interpreter(start: Start, gr
         ReplaceCore, f"{NODE}/replace_core", component="python", core="executor_tests/PyKeeping"
     )
     assert reply.success, reply.message
-    keeping = Path(tempfile.gettempdir()) / f"mauve_keeping_{robot.process.process.pid}"
-    keeping.touch()
+    keeping = keep_interpreter(robot.process)
     try:
         graph.spin_until(lambda: keeping.read_text() == "keeping", "the interpreter to be kept")
         began = time.monotonic()

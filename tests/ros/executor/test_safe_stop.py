@@ -5,7 +5,6 @@ import fcntl
 import os
 import signal
 import socket
-import tempfile
 import time
 import tty
 from collections.abc import Callable, Iterator
@@ -90,21 +89,6 @@ def test_a_signal_waits_for_no_lock_of_the_interpreter(
         executor.wait()
     finally:
         keeping.unlink()
-
-
-@pytest.fixture
-def kept(architecture: Path) -> Callable[[Any], Path]:
-    """`kept(executor)` lets a component keep the interpreter for 5 s; returns the file that says so."""
-    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
-    before, after = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/", "PyKeeping,"
-    architecture.write_text(text.replace(f"{before}Counter,", f"{before}{after}", 1), encoding="utf-8")
-
-    def keep(executor: Any) -> Path:
-        file = Path(tempfile.gettempdir()) / f"mauve_keeping_{executor.process.pid}"
-        file.touch()
-        return file
-
-    return keep
 
 
 class Manager:
