@@ -29,6 +29,7 @@ from reconfiguration import (
     swap_rows,
 )
 from recording import recording_rows
+from recording_kept import kept_rows
 from recording_killed import kill_rows
 from rows import Row, markdown, not_available
 from rules import rule_rows
@@ -72,6 +73,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "command": command_rows,
     "recording": recording_rows,
     "recording-killed": kill_rows,
+    "recording-kept": kept_rows,
     "reading": reading_rows,
     "mission": mission_rows,
     "links": links_rows,

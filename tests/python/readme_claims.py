@@ -423,6 +423,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "after `kill -9`, whenever that comes": (
         "python/trace/test_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
         "ros/executor/test_process.py::test_killed_executor_leaves_a_bag_that_opens",
+        "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",
+    ),
+    "A process of its own, `bag_keeper`, writes the files": (
+        "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",
+        "ros/executor/test_recording.py::test_a_keeper_writes_the_bag",
     ),
     "what is missing is less than the last 200 ms": (
         "bench: lost by kill -9 while recording 100,000 records a second, worst",
@@ -906,6 +911,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: records lost at that rate, in any round",
         "bench: bytes of a record in the bag",
     ),
+    "| the same, and of 30 MB of images a second, where `bag_keeper` writes the files": (
+        "bench: CPU of recording 100,000 records a second, a keeper writing the files",
+        "bench: CPU of recording 30 MB a second of images, a keeper writing the files",
+    ),
     "| lost by `kill -9` meanwhile, 50 times at random": (
         "bench: lost by kill -9 while recording 100,000 records a second, worst",
     ),
@@ -973,6 +982,7 @@ PROMISE_NOTHING = (
     "(6*) Of the evening",
     "(7*) Of 2026-11-25",
     "(8*) Of 2026-11-25",
+    "(9*) Of 2026-11-26",
     "With one thread in both, the start takes 1.39 x",
     "(**) Of the same day",
     "(***) Of the evening",

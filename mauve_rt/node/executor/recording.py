@@ -111,7 +111,8 @@ class Recording:
             TraceError: the folder exists already or cannot be written.
 
         """
-        from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415 - a start without a bag needs none
+        from mauve_rt.trace.bag.disk import keeper_program  # noqa: PLC0415 - a start without a bag needs none
+        from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415
 
         chosen = tuple(self._choose(topics))
         with self._lock:
@@ -124,6 +125,7 @@ class Recording:
                 split=split,
                 on_error=self._node.get_logger().error,
                 messages=self._bound,
+                keeper=keeper_program(),
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
             recorder.start(discard=self._runtime.active)

@@ -8,15 +8,16 @@ On disk, always:
                                                                       ----------------'
 
 A flush turns the waiting messages into one chunk and writes it, followed by the new tail, over the old
-tail, in one pwrite. The file is complete before and after it; a process killed between two flushes leaves
-all that was flushed. (A kill that hits the inside of that one system call, some tens of microseconds, can
-leave it half done: the kernel gives up a write between two pages when a fatal signal is pending. Power loss
-is another matter: nothing here waits for the disk.)
+tail, in one write. The file is complete before and after it; a process killed between two flushes leaves
+all that was flushed. Inside of the write it takes a `KeptDisk`: Linux gives up a write between two pages
+when its process is killed. (Power loss is another matter: nothing here waits for the disk.)
 
 The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
 the file. Format: https://mcap.dev/spec.
 """
 
+import errno
+import functools
 import os
 import struct
 import zlib
@@ -24,6 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
 from mauve_rt.trace.format.mcap_records import (
@@ -44,8 +46,8 @@ MAGIC = b"\x89MCAP0\r\n"
 class McapFile:
     """Writes one MCAP file. For one thread at a time."""
 
-    def __init__(self, path: Path, *, profile: str, library: str) -> None:
-        """Create the file, which is a complete empty one when this returns.
+    def __init__(self, path: Path, *, profile: str, library: str, disk: Disk | None = None) -> None:
+        """Create the file, which is a complete empty one as soon as there is one of that name.
 
         Raises:
             TraceError: it exists already or cannot be written.
@@ -60,14 +62,18 @@ class McapFile:
         self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
         self._before = self._now
         self._descriptor = -1
+        self._disk = disk or Disk()
+        unfinished = path.with_name(f".{path.name}.new")
         try:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-            try:
-                write_all(self._descriptor, start + self._now.tail, 0)
-            except OSError:
-                path.unlink()
-                raise
+            if path.exists():
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+            flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
+            self._descriptor = os.open(unfinished, flags, 0o644)
+            self._disk.write(self._descriptor, (start, self._now.tail), 0)
+            unfinished.rename(path)
         except OSError as error:
+            if self._descriptor >= 0:
+                unfinished.unlink(missing_ok=True)
             self.abort()
             msg = f"bag file {path}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
@@ -125,16 +131,16 @@ class McapFile:
         chunk, before = self._written, self._before = self._chunk, self._now
         if not self.is_waiting:
             return
-        block, index = chunk.build(before.data_end)
+        parts, index = chunk.build(before.data_end)
         self._chunk_indexes += index
         self._now = self._finished(
             before.counts.plus(chunk.counts),
             before.chunk_count + 1,
-            before.data_end + len(block),
-            zlib.crc32(block, before.data_crc),
+            before.data_end + sum(map(len, parts)),
+            functools.reduce(lambda crc, part: zlib.crc32(part, crc), parts, before.data_crc),
         )
         try:
-            write_all(self._descriptor, block + self._now.tail, before.data_end)
+            self._disk.write(self._descriptor, (*parts, self._now.tail), before.data_end)
         except OSError as error:
             msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
             raise TraceError(msg) from error
@@ -148,8 +154,7 @@ class McapFile:
         self._now, self._chunk = self._before, self._written
         del self._chunk_indexes[self._now.index_bytes :]
         try:
-            write_all(self._descriptor, self._now.tail, self._now.data_end)
-            os.ftruncate(self._descriptor, self.size)
+            self._disk.write(self._descriptor, (self._now.tail,), self._now.data_end, size=self.size)
         except OSError as error:
             return f"the old end could not be put back either ({error.strerror}): the file needs repair"
         return f"the file is complete up to the flush before, {self.flushed.messages} messages"
@@ -233,12 +238,3 @@ def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
     footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
     crc = zlib.crc32(footer, zlib.crc32(body))
     return b"".join((end, body, footer, struct.pack("<I", crc), MAGIC))
-
-
-def write_all(descriptor: int, data: bytes, offset: int) -> None:
-    """One pwrite; more only where the system took less (a full disk, which then says so, or over 2 GB)."""
-    rest = memoryview(data)
-    while rest:
-        written = os.pwrite(descriptor, rest, offset)
-        rest = rest[written:]
-        offset += written

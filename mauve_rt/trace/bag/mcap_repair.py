@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from mauve_rt.trace.bag.mcap_file import Summary, build_tail, write_all
+from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.mcap_file import Summary, build_tail
 from mauve_rt.trace.bag.mcap_scan import Found, McapScan, Told
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts
@@ -178,8 +179,7 @@ class FileState:
                 )
                 crc = zlib.crc32(self._missing_indexes, crc)
                 tail = self._missing_indexes + build_tail(summary, data_end=data_end, data_crc=crc)
-                write_all(descriptor, tail, self.whole_bytes)
-                os.ftruncate(descriptor, self.whole_bytes + len(tail))
+                Disk().write(descriptor, (tail,), self.whole_bytes, size=self.whole_bytes + len(tail))
             finally:
                 os.close(descriptor)
         except OSError as error:

@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Self
 
 import mauve_rt
+from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.bag.mcap_file import McapFile
 from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
 from mauve_rt.trace.bag.recorded import TopicQos
@@ -35,8 +36,8 @@ class BagWriter:
     gets the log time of that flush. Its publish time stays its own.
     """
 
-    def __init__(self, directory: Path, *, ros_distro: str = "jazzy") -> None:
-        """Create the folder (and its parents) with an empty, finished bag in it.
+    def __init__(self, directory: Path, *, ros_distro: str = "jazzy", disk: Disk | None = None) -> None:
+        """Create the folder (and its parents) with an empty, finished bag in it; closes `disk` with the bag.
 
         Raises:
             TraceError: the folder exists already, or cannot be written.
@@ -44,6 +45,7 @@ class BagWriter:
         """
         self.directory = Path(directory)
         self._ros_distro = ros_distro
+        self._disk = disk or Disk()
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
         self._topics: dict[str, _Topic] = {}
@@ -51,7 +53,14 @@ class BagWriter:
         self._stale = True  # metadata.yaml does not tell what the files hold
         self._told: set[str] = set()  # the files that metadata.yaml names
         self._flushed_ns = 0  # latest log time of all that was flushed
-        # Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it.
+        try:
+            self._create()
+        except TraceError:
+            self._disk.close()
+            raise
+
+    def _create(self) -> None:
+        """Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it."""
         unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
         try:
             exists = self.directory.exists()
@@ -193,6 +202,7 @@ class BagWriter:
         self._file.abort()
         if self._complete and self._file.path.name not in self._told:  # new and empty
             self._file.path.unlink(missing_ok=True)
+        self._disk.close()
 
     def __enter__(self) -> Self:
         """Return the writer itself: the bag is open from its construction."""
@@ -215,7 +225,8 @@ class BagWriter:
 
     def _new_file(self, directory: Path) -> McapFile:
         path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
-        return McapFile(path, profile="ros2", library=f"mauve_rt {mauve_rt.__version__}")
+        library = f"mauve_rt {mauve_rt.__version__}"
+        return McapFile(path, profile="ros2", library=library, disk=self._disk)
 
     def _write_metadata(self, directory: Path) -> None:
         topics = [_counted(topic, self._files()) for topic in self._topics.values()]

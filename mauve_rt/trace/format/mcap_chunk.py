@@ -60,33 +60,29 @@ class PendingChunk:
         self.counts.add(channel_id, log_time_ns)
         self._indexes.setdefault(channel_id, bytearray()).extend(entry)
 
-    def build(self, offset: int) -> tuple[bytes, bytes]:
-        """Return the chunk and its message indexes for this place in the file, and the chunk index."""
+    def build(self, offset: int) -> tuple[list[bytes | bytearray], bytes]:
+        """Return the chunk and its message indexes for this place in the file, in parts, and its index."""
         size = len(self.records)
         head = _CHUNK_HEAD.pack(
             self.counts.start_ns, self.counts.end_ns, size, zlib.crc32(self.records), 0, size
         )
-        parts: list[bytes | bytearray] = [
-            HEAD.pack(Opcode.CHUNK, len(head) + size),
-            head,
-            self.records,
-        ]
-        chunk_length = at = sum(map(len, parts))
+        head = HEAD.pack(Opcode.CHUNK, len(head) + size) + head
+        chunk_length = len(head) + size
+        indexes = bytearray()
         index_offsets: dict[int, int] = {}
         for channel_id, entries in self._indexes.items():
-            index_offsets[channel_id] = offset + at
-            index_head = _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries))
-            parts += [index_head, entries]
-            at += len(index_head) + len(entries)
+            index_offsets[channel_id] = offset + chunk_length + len(indexes)
+            indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries))
+            indexes += entries
         index = ChunkIndex(
             chunk_length=chunk_length,
             chunk_start_offset=offset,
             compression="",
             compressed_size=size,
             message_end_time=self.counts.end_ns,
-            message_index_length=at - chunk_length,
+            message_index_length=len(indexes),
             message_index_offsets=index_offsets,
             message_start_time=self.counts.start_ns,
             uncompressed_size=size,
         )
-        return b"".join(parts), index.to_bytes()
+        return [head, self.records, indexes], index.to_bytes()

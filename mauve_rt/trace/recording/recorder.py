@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
 from mauve_rt.trace.recording.trace_bag import (
     BATCHES,
@@ -62,6 +63,7 @@ class Recorder:
         split: Split | None = None,
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
+        keeper: Path | None = None,
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -75,6 +77,8 @@ class Recorder:
             split: when the bag goes on in a new file; after a minute unless said otherwise.
             on_error: called at most once for each cause, with one line, on the recorder thread.
             messages: asked, on the recorder thread, for messages beside those given to record().
+            keeper: the program that writes the files (`keeper_program`), so that a kill of this process finds
+                no write half done; without one this process writes.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -87,7 +91,10 @@ class Recorder:
         self._on_error = on_error
         self._messages = messages
         self._dropped_before = messages.dropped_messages() if messages is not None else 0
-        self._bag = TraceBag(source, directory, node_name=node_name, on_error=self._report, split=split)
+        disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
+        self._bag = TraceBag(
+            source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
+        )
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
         self._waiting_bytes = 0

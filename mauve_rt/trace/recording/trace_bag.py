@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
@@ -128,6 +129,7 @@ class TraceBag:
         node_name: str,
         on_error: Callable[[str], None],
         split: Split | None = None,
+        disk: Disk | None = None,
     ) -> None:
         """Create the bag; nothing is drained yet.
 
@@ -137,6 +139,7 @@ class TraceBag:
             node_name: absolute name of the executor's node; the trace is below it.
             on_error: called at most once for each type that cannot be recorded, with one line.
             split: when it goes on in a new file; after a minute unless said otherwise.
+            disk: closed with the bag.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -146,7 +149,7 @@ class TraceBag:
         self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
-        self._bag = BagWriter(directory)
+        self._bag = BagWriter(directory, disk=disk)
         try:
             self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)

@@ -94,6 +94,21 @@ def test_a_bag_begun_and_ended_while_the_executor_runs(executor: ExecutorProcess
     }
 
 
+def test_a_keeper_writes_the_bag(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    def keepers() -> list[str]:
+        children = Path(f"/proc/{executor.process.pid}/task").glob("*/children")
+        ids = [child for file in children for child in file.read_text("utf-8").split()]
+        return [name for child in ids if (name := Path(f"/proc/{child}/comm").read_text("utf-8").strip())]
+
+    assert keepers() == []
+    assert start(graph, bag="kept").success
+    assert keepers() == ["bag_keeper"]
+    assert stop(graph).success
+    assert keepers() == []
+    assert not [finding for finding in check_bag(tmp_path / "kept") if finding.is_wrong]
+    assert "tear the bag" not in executor.output, "it never fell back on its own writes"
+
+
 def test_one_bag_after_the_other(executor: ExecutorProcess, graph: Any):
     bags = []
     for _ in range(2):

@@ -1,0 +1,260 @@
+"""The keeper writes a bag's files: a kill of the recording process finds each write done, or not begun."""
+
+import contextlib
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from bag_rules import assert_rosbag2_reads
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+
+from mauve_rt.trace import TraceError
+from mauve_rt.trace.bag.disk import Disk, KeptDisk, keeper_program
+from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
+
+KEEPER = keeper_program()
+TEXT = "mauve_test_msgs/msg/Text"
+PATIENCE_S = 100.0
+
+
+@pytest.fixture(autouse=True)
+def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    share = tmp_path / "prefix" / "share"
+    shutil.copytree(Path(__file__).parents[3] / "mauve_msgs" / "msg", share / "mauve_msgs" / "msg")
+    (share / "mauve_test_msgs" / "msg").mkdir(parents=True)
+    (share / "mauve_test_msgs" / "msg" / "Text.msg").write_text("string data\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, f"gave up waiting for: {what}"
+        time.sleep(0.002)
+
+
+def has_ended(process: int) -> bool:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    return True
+
+
+class Kept:
+    """A KeptDisk, and what it told."""
+
+    def __init__(self, program: Path = KEEPER) -> None:
+        self.told: list[str] = []
+        self.disk = KeptDisk(program, on_error=self.told.append)
+
+    @property
+    def process(self) -> int:
+        return self.disk._process
+
+
+@pytest.fixture
+def kept():
+    kept = Kept()
+    yield kept
+    kept.disk.close()
+
+
+@pytest.fixture
+def file(tmp_path: Path):
+    descriptor = os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT)
+    yield descriptor
+    os.close(descriptor)
+
+
+# ---- both ways to write are one to who uses them
+
+
+@pytest.fixture(params=["direct", "kept"])
+def disk(request: pytest.FixtureRequest):
+    disk = Disk() if request.param == "direct" else Kept().disk
+    yield disk
+    disk.close()
+
+
+def test_what_is_written_is_there(disk: Disk, file: int, tmp_path: Path):
+    for data, offset, size, expected in [
+        (b"0123456789", 0, None, b"0123456789"),
+        (b"ab", 4, None, b"0123ab6789"),
+        (b"", 0, 5, b"0123a"),
+        (b"xyz", 4, 6, b"0123xy"),
+        (bytes(9 << 20), 6, None, b"0123xy" + bytes(9 << 20)),  # more than the keeper keeps room for
+        (b"!", 0, 3, b"!12"),
+    ]:
+        disk.write(file, (data,), offset, size=size)
+        assert (tmp_path / "file").read_bytes() == expected
+
+
+def test_a_refusal_is_an_error_that_says_which(disk: Disk, tmp_path: Path):
+    (tmp_path / "file").touch()
+    with (tmp_path / "file").open("rb") as file, pytest.raises(OSError, match="Bad file descriptor"):
+        disk.write(file.fileno(), (b"data",), 0)
+    with Path("/dev/full").open("wb") as file, pytest.raises(OSError, match="No space left") as failure:
+        disk.write(file.fileno(), (b"data",), 0)
+    assert failure.value.errno == errno.ENOSPC
+
+
+def test_a_bag_is_the_same(disk: Disk, tmp_path: Path):
+    with BagWriter(tmp_path / "bag", disk=disk) as bag:
+        bag.add_topic("/words", TEXT)
+        for number in range(9):
+            bag.write("/words", number, bytes([0, 1, 0, 0, 2, 0, 0, 0, 48 + number, 0]))
+            bag.flush()
+            if number % 4 == 3:
+                bag.split()
+    with Reader(tmp_path / "bag") as reader:
+        assert [data[8] - 48 for _, _, data in reader.messages()] == list(range(9))
+    assert_rosbag2_reads(tmp_path / "bag")
+    assert sorted(path.name for path in (tmp_path / "bag").iterdir()) == [
+        *(f"bag_{number}.mcap" for number in range(3)),
+        "metadata.yaml",
+    ]
+
+
+# ---- the keeper's life
+
+
+def test_it_ends_with_the_bag(kept: Kept, tmp_path: Path):
+    process = kept.process
+    assert not has_ended(process)
+    BagWriter(tmp_path / "bag", disk=kept.disk).close()
+    assert has_ended(process)
+    kept.disk.close()
+    assert kept.told == []
+
+
+def test_it_ends_with_a_bag_that_cannot_be_made(kept: Kept, tmp_path: Path):
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(TraceError, match="exists already"):
+        BagWriter(tmp_path / "bag", disk=kept.disk)
+    assert kept.process == 0
+
+
+def test_signals_do_not_end_it(kept: Kept, file: int, tmp_path: Path):
+    assert os.getsid(kept.process) == kept.process, "what ends the session of ours does not reach it"
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        os.kill(kept.process, number)
+    kept.disk.write(file, (b"data",), 0)
+    assert (tmp_path / "file").read_bytes() == b"data"
+    assert kept.told == []
+
+
+def test_where_it_is_gone_the_process_writes_itself_and_says_so_once(kept: Kept, file: int, tmp_path: Path):
+    kept.disk.write(file, (b"one",), 0)
+    os.kill(kept.process, signal.SIGKILL)
+    until(lambda: has_ended(kept.process), "its end")
+    kept.disk.write(file, (b"two",), 3)
+    kept.disk.write(file, (b"three",), 6, size=9)
+    assert (tmp_path / "file").read_bytes() == b"onetwothr"
+    assert len(kept.told) == 1
+    assert "the keeper of the bag is gone" in kept.told[0]
+    assert "a kill inside of a write can tear the bag" in kept.told[0]
+
+
+def test_where_it_cannot_be_started_the_process_writes_itself_and_says_so(tmp_path: Path, file: int):
+    kept = Kept(tmp_path / "nowhere")
+    kept.disk.write(file, (b"data",), 0)
+    assert (tmp_path / "file").read_bytes() == b"data"
+    why = f"{tmp_path / 'nowhere'} cannot be started (No such file or directory)"
+    assert kept.told == [f"{why}: from here on a kill inside of a write can tear the bag"]
+
+
+def test_it_takes_nothing_of_its_process(kept: Kept, file: int):
+    """No pipe of it stays open, and no folder in use."""
+    kept.disk.write(file, (b"it has begun",), 0)
+    held = {path.readlink() for path in Path(f"/proc/{kept.process}/fd").iterdir()}
+    assert {str(path).partition(":")[0] for path in held} == {"/dev/null", "socket", "/memfd"}
+    assert Path(f"/proc/{kept.process}/cwd").readlink() == Path("/")
+
+
+def test_a_disk_that_stands_still_holds_up_no_recorder(tmp_path: Path):
+    source = SyntheticSource(["c"])
+    recorder = Recorder(source, tmp_path / "bag", node_name="/executor", queue_bytes=1000, keeper=KEEPER)
+    process = recorder._bag._bag._disk._process
+    recorder.start()
+    os.kill(process, signal.SIGSTOP)
+    try:
+        until(lambda: not record(recorder), "the queue to be full")
+        assert recorder.dropped_messages > 0
+        recorder.stop()
+        assert recorder.recording, "it waits for the disk still"
+    finally:
+        os.kill(process, signal.SIGCONT)
+    until(lambda: not recorder.recording, "its end")
+    until(lambda: has_ended(process), "the keeper's end")
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == recorder.message_count
+
+
+def record(recorder: Recorder) -> bool:
+    return recorder.record("/words", TEXT, bytes([0, 1, 0, 0, 2, 0, 0, 0, 48, 0]), monotonic_ns=1)
+
+
+# ---- kills
+
+
+RECORDING = f"""
+import sys
+from pathlib import Path
+from mauve_rt.trace.bag.disk import KeptDisk
+from mauve_rt.trace.bag.writer import BagWriter
+disk = KeptDisk(Path(sys.argv[1]), on_error=print)
+bag = BagWriter(Path(sys.argv[2]), disk=disk)
+size, split_every = int(sys.argv[3]), int(sys.argv[4])
+bag.add_topic("/words", "{TEXT}")
+message = bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + b"x" * (size - 1) + bytes(1)
+print(disk._process, flush=True)
+for number in range(10**9):
+    bag.write("/words", number, message)
+    bag.flush()
+    if number % split_every == split_every - 1:
+        bag.split()
+    print(number, flush=True)
+"""
+
+
+def kill_in_a_write(bag: Path, *, size: int, split_every: int, at: int) -> list[str]:
+    """Kill a process as soon as its file grows again; what it had said."""
+    words = [sys.executable, "-c", RECORDING, KEEPER, bag, str(size), str(split_every)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        keeper = int(child.stdout.readline())
+        for _ in range(at):
+            child.stdout.readline()
+        bytes_before = sum(file.stat().st_size for file in bag.glob("*.mcap"))
+        while sum(file.stat().st_size for file in bag.glob("*.mcap")) == bytes_before:
+            pass
+        child.kill()
+        said = child.stdout.readlines()
+    until(lambda: has_ended(keeper), "the keeper's end")
+    return said
+
+
+@pytest.mark.parametrize("split_every", [3, 1000])
+@pytest.mark.parametrize("size", [16, 4096, 100_000, 2_000_000, 8_000_000])
+def test_a_kill_in_a_write_leaves_whole_files(tmp_path: Path, size: int, split_every: int):
+    for trial in range(3):
+        bag = tmp_path / f"bag_{trial}"
+        kill_in_a_write(bag, size=size, split_every=split_every, at=1 + trial)
+        files = sorted(bag.glob("*.mcap"))
+        assert files
+        for file in files:
+            with file.open("rb") as stream:
+                by_mcap = sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
+            with Reader(file) as reader:
+                assert sum(1 for _ in reader.messages()) == by_mcap
+        assert_rosbag2_reads(bag, was_killed=True)
+        with Reader(bag) as reader:
+            assert sum(1 for _ in reader.messages()) > trial, "what was flushed before is there"
