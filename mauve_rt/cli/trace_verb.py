@@ -1,6 +1,7 @@
 """`mauve trace ...`: what can be done with recorded traces. Its sub-verbs are the table at the end."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("perfetto", "csv"),
         default="perfetto",
-        help="for ui.perfetto.dev (default), or CSV",
+        help="for ui.perfetto.dev (default), or CSV, with a file for each topic, too",
     )
     parser.add_argument(
         "--out", type=Path, metavar="PATH", help="default: BAG.pftrace, or folder BAG_csv, here"
@@ -50,6 +51,7 @@ def _export(args: argparse.Namespace) -> int:
 
     bags = all_bags(args.bags)
     name = bags[0].resolve().name if len(bags) == 1 else "traces"
+    problems: list[str] = []
     with shown() as progress:
         traces = _open(bags, part(progress, 0.0, 0.5))
         writing = part(progress, 0.5, 1.0)
@@ -59,12 +61,14 @@ def _export(args: argparse.Namespace) -> int:
 
             out = args.out or Path(f"{name}_csv")
             trace = merge_traces(traces) if len(traces) > 1 else traces[name]
-            export_csv(trace, out, force=args.force, progress=writing)
+            problems = export_csv(trace, out, force=args.force, progress=writing)
         else:
             from mauve_rt.trace.export.perfetto import export_perfetto  # noqa: PLC0415
 
             out = args.out or Path(f"{name}.pftrace")
             export_perfetto(traces, out, force=args.force, progress=writing)
+    for problem in problems:
+        print(f"note: left out: {problem}", file=sys.stderr)
     print(out)
     return OK
 

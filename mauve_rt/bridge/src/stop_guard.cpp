@@ -106,7 +106,8 @@ std::vector<StopGuard::Transition> StopGuard::take_transitions() {
   const std::lock_guard lock(mutex_);
   std::vector<Transition> all;
   for (auto& [number, waiting] : transitions_) {
-    if (waiting.request) all.push_back({.number = number, .request = *std::exchange(waiting.request, {})});
+    if (!std::exchange(waiting.is_taken, true))
+      all.push_back({.number = number, .request = std::move(waiting.request)});
   }
   return all;
 }
@@ -303,7 +304,7 @@ void StopGuard::take_changes() {
     is_to_be_safe |= protects(request.transition);
     if (!change_request_.serialize(message_)) continue;
     const std::lock_guard lock(mutex_);
-    transitions_[++last_number_] = {.id = id, .request = bytes_of(message_)};
+    transitions_[++last_number_] = {.id = id, .request = bytes_of(message_), .is_taken = false};
   }
   tell_news();
   if (is_to_be_safe) make_safe();

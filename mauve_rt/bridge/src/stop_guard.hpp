@@ -132,7 +132,8 @@ class StopGuard {
   std::vector<Answered> answered_;
   struct Waiting {
     rmw_request_id_t id;
-    std::optional<std::vector<std::byte>> request;  // until the node has taken it
+    std::vector<std::byte> request;
+    bool is_taken;  // by the node
   };
   std::map<std::uint64_t, Waiting> transitions_;
   std::uint64_t last_number_{0};

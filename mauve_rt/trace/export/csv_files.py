@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from mauve_rt.trace.export.output import new_folder
+from mauve_rt.trace.export.topic_files import export_topics
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reading import frames
@@ -30,12 +31,13 @@ _FRAMES: dict[str, Callable[[Trace], pd.DataFrame]] = {
 _ROWS_AT_ONCE = 100_000
 
 
-def export_csv(trace: Trace, folder: Path, *, force: bool = False, progress: Progress = silent) -> None:
+def export_csv(trace: Trace, folder: Path, *, force: bool = False, progress: Progress = silent) -> list[str]:
     """Write a folder of CSV files, UTF-8, with a header row each that names the units.
 
     The columns are those of `mauve_rt.trace.reading.frames`; kinds of records that are newer than this reader
     have a file each, named by the bag. components.csv counts, and statistics.csv has the distributions of
-    `mauve_rt.trace.reading.statistics`. What is not known is an empty field.
+    `mauve_rt.trace.reading.statistics`. What is not known is an empty field. Each topic that was recorded has
+    a file; returns which of these are left out (`export_topics`).
 
     Raises:
         TraceError: the folder exists already (unless `force`), or cannot be written.
@@ -43,14 +45,16 @@ def export_csv(trace: Trace, folder: Path, *, force: bool = False, progress: Pro
     """
     with new_folder(folder, force=force) as place:
         all_frames = _FRAMES | _newer_frames(trace)
-        works = len(all_frames) + 1
+        works = len(all_frames) + 2
         for done, (name, frame_of) in enumerate(all_frames.items()):
             of_one = part(progress, done / works, (done + 1) / works)
             _write_parts(frame_of(trace), place / f"{name}.csv", of_one)
+        problems = export_topics(trace, place, progress=part(progress, 1 - 2 / works, 1 - 1 / works))
         statistics = all_statistics(trace, progress=part(progress, 1 - 1 / works, 1))
         _write(_counts(statistics), place / "components.csv")
         _write(_distributions(statistics), place / "statistics.csv")
         progress(1, "statistics.csv")
+    return problems
 
 
 def _newer_frames(trace: Trace) -> dict[str, Callable[[Trace], pd.DataFrame]]:

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <climits>
 #include <cstdint>
 #include <cstdlib>
@@ -29,6 +30,11 @@ struct Order {
 };
 constexpr std::uint64_t kKeepSize = UINT64_MAX;
 constexpr std::size_t kKeptBytes = std::size_t{8} << 20U;  // of the memory, between two writes
+
+bool read_number(const char* text, int& number) {
+  const char* const end = text + std::strlen(text);
+  return std::from_chars(text, end, number).ptr == end && text != end;
+}
 
 /// The next order, and its file; false: the other process has ended.
 bool receive(int socket, Order& order, int& file) {
@@ -103,9 +109,10 @@ std::int32_t carry_out(const Order& order, int file, const char* data) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count != 3) return EXIT_FAILURE;
-  const int socket = std::atoi(arguments[1]);
-  const int memory_descriptor = std::atoi(arguments[2]);
+  int socket = -1;
+  int memory_descriptor = -1;
+  if (count != 3 || !read_number(arguments[1], socket) || !read_number(arguments[2], memory_descriptor))
+    return EXIT_FAILURE;
   keep_only(socket, memory_descriptor);
   Memory memory(memory_descriptor);
   Order order{};

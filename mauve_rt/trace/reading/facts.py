@@ -4,6 +4,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+OWN_TYPES = tuple(f"mauve_msgs/msg/{name}" for name in ("TraceBatch", "TraceNames", "TraceArchitecture"))
+"""What a trace consists of; all else in its bag are other topics' messages."""
+
 
 class Deployment(NamedTuple):
     """The grid of a component's instants from time_ns on: epoch_ns + offset_ns + k * period_ns."""

@@ -1,0 +1,113 @@
+"""The messages of a bag's topics as CSV files, one for each topic."""
+
+import csv
+import dataclasses
+import json
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.progress import Progress
+from mauve_rt.trace.reading.facts import OWN_TYPES
+from mauve_rt.trace.reading.trace import Trace
+
+MOST_ELEMENTS = 1000
+"""Of an array that is written out; of a longer one, as an image's, its length is."""
+_TIMES = ("log_time_ns", "monotonic_ns")
+_NO_NAME = re.compile(r"[^\w.-]")
+
+
+def export_topics(trace: Trace, folder: Path, *, progress: Progress) -> list[str]:
+    """Write `topic.NAME.csv` for each topic but the trace's own, `.` in the place of `/` in its name.
+
+    A row is a message: its times (CLOCK_REALTIME, CLOCK_MONOTONIC), then a column for each field, as
+    `pose.position.x`. An array is one column, in JSON. What is not valid UTF-8 is escaped. Returns which
+    topics are left out, as a message of theirs cannot be read.
+    """
+    if not _problem(trace, (), folder, progress):
+        return []
+    topics = [topic for topic, (type_name, _) in trace.topics.items() if type_name not in OWN_TYPES]
+    found = (_problem(trace, (topic,), folder, progress) for topic in topics)
+    return [problem for problem in found if problem]
+
+
+def _problem(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progress) -> str:
+    """Write these, or none of them and return why."""
+    before = {*folder.iterdir()}
+    try:
+        _write(trace, topics, folder, progress)
+    except TraceError as error:
+        for file in {*folder.iterdir()} - before:
+            file.unlink()
+        return str(error)
+    return ""
+
+
+def _write(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progress) -> None:
+    """Messages of these topics; of all but the trace's own where none is named."""
+    total = sum(count for _, count in trace.topics.values())
+    with ExitStack() as open_files:
+        tables: dict[str, _Table] = {}
+        for done, message in enumerate(trace.messages(*topics)):
+            row = dict(_flat("", message.msg))
+            table = tables.get(message.topic)
+            if table is None:
+                path = folder / _file_name(message.topic, taken=[file.name for file in folder.iterdir()])
+                table = tables[message.topic] = _Table(path, list(row), open_files)
+            table.write(message.log_time_ns, message.monotonic_ns, row)
+            if done % 1000 == 0:
+                progress(done / total, table.path.name)
+
+
+class _Table:
+    """One file, with a column for each field of its first message."""
+
+    def __init__(self, path: Path, fields: list[str], open_files: ExitStack) -> None:
+        self.path = path
+        self._fields = fields
+        text = path.open("w", encoding="utf-8", errors="backslashreplace", newline="")
+        self._writer = csv.writer(open_files.enter_context(text), lineterminator="\n")
+        self._writer.writerow([*_TIMES, *fields])
+
+    def write(self, log_time_ns: int, monotonic_ns: int, row: dict[str, Any]) -> None:
+        self._writer.writerow([log_time_ns, monotonic_ns, *(row.get(name, "") for name in self._fields)])
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """The columns of a message, by their names."""
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from _flat(f"{name}.{field.name}" if name else field.name, getattr(value, field.name))
+    elif isinstance(value, np.ndarray | list | tuple | bytes):
+        yield name, _array_text(value)
+    else:
+        yield name, value
+
+
+def _array_text(values: Any) -> str:
+    if len(values) > MOST_ELEMENTS:
+        return f"{len(values)} elements"
+    return json.dumps(_plain(values))
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple | bytes):
+        return [_plain(one) for one in value]
+    if dataclasses.is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    return value
+
+
+def _file_name(topic: str, *, taken: list[str]) -> str:
+    """Of ROS names each is another one; of others' bags a second one gets a number."""
+    name = "topic." + _NO_NAME.sub("_", topic.strip("/").replace("/", "."))
+    numbers = (f".{number}" for number in range(2, len(taken) + 3))
+    return next(path for suffix in ("", *numbers) if (path := f"{name}{suffix}.csv") not in taken)
