@@ -424,6 +424,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
         "ros/executor/test_process.py::test_killed_executor_leaves_a_bag_that_opens",
         "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",
+        "python/trace/test_strangers.py::test_all_find_the_same",
     ),
     "A process of its own, `bag_keeper`, writes the files": (
         "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",

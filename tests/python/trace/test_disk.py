@@ -1,30 +1,22 @@
 """The keeper writes a bag's files: a kill of the recording process finds each write done, or not begun."""
 
-import contextlib
 import errno
 import os
 import shutil
 import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from bag_kills import KEEPER, TEXT, has_ended, kill_in_a_write, until
 from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag.disk import Disk, KeptDisk, keeper_program
+from mauve_rt.trace.bag.disk import Disk, KeptDisk
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-
-KEEPER = keeper_program()
-TEXT = "mauve_test_msgs/msg/Text"
-PATIENCE_S = 100.0
 
 
 @pytest.fixture(autouse=True)
@@ -34,19 +26,6 @@ def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (share / "mauve_test_msgs" / "msg").mkdir(parents=True)
     (share / "mauve_test_msgs" / "msg" / "Text.msg").write_text("string data\n")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
-
-
-def until(condition: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, f"gave up waiting for: {what}"
-        time.sleep(0.002)
-
-
-def has_ended(process: int) -> bool:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    return True
 
 
 class Kept:
@@ -204,42 +183,6 @@ def record(recorder: Recorder) -> bool:
 
 
 # ---- kills
-
-
-RECORDING = f"""
-import sys
-from pathlib import Path
-from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.writer import BagWriter
-disk = KeptDisk(Path(sys.argv[1]), on_error=print)
-bag = BagWriter(Path(sys.argv[2]), disk=disk)
-size, split_every = int(sys.argv[3]), int(sys.argv[4])
-bag.add_topic("/words", "{TEXT}")
-message = bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + b"x" * (size - 1) + bytes(1)
-print(disk._process, flush=True)
-for number in range(10**9):
-    bag.write("/words", number, message)
-    bag.flush()
-    if number % split_every == split_every - 1:
-        bag.split()
-    print(number, flush=True)
-"""
-
-
-def kill_in_a_write(bag: Path, *, size: int, split_every: int, at: int) -> list[str]:
-    """Kill a process as soon as its file grows again; what it had said."""
-    words = [sys.executable, "-c", RECORDING, KEEPER, bag, str(size), str(split_every)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
-        keeper = int(child.stdout.readline())
-        for _ in range(at):
-            child.stdout.readline()
-        bytes_before = sum(file.stat().st_size for file in bag.glob("*.mcap"))
-        while sum(file.stat().st_size for file in bag.glob("*.mcap")) == bytes_before:
-            pass
-        child.kill()
-        said = child.stdout.readlines()
-    until(lambda: has_ended(keeper), "the keeper's end")
-    return said
 
 
 @pytest.mark.parametrize("split_every", [3, 1000])
