@@ -52,6 +52,15 @@ class TaskSettings(TypedDict, total=False):
     stack_bytes: int
     trace_records: int  # 0: by the period
     hung_after_ns: int  # 0: 10 periods, 1 s at least
+    deadline_ns: int  # from a release to the next wait, for the analysis; 0: the next instant
+    states: dict[str, StateTimes]  # of the fsm's execution states, by name
+
+@type_check_only
+class StateTimes(TypedDict, total=False):
+    """Times of an execution state, in the place of the fsm's own."""
+
+    max_execution_ns: int | None  # the bound that the watchdog enforces
+    simulated_execution_ns: int | None  # what it takes in virtual time
 
 @final
 class TaskSetting:
@@ -139,6 +148,20 @@ class ExecutionTimeDescription:
     max_ns: Final[int]
 
 @final
+class DescribedState:
+    """A state of an fsm; fields as mauve_msgs/msg/StateInfo."""
+
+    name: Final[str]
+    is_initial: Final[bool]
+    is_wait: Final[bool]
+    is_event_wait: Final[bool]
+    duration_ns: Final[int]  # of a wait; of an event wait its timeout; FOREVER: it has none
+    min_interarrival_ns: Final[int]  # of an event wait
+    max_execution_ns: Final[int]  # of an execution state: its bound; 0: none
+    simulated_execution_ns: Final[int]  # what it takes in virtual time
+    successors: Final[list[str]]  # in the order in which guards are asked; last the one without a guard
+
+@final
 class ComponentDescription:
     """A snapshot; fields as mauve_msgs/msg/ComponentInfo."""
 
@@ -176,6 +199,9 @@ class ComponentDescription:
     hung_after_ns: Final[int]  # an older state is told as hung
     waiting: Final[bool]  # current_state is a wait
     hung: Final[bool]
+    deadline_ns: Final[int]  # declared; 0: the next instant
+    overrun: Final[str]  # 'skip', 'catch_up', 'fault'
+    states: Final[list[DescribedState]]  # of the fsm
 
 @final
 class RecentMaxima:
@@ -257,7 +283,9 @@ class ShellBuilder:
 class FsmBuilder:
     """Takes the declarations of a state machine written in Python; states by their names."""
 
-    def execution(self, name: str, method: str, max_execution_ns: int) -> None: ...
+    def execution(
+        self, name: str, method: str, max_execution_ns: int, simulated_execution_ns: int
+    ) -> None: ...
     def wait(self, name: str, duration_ns: int) -> None: ...
     def wait_event(self, name: str, port: str, timeout_ns: int, min_interarrival_ns: int) -> None: ...
     def set_initial(self, state: str) -> None: ...
@@ -565,6 +593,12 @@ class Architecture:
     def threads_left_behind(self) -> int:
         """Threads of removed components that still run a timed-out execution."""
     def components(self) -> list[ComponentDescription]: ...
+    def previewed_states(self, component: str) -> list[DescribedState]:
+        """The states that the component's fsm will have, before anything is configured.
+
+        Raises:
+            MauveError: it cannot be so.
+        """
     def take_recent_maxima(self) -> list[RecentMaxima]:
         """Of every component, and counted anew from here on: for one caller only."""
     def resources(self) -> list[ResourceDescription]: ...

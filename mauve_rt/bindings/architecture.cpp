@@ -142,6 +142,13 @@ void bind_architecture(py::module_& module) {
       .def("threads_left_behind",
            [](PyArchitecture& self) { return self.architecture.threads_left_behind(); })
       .def("components", &describe_components)
+      .def(
+          "previewed_states",
+          [](PyArchitecture& self, const std::string& component) {
+            const py::gil_scoped_release unlocked;  // the fsm may be written in Python
+            return self.architecture.component(component).previewed_states();
+          },
+          py::arg("component"))
       .def("take_recent_maxima", &take_all_recent_maxima)
       .def("resources", &describe_resources);
 }

@@ -115,7 +115,10 @@ ComponentDescription describe_component(Component& component) {
           .allocations = task.counters().allocations(),
           .page_faults = task.counters().page_faults(),
           .execution_times = describe_execution_times(*component.state_times()),
-          .state_age = age};
+          .state_age = age,
+          .deadline_ns = task.settings().deadline_ns,
+          .overrun = std::string(kOverrunPolicies[static_cast<std::size_t>(task.settings().overrun)]),
+          .states = component.described_states()};
 }
 
 RecentMaxima take_recent_maxima(const Component& component) {
@@ -185,6 +188,17 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("count", &E::count)
       .def_readonly("mean_ns", &E::mean_ns)
       .def_readonly("max_ns", &E::max_ns);
+  using S = DescribedState;
+  py::class_<S>(module, "DescribedState")
+      .def_readonly("name", &S::name)
+      .def_readonly("is_initial", &S::is_initial)
+      .def_readonly("is_wait", &S::is_wait)
+      .def_readonly("is_event_wait", &S::is_event_wait)
+      .def_readonly("duration_ns", &S::duration_ns)
+      .def_readonly("min_interarrival_ns", &S::min_interarrival_ns)
+      .def_readonly("max_execution_ns", &S::max_execution_ns)
+      .def_readonly("simulated_execution_ns", &S::simulated_execution_ns)
+      .def_readonly("successors", &S::successors);
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription")
       .def_readonly("name", &C::name)
@@ -215,6 +229,9 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("allocations", &C::allocations)
       .def_readonly("page_faults", &C::page_faults)
       .def_readonly("execution_times", &C::execution_times)
+      .def_readonly("deadline_ns", &C::deadline_ns)
+      .def_readonly("overrun", &C::overrun)
+      .def_readonly("states", &C::states)
       .def_property_readonly("state_age_ns", [](const C& self) { return self.state_age.age_ns; })
       .def_property_readonly("state_bound_ns", [](const C& self) { return self.state_age.bound_ns; })
       .def_property_readonly("hung_after_ns", [](const C& self) { return self.state_age.hung_after_ns; })

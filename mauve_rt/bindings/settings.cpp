@@ -17,12 +17,35 @@ SettingValue from_python(const TaskSetting& setting, const SettingValue& example
   }
 }
 
+/// {"Run": {"max_execution_ns": 1000, "simulated_execution_ns": 0}}; either may be left out, or be None.
+std::vector<DeclaredState> declared_states(py::handle value) {
+  std::vector<DeclaredState> states;
+  for (const auto& [name, times] : value.cast<std::map<std::string, py::dict>>()) {
+    DeclaredState state{.name = name, .max_execution_ns = {}, .simulated_execution_ns = {}};
+    for (const auto& [key, time] : times) {
+      const auto word = key.cast<std::string>();
+      auto* const kept = word == "max_execution_ns"         ? &state.max_execution_ns
+                         : word == "simulated_execution_ns" ? &state.simulated_execution_ns
+                                                            : nullptr;
+      if (kept == nullptr) throw py::type_error("states: a state has no time '" + word + "'");
+      *kept = time.cast<std::optional<time_ns_t>>();
+    }
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
 }  // namespace
 
 TaskSettings task_settings(const std::string& component, const py::kwargs& given) {
   TaskSettings settings;
   for (const auto& [key, value] : given) {
     const auto name = key.cast<std::string>();
+    if (name == "states") {
+      settings.states = declared_states(value);
+      check_states(settings.states, component);
+      continue;
+    }
     const auto* setting = std::find_if(kTaskSettings.begin(), kTaskSettings.end(),
                                        [&name](const TaskSetting& each) { return each.name == name; });
     if (setting == kTaskSettings.end())

@@ -165,6 +165,9 @@ struct ComponentDescription {
   std::uint64_t allocations, page_faults;
   std::vector<ExecutionTimeDescription> execution_times;
   StateAge state_age;
+  time_ns_t deadline_ns;
+  std::string overrun;
+  std::vector<DescribedState> states;
 };
 ComponentDescription describe_component(Component& component);
 

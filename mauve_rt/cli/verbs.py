@@ -4,7 +4,7 @@ import argparse
 import sys
 from typing import Any
 
-from mauve_rt.cli import check_verb, report_verb, rules_verb, trace_verb
+from mauve_rt.cli import analyze_verb, check_verb, report_verb, rules_verb, trace_verb
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -292,6 +292,12 @@ VERBS = (
         "check architecture, rules and steps files without starting anything",
         check_verb.add_arguments,
         check_verb.main,
+    ),
+    Verb(
+        "analyze",
+        "show the task model of an architecture: what each component executes, how often and how long",
+        analyze_verb.add_arguments,
+        analyze_verb.main,
     ),
     Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
     Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),

@@ -11,10 +11,11 @@ from mauve_msgs.msg import (
     RealtimeStatus,
     ReconfigurationEvent,
     ResourceInfo,
+    StateInfo,
     StepReport,
     TraceArchitecture,
 )
-from mauve_rt._kernel import ComponentDescription, PortDescription
+from mauve_rt._kernel import ComponentDescription, DescribedState, PortDescription
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
@@ -49,7 +50,14 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
         skipped=component.skipped,
         **_state_age(component),
         structural=[item.name for item in component.properties if item.structural],
+        deadline_ns=component.deadline_ns,
+        overrun=component.overrun,
+        states=[_state_info(state) for state in component.states],
     )
+
+
+def _state_info(state: DescribedState) -> Any:
+    return StateInfo(**{name: getattr(state, name) for name in StateInfo.get_fields_and_field_types()})
 
 
 def _state_age(component: ComponentDescription) -> dict[str, Any]:

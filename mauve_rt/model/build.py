@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from mauve_rt._kernel import Architecture, PluginRegistry, Transaction
+from mauve_rt._kernel import Architecture, DescribedState, PluginRegistry, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.checks import Checks
@@ -57,6 +57,19 @@ def configure(model: ArchitectureModel, architecture: Architecture) -> None:
     """
     with _errors_at(model):
         architecture.configure()
+
+
+def previewed_states(model: ArchitectureModel, architecture: Architecture) -> dict[str, list[DescribedState]]:
+    """The states of each component's fsm, of an architecture built from `model`; nothing is configured.
+
+    Raises:
+        ArchitectureFileError: an fsm cannot be so.
+    """
+    states = {}
+    for name in model.components:
+        with _errors_at(model, ("components", name)):
+            states[name] = architecture.previewed_states(name)
+    return states
 
 
 _ANY_CORE = "*"  # to the kernel; what is installed may be another thing every day
@@ -141,6 +154,8 @@ def _place_of(model: ArchitectureModel, error: MauveError) -> Location:
     if error.component in model.components:
         place: Location = ("components", error.component)
         component = model.components[error.component]
+        if error.found in component.states:
+            return (*place, "states", error.found)
         if error.code in ("loop_without_wait", "bad_fsm"):
             return (*place, "fsm")
         if error.code == "bad_period":

@@ -18,6 +18,12 @@
 
 `alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
 `installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
+`deadline_ns` and `states` are what the timing analysis asks for: how long after a release its work is to be
+done, and how long a state executes. `max_execution_ns` is a bound, which the watchdog enforces;
+`simulated_execution_ns` is what it takes in virtual time, and no bound:
+
+    control: {..., deadline_ns: 5000000, states: {Control: {max_execution_ns: 200000}}}
+
 `trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
 does not fit is counted as lost. A state that lasts longer than `hung_after_ms` is told as hung: an error in
 /diagnostics, in ~/state and in the log; without the key after 10 periods, but no sooner than after 1 s.
@@ -42,6 +48,7 @@ Nothing here looks at plug-ins, so a file can be read where none is installed.
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
+from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
 from mauve_rt.model.kinds import (
     Choice,
@@ -64,6 +71,7 @@ PropertyValue = bool | int | float | str
 QOS_NAMES = ("reliable", "best_effort", "transient_local", "sensor_data")
 MAX_DEPTH = 1_000_000  # of the queue of a topic
 _LONGEST_MS = 1e9
+_LONGEST_NS = TASK_SETTINGS["deadline_ns"].most
 
 _PLUGIN = r"[A-Za-z]\w*/[A-Za-z_]\w*"
 _ROS_WORDS = r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*"
@@ -241,6 +249,19 @@ class ResourceModel(Section):
         vars(self)["_parameters"] = told
 
 
+class StateModel(Section):
+    """Times of an execution state, in the place of what the fsm's own code says."""
+
+    max_execution_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)  # the watchdog enforces it
+    simulated_execution_ns: int | None = setting(Whole(0, _LONGEST_NS), default=None)  # in virtual time
+
+    def misfit(self) -> Fault | None:
+        """One of them at least."""
+        if self.max_execution_ns is None and self.simulated_execution_ns is None:
+            return Fault((), "form", limit="max_execution_ns or simulated_execution_ns or both of them")
+        return None
+
+
 class ComponentModel(Section):
     """A component and the thread it runs on."""
 
@@ -259,17 +280,23 @@ class ComponentModel(Section):
     trace_records: int | None = kernel_setting("trace_records")  # None: by the period
     # A state that lasts longer is told as hung; None: 10 periods, 1 s at least.
     hung_after_ms: float | None = kernel_setting("hung_after_ns", in_ms=True)
+    deadline_ns: int | None = kernel_setting("deadline_ns")  # None: the next instant
+    states: dict[str, StateModel] = setting(TableOf(Part(StateModel), names=IDENTIFIER), default={})
     reconfigurable: bool = setting(Flag(), default=True)
     properties: dict[str, PropertyValue] = setting(TableOf(Scalar()), default={})
     diagnostics: DiagnosticsModel = setting(Part(DiagnosticsModel), default=DiagnosticsModel())
 
     def task_settings(self) -> dict[str, Any]:
         """How the kernel is to run it; what the file does not say is the kernel's choice."""
-        return {
+        told = {
             each.name: each.to_kernel(getattr(self, key))
             for key, each in self.settings.items()
             if isinstance(each, KernelSetting) and getattr(self, key) is not None
         }
+        states = {
+            name: {key: getattr(state, key) for key in state.given} for name, state in self.states.items()
+        }
+        return {**told, "states": states} if states else told
 
 
 class FileModel(Section):

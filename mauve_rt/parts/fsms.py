@@ -54,10 +54,19 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         raise NotImplementedError(f"{type(self).__qualname__} lacks define()")
 
     def execution(
-        self, name: str, method: str | Callable[[CoreT], object], *, max_execution_ns: int = 0
+        self,
+        name: str,
+        method: str | Callable[[CoreT], object],
+        *,
+        max_execution_ns: int = 0,
+        simulated_execution_ns: int = 0,
     ) -> State:
-        """A state that runs a method of the core, given by its name or as `HoverCore.follow`."""
-        self._machine.execution(name, _method_name(method), max_execution_ns)
+        """A state that runs a method of the core, given by its name or as `HoverCore.follow`.
+
+        `max_execution_ns` is its bound, which the watchdog enforces, 0: none; `simulated_execution_ns` is
+        what it takes in virtual time.
+        """
+        self._machine.execution(name, _method_name(method), max_execution_ns, simulated_execution_ns)
         return State(name)
 
     def wait(self, name: str, duration_ns: int) -> State:

@@ -746,6 +746,31 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_perfetto.py::test_one_process_and_its_components",
         "python/trace/test_perfetto.py::test_a_reconfiguration_flows_from_the_request_to_the_next_release",
     ),
+    "mauve analyze robot.yaml # of a file": (
+        "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+    ),
+    "mauve analyze robot.yaml --budget-from DIR --margin 1.2": (
+        "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+    ),
+    "mauve analyze robot.yaml --budget-from DIR --write": (
+        "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+        "python/yaml/test_insertion.py::test_an_entry_is_put_in_and_all_else_stays",
+    ),
+    "It shows the model that runs as a timing analysis takes it": (
+        "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+        "python/cli/test_analyze.py::test_the_model_in_words",
+    ),
+    "A job is what is executed from one wait to the next by the costliest way through the fsm": (
+        "python/analysis/test_digraph.py::test_of_several_ways_to_a_wait_the_costliest_counts",
+        "python/analysis/test_digraph.py::test_no_run_of_any_machine_is_outside_of_its_digraph",
+    ),
+    "what cannot be proved of a component is said, with the remedy": (
+        "python/cli/test_analyze.py::test_what_cannot_be_proved_is_said_of_each_component",
+    ),
+    "Times and deadlines stand in the code of an fsm or in the architecture file": (
+        "python/cli/test_analyze.py::test_a_declared_time_of_the_file_or_of_the_code",
+        "DeclaredStates.StandInThePlaceOfTheFsmsOwn",
+    ),
     "`mauve check FILE...` says what is wrong with architecture, rules and steps files": (
         "python/cli/test_check.py::test_an_architecture_file",
         "python/cli/test_check.py::test_a_rules_file_by_itself",

@@ -86,6 +86,13 @@ class ExecutorProcess:
         """Everything it printed."""
         return self._log.read_text(encoding="utf-8")
 
+    def await_output(self, words: str) -> None:
+        """Until it has printed that: a thread of its own writes its log, after what it tells by other ways."""
+        deadline = time.monotonic() + PATIENCE_S
+        while words not in self.output:
+            assert time.monotonic() < deadline, f"it never printed: {words}\n{self.output}"
+            time.sleep(0.01)
+
     def wait_begun(self) -> None:
         """Until it handles signals: loading takes a while."""
         wait_for_signals(self.process.pid)

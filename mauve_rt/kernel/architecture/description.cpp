@@ -36,6 +36,14 @@ void sort_by_name(std::vector<Facts>& facts) {
   std::sort(facts.begin(), facts.end(), [](const Facts& a, const Facts& b) { return a.name < b.name; });
 }
 
+std::string text_of(const DeclaredState& state) {
+  const auto time = [](const std::optional<time_ns_t>& time_ns) {
+    return time_ns ? std::to_string(*time_ns) : "as the fsm says";
+  };
+  return state.name + " max_execution_ns " + time(state.max_execution_ns) + " simulated_execution_ns " +
+         time(state.simulated_execution_ns);
+}
+
 std::string text_of(const ComponentFacts& facts) {
   std::string text = "component " + facts.name + "\n  state " + std::string(to_string(facts.state)) + "\n";
   text +=
@@ -44,6 +52,7 @@ std::string text_of(const ComponentFacts& facts) {
           std::to_string(facts.reference_ns) + "\n";
   for (const TaskSetting& setting : kTaskSettings)
     text += "  setting " + std::string(setting.name) + " " + to_string(setting.get(facts.settings)) + "\n";
+  for (const DeclaredState& state : facts.settings.states) text += "  declared " + text_of(state) + "\n";
   text += "  alternatives " + join(facts.alternatives) + "\n";
   if (!facts.fallback.empty()) text += "  fallback " + facts.fallback + "\n";
   if (!facts.reconfigurable) text += "  reconfigurable false\n";

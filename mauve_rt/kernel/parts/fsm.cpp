@@ -269,6 +269,7 @@ CoreBinding FsmBase::bind_dynamic(DynamicCore& core) const {
 bool FsmBase::configure_hook() {
   cleanup_hook();
   define();
+  take_declared_times();
   if (initial_ == nullptr) {
     throw Error(ErrorCode::bad_fsm, "the machine has no initial state",
                 {.element = description(), .expected = "set_initial(state)", .remedy = kDeclareRemedy});
@@ -297,6 +298,33 @@ bool FsmBase::configure_hook() {
   const time_ns_t cycles_ns = cycle_gcd_ns(*initial_);  // also refuses loops without a wait
   period_ns_ = sporadic_ ? 0 : std::gcd(cycles_ns, divisor_ns_);
   return true;
+}
+
+std::vector<DescribedState> FsmBase::describe_states() const {
+  std::vector<DescribedState> all;
+  for (const auto& state : states_) {
+    all.push_back({.name = state->name,
+                   .is_initial = state.get() == initial_,
+                   .is_wait = state->is_wait,
+                   .is_event_wait = state->event != nullptr,
+                   .duration_ns = state->duration_ns,
+                   .min_interarrival_ns = state->min_interarrival_ns,
+                   .max_execution_ns = state->max_execution_ns,
+                   .simulated_execution_ns = state->simulated_execution_ns,
+                   .successors = {}});
+    for (const State* next : successors(*state)) all.back().successors.push_back(next->name);
+  }
+  return all;
+}
+
+void FsmBase::take_declared_times() noexcept {
+  for (const DeclaredState& declared : declared_states_) {
+    for (const auto& state : states_) {
+      if (state->name != declared.name || state->is_wait) continue;
+      state->max_execution_ns = declared.max_execution_ns.value_or(state->max_execution_ns);
+      state->simulated_execution_ns = declared.simulated_execution_ns.value_or(state->simulated_execution_ns);
+    }
+  }
 }
 
 void FsmBase::cleanup_hook() {

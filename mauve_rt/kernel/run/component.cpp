@@ -111,6 +111,27 @@ std::shared_ptr<const StateTimes> Component::state_times() const {
   return shown_times_;
 }
 
+std::vector<DescribedState> Component::described_states() const {
+  const std::lock_guard lock(shown_mutex_);
+  return shown_states_;
+}
+
+std::vector<DescribedState> Component::previewed_states() const {
+  if (!make_fsm_) return described_states();
+  const std::unique_ptr<FsmBase> fsm = make_fsm_();
+  bind_fsm(*fsm, *parts_.shell);
+  fsm->configure();
+  std::vector<DescribedState> states = fsm->describe_states();
+  try {
+    require_declared_states(*fsm);
+  } catch (...) {
+    fsm->cleanup();
+    throw;
+  }
+  fsm->cleanup();
+  return states;
+}
+
 void Component::show() {
   ShownParts now{.shell = parts_.shell->implementation(),
                  .core = {},  // by name only: a fallback may take its place at any moment
@@ -124,8 +145,10 @@ void Component::show() {
   }
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});
+  std::vector<DescribedState> states = parts_.fsm->describe_states();
   const std::lock_guard lock(shown_mutex_);
   shown_ = std::move(now);
+  shown_states_ = std::move(states);
   shown_times_ = parts_.fsm->times();
 }
 
@@ -343,6 +366,26 @@ void Component::bind_fsm(FsmBase& fsm, Shell& shell) const {
         ErrorCode::type_mismatch, "the fsm was written for another shell",
         {.component = name_, .element = fsm.description(), .expected = "an fsm for " + shell.description()});
   }
+  fsm.declare_states(task_.settings().states);
+}
+
+/// Of the fsm that it starts with; later ones need not have them all.
+void Component::require_declared_states(const FsmBase& fsm) const {
+  for (const DeclaredState& declared : task_.settings().states) {
+    std::vector<std::string> executions;
+    bool is_one = false;
+    for (const auto& state : fsm.states()) {
+      if (!state->is_wait) executions.push_back(state->name);
+      is_one = is_one || (!state->is_wait && state->name == declared.name);
+    }
+    if (is_one) continue;
+    throw Error(ErrorCode::bad_fsm, "the fsm has no such execution state",
+                {.component = name_,
+                 .element = fsm.description(),
+                 .expected = "one of " + join(executions),
+                 .found = declared.name,
+                 .remedy = "declare times of the states that the fsm executes"});
+  }
 }
 
 void Component::check_stack(const Shell& shell) const {
@@ -369,6 +412,7 @@ bool Component::configure_hook() {
   try {
     parts_.shell->configure();
     parts_.fsm->configure();
+    require_declared_states(*parts_.fsm);
     period_ns = settled_period_ns(*parts_.fsm);
     bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
     prepare_fallback();

@@ -127,7 +127,7 @@ bool Machine::execute(const State& state) {
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
   methods[state.action].run(*core_);
   next_ = successor(state);
-  clock_->spend(state.simulated_ns());
+  clock_->spend(state.simulated_execution_ns);
   boundary_ns_ = clock_->now_ns();
   const bool had_timed_out = state.max_execution_ns != 0 && !end_execution();
   trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);

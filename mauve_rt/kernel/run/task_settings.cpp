@@ -41,6 +41,28 @@ void check_settings(const TaskSettings& settings, const std::string& component) 
     const SettingValue value = setting.get(settings);
     if (value != setting.get(TaskSettings{})) check_setting(setting, value, component);
   }
+  check_states(settings.states, component);
+}
+
+void check_states(const std::vector<DeclaredState>& states, const std::string& component) {
+  const auto check_time = [&](const DeclaredState& state, const char* what,
+                              const std::optional<time_ns_t>& time_ns, time_ns_t least_ns) {
+    if (!time_ns || (*time_ns >= least_ns && *time_ns <= kLongest)) return;
+    throw Error(ErrorCode::out_of_range, "a state's time is out of range",
+                {.component = component,
+                 .element = "state " + state.name + ", " + what,
+                 .expected = std::to_string(least_ns) + " to " + std::to_string(kLongest) + " ns",
+                 .found = std::to_string(*time_ns)});
+  };
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    check_time(states[i], "max_execution_ns", states[i].max_execution_ns, 1);
+    check_time(states[i], "simulated_execution_ns", states[i].simulated_execution_ns, 0);
+    for (std::size_t other = 0; other < i; ++other) {
+      if (states[other].name != states[i].name) continue;
+      throw Error(ErrorCode::duplicate_name, "a state is declared twice",
+                  {.component = component, .element = "state " + states[i].name});
+    }
+  }
 }
 
 std::string to_string(const SettingValue& value) {

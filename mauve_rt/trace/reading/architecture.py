@@ -37,6 +37,11 @@ class ComponentInfo:
     priority: int
     cpus: tuple[int, ...]
     ports: tuple[PortInfo, ...]
+    deadline_ns: int = 0
+    """Declared, from a release to the next wait; 0: the next instant."""
+    overrun: str = ""
+    states: tuple[Any, ...] = ()
+    """Of the fsm, with the fields of mauve_msgs/msg/StateInfo; none in a bag of an earlier version."""
 
     @classmethod
     def of_message(cls, message: Any) -> Self:
@@ -58,6 +63,9 @@ class ComponentInfo:
             priority=int(message.priority),
             cpus=tuple(int(cpu) for cpu in message.cpus),
             ports=ports,
+            deadline_ns=int(getattr(message, "deadline_ns", 0)),
+            overrun=getattr(message, "overrun", ""),
+            states=tuple(getattr(message, "states", ())),
         )
 
     def prefixed(self, prefix: str) -> Self:

@@ -34,6 +34,45 @@ def test_rule_13_every_instant_is_run_and_the_trace_is_the_same_every_time():
     assert traces[0] == traces[1] != b""
 
 
+class CostlyFsm(ActFsm):
+    """Acts for 5 ms of virtual time, every 2 ms; its bound is no time that it takes."""
+
+    def define(self) -> None:
+        act = self.execution("Act", "act", max_execution_ns=7 * MS, simulated_execution_ns=5 * MS)
+        pause = self.wait("Pause", 2 * MS)
+        self.set_initial(act)
+        self.next(act, pause)
+        self.next(pause, act)
+
+
+@pytest.mark.parametrize(
+    ("states", "skipped"),
+    [
+        ({}, True),
+        ({"Act": {"simulated_execution_ns": 0}}, False),
+        ({"Act": {"simulated_execution_ns": 5 * MS, "max_execution_ns": 8 * MS}}, True),
+        ({"Act": {"max_execution_ns": None}}, True),
+    ],
+)
+def test_an_execution_takes_what_is_declared_and_its_bound_is_none(
+    built: Stage, states: dict[str, dict[str, int | None]], *, skipped: bool
+):
+    built.architecture.add_component("c", CountShell, CountCore, CostlyFsm, states=states)
+    built.architecture.configure()
+    simulation = Simulation()
+    simulation.add(built.architecture)
+    simulation.deploy()
+    simulation.run_until(simulation.epoch_ns() + 100 * MS)
+    (told,) = built.architecture.components()
+    assert (told.skipped > 0) == skipped
+    assert told.state == "RUNNING", "no bound was exceeded"
+    (act,) = (state for state in told.states if not state.is_wait)
+    wanted = states.get("Act", {})
+    assert act.max_execution_ns == (wanted.get("max_execution_ns") or 7 * MS)
+    assert act.simulated_execution_ns == wanted.get("simulated_execution_ns", 5 * MS)
+    simulation.shutdown()
+
+
 def test_rule_13_transactions_and_callbacks_act_at_their_instants(pair: Stage):
     simulation = Simulation()
     host = simulation.add(pair.architecture)

@@ -134,8 +134,10 @@ def test_a_hung_component_is_told_until_it_goes_on(
         assert {status.level for status in told.statuses(part)} == {DiagnosticStatus.OK}
     assert executor.process.poll() is None
     for way in ("loop", "sleep", "pipe"):
+        gone = f"component '{way}' is no longer hung"
+        executor.await_output(gone)
+        assert executor.output.count(gone) == 1
         assert executor.output.count(f"component '{way}' is hung: state Count has lasted ") == 1
-        assert executor.output.count(f"component '{way}' is no longer hung") == 1
 
 
 def test_one_that_waits_for_events_has_a_figure_of_its_own(

@@ -241,6 +241,7 @@ def test_without_real_time_rights_it_runs_and_says_so(
     states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
     graph.spin_until(lambda: bool(states), "~/state")
     assert states[-1].realtime == reply.realtime
+    executor.await_output(about_fifo)
     assert executor.output.count(about_fifo) == 1
 
 
@@ -282,7 +283,7 @@ def test_lifecycle_step_by_step(architecture: Path, start_executor: Starter, gra
     architecture.write_text("mauve: 1\n", encoding="utf-8")
     configure = Transition(id=Transition.TRANSITION_CONFIGURE)
     assert not graph.ask(ChangeState, f"{NODE}/change_state", transition=configure).success
-    assert "the file has no 'components'" in executor.output
+    executor.await_output("the file has no 'components'")
     assert executor.end(signal.SIGTERM)[0] == 0
 
 

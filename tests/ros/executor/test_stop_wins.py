@@ -167,4 +167,4 @@ def test_a_part_may_ask_its_own_executor_while_it_is_configured(stage: Stage) ->
         assert stage.graph.ask(ReplaceCore, f"{NODE}/replace_core", **core).success
     sleepy = stage.part("sleepy")
     assert (sleepy.state, sleepy.core) == (ComponentInfo.STOPPED, "executor_tests/Counter")
-    assert "a request was refused: another change has been under way" in stage.executor.output
+    stage.executor.await_output("a request was refused: another change has been under way")

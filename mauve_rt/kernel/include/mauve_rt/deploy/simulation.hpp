@@ -89,7 +89,7 @@ class SimulatedHost final : public Host {
 ///
 /// Every architecture has one virtual processor. On it the task that is due runs to its next wait, without preemption;
 /// of several that are due the one of the highest priority, then the one declared first. An execution state takes the
-/// time that it declares (State::simulated_execution_ns, else all that its max_execution allows; default: none). Callbacks come before the tasks of the same instant.
+/// time that it declares (State::simulated_execution_ns; default: none). Callbacks come before the tasks of the same instant.
 /// Everything on one thread: the caller's. All functions [non-rt].
 class Simulation {
  public:

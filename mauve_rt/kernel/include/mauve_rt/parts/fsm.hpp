@@ -14,6 +14,7 @@
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/statistics.hpp"
 #include "mauve_rt/parts/core.hpp"
+#include "mauve_rt/parts/declared_state.hpp"
 #include "mauve_rt/parts/event_input.hpp"
 
 namespace mauve {
@@ -104,21 +105,30 @@ struct State {
   std::string name;
   std::size_t index{0};  // in the order of declaration
   bool is_wait{false};
-  time_ns_t duration_ns{0};              // of a wait; of an event wait its timeout; kForever: it has none
-  std::unique_ptr<EventInput> event;     // of an event wait
-  time_ns_t min_interarrival_ns{0};      // of an event wait: the least time from one release to the next
-  std::size_t action{kNone};             // of an execution state
-  time_ns_t max_execution_ns{0};         // declared bound of an execution state; 0: none
-  time_ns_t simulated_execution_ns{-1};  // what it takes in virtual time; < 0: as long as its bound allows
-  std::vector<Transition> transitions;   // the first whose guard holds is taken; of a wait, when it has ended
-  State* next{nullptr};                  // otherwise this one
+  time_ns_t duration_ns{0};             // of a wait; of an event wait its timeout; kForever: it has none
+  std::unique_ptr<EventInput> event;    // of an event wait
+  time_ns_t min_interarrival_ns{0};     // of an event wait: the least time from one release to the next
+  std::size_t action{kNone};            // of an execution state
+  time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
+  time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
+  std::vector<Transition> transitions;  // the first whose guard holds is taken; of a wait, when it has ended
+  State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
   ExecutionTime* execution_time{nullptr};  // recorded by the thread that runs it
+};
 
-  /// How much of virtual time it takes. [rt]
-  time_ns_t simulated_ns() const MAUVE_RT {
-    return simulated_execution_ns < 0 ? max_execution_ns : simulated_execution_ns;
-  }
+/// A state as who analyses or draws a machine sees it.
+struct DescribedState {
+  std::string name{};
+  bool is_initial{false};
+  bool is_wait{false};
+  bool is_event_wait{false};
+  time_ns_t duration_ns{0};             // of a wait; of an event wait its timeout; kForever: it has none
+  time_ns_t min_interarrival_ns{0};     // of an event wait
+  time_ns_t max_execution_ns{0};        // of an execution state: its bound; 0: none
+  time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
+  std::vector<std::string>
+      successors{};  // in the order in which guards are asked; last the one without a guard
 };
 
 /// An fsm seen without its types.
@@ -146,6 +156,11 @@ class FsmBase : public Configurable {
   /// The smallest max_execution of all states; 0: none declares one. Valid once configured. [rt]
   time_ns_t smallest_bound_ns() const MAUVE_RT { return smallest_bound_ns_; }
 
+  /// Empty before it is configured. [non-rt]
+  std::vector<DescribedState> describe_states() const;
+  /// Times of execution states that stand in the place of its own, as far as it has states of these names. Before configure.
+  /// [setup]
+  void declare_states(std::vector<DeclaredState> states) { declared_states_ = std::move(states); }
   /// [setup]
   void set_implementation(std::string name) { implementation_ = std::move(name); }
   /// [rt]
@@ -178,6 +193,8 @@ class FsmBase : public Configurable {
   void cleanup_hook() override;
 
  private:
+  void take_declared_times() noexcept;
+
   std::vector<std::unique_ptr<State>> states_;
   std::vector<Method> methods_;
   std::shared_ptr<StateTimes> times_{std::make_shared<StateTimes>()};
@@ -187,6 +204,7 @@ class FsmBase : public Configurable {
   time_ns_t initial_interarrival_ns_{0};
   time_ns_t smallest_bound_ns_{0};
   time_ns_t divisor_ns_{0};  // 0: none
+  std::vector<DeclaredState> declared_states_;
   std::string implementation_;
 };
 

@@ -204,6 +204,11 @@ class Component final : public Configurable {
 
   /// Names, wiring and property values now; unlike the parts themselves safe while they are being replaced. [non-rt]
   ShownParts shown() const;
+  /// Of the fsm. [non-rt]
+  std::vector<DescribedState> described_states() const;
+  /// The same before anything is configured: of an instance of the fsm made for that, where one can be made. [setup]
+  /// Throws Error: it cannot be so.
+  std::vector<DescribedState> previewed_states() const;
   /// How long the execution states took since the fsm was configured. [non-rt]
   std::shared_ptr<const StateTimes> state_times() const;
   /// To be called by who changed something, after the fact. [non-rt]
@@ -295,6 +300,7 @@ class Component final : public Configurable {
   void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
   void bind_fsm(FsmBase& fsm, Shell& shell) const;
+  void require_declared_states(const FsmBase& fsm) const;
   /// Refuses a shell whose messages do not fit on the task's stack. Throws Error (out_of_range).
   void check_stack(const Shell& shell) const;
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
@@ -321,6 +327,7 @@ class Component final : public Configurable {
   ShownParts shown_;
   std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
   std::shared_ptr<const StateTimes> shown_times_;
+  std::vector<DescribedState> shown_states_;
 };
 
 /// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]

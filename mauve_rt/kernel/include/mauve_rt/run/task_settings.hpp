@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "mauve_rt/base/time.hpp"
+#include "mauve_rt/parts/declared_state.hpp"
 
 namespace mauve {
 
@@ -35,6 +36,8 @@ struct TaskSettings {
   std::size_t stack_bytes{std::size_t{512} * 1024};  // prefaulted whole: it is held in memory
   std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
   time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
+  time_ns_t deadline_ns{0};      // from a release to the next wait, for the analysis; 0: the next instant
+  std::vector<DeclaredState> states{};  // of the fsm's execution states
   bool operator==(const TaskSettings&) const = default;
 };
 
@@ -69,7 +72,7 @@ constexpr TaskSetting number_setting(std::string_view name, std::int64_t least, 
           }};
 }
 
-/// The table: what is added to TaskSettings gets a line here.
+/// The table: what is added to TaskSettings gets a line here, unless it is of each state.
 inline constexpr std::array kTaskSettings{
     number_setting<&TaskSettings::priority>("priority", 1, 98,
                                             "1 is the lowest, 98 the highest; 99 is kept for the watchdog"),
@@ -102,11 +105,15 @@ inline constexpr std::array kTaskSettings{
                                                  "leave the key out to have room by the period"),
     number_setting<&TaskSettings::hung_after_ns>("hung_after_ns", 1, kLongest,
                                                  "leave the key out for 10 periods, 1 s at least"),
+    number_setting<&TaskSettings::deadline_ns>("deadline_ns", 1, kLongest,
+                                               "leave the key out for the next instant"),
 };
 
 /// Throws Error (out_of_range, invalid_argument) unless the value is one that the setting takes; `component` is
 /// named in it. [non-rt]
 void check_setting(const TaskSetting& setting, const SettingValue& value, const std::string& component);
+/// Throws Error (out_of_range, duplicate_name) unless these can be. [non-rt]
+void check_states(const std::vector<DeclaredState>& states, const std::string& component);
 /// Likewise of all of them; the default is always taken. [non-rt]
 void check_settings(const TaskSettings& settings, const std::string& component);
 /// "5", "0, 1", "skip". [non-rt]

@@ -1,0 +1,104 @@
+"""A component as the analysis takes it: its machine of states, and how its thread is scheduled."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+FOREVER_NS = 2**63 - 1
+"""Of a wait that only an event or a stop ends."""
+
+
+@dataclass(frozen=True)
+class ExecutionTime:
+    """How long an execution state takes at most, and who says so."""
+
+    ns: int | None = None
+    origin: str = "missing"
+
+    def __str__(self) -> str:
+        """As `0.200 ms, declared`."""
+        return self.origin if self.ns is None else f"{in_ms(self.ns)}, {self.origin}"
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of the machine: an execution, a wait for a time, or a wait for an event."""
+
+    name: str
+    is_initial: bool
+    is_wait: bool
+    separation_ns: int
+    """Of a wait: the least time from the release before it to that at its end; FOREVER_NS: none comes."""
+    is_event_wait: bool
+    successors: tuple[str, ...]
+    time: ExecutionTime = ExecutionTime()
+    """Of an execution state."""
+
+    @classmethod
+    def of(cls, told: Any) -> Self:
+        """Of a mauve_msgs/msg/StateInfo, or what has the same fields."""
+        bound_ns = int(told.max_execution_ns)
+        return cls(
+            name=told.name,
+            is_initial=bool(told.is_initial),
+            is_wait=bool(told.is_wait),
+            separation_ns=int(told.min_interarrival_ns if told.is_event_wait else told.duration_ns),
+            is_event_wait=bool(told.is_event_wait),
+            successors=tuple(told.successors),
+            time=ExecutionTime(bound_ns, "declared") if bound_ns else ExecutionTime(),
+        )
+
+
+@dataclass(frozen=True)
+class Machine:
+    """One component. Times in ns."""
+
+    name: str
+    cpus: tuple[int, ...]
+    """That its thread may run on; none: any."""
+    priority: int
+    policy: str
+    """As read back from the thread; empty: it does not run yet."""
+    period_ns: int
+    """0: it waits for events, or does not run yet."""
+    deadline_ns: int
+    """From a release to the next wait; 0: the next instant."""
+    overrun: str
+    states: tuple[State, ...]
+    is_python: bool | None = None
+    """Whether it runs under the interpreter's lock; None: nobody knows."""
+
+    @classmethod
+    def of(cls, told: Any, *, states: Sequence[Any] | None = None, is_python: bool | None = None) -> Self:
+        """Of a mauve_msgs/msg/ComponentInfo, or what has the same fields."""
+        return cls(
+            name=told.name,
+            cpus=tuple(int(cpu) for cpu in told.cpus),
+            priority=int(told.priority),
+            policy=told.policy,
+            period_ns=int(told.period_ns),
+            deadline_ns=int(told.deadline_ns),
+            overrun=told.overrun,
+            states=tuple(State.of(state) for state in (told.states if states is None else states)),
+            is_python=is_python,
+        )
+
+    def with_budgets(self, budgets: Mapping[str, ExecutionTime]) -> Self:
+        """The same, with these times by state where it has none."""
+        states = (
+            state
+            if state.is_wait or state.time.ns is not None
+            else replace(state, time=budgets.get(state.name, state.time))
+            for state in self.states
+        )
+        return replace(self, states=tuple(states))
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Execution states whose time nobody knows."""
+        return tuple(state.name for state in self.states if not state.is_wait and state.time.ns is None)
+
+
+def in_ms(time_ns: int) -> str:
+    """As `0.200 ms`."""
+    return f"{time_ns / 1e6:,.3f} ms"

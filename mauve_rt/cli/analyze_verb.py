@@ -1,0 +1,205 @@
+"""`mauve analyze FILE|NODE|BAG`: the task model of an architecture, for an analysis of its timing."""
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mauve_rt.cli.verb import BAD_USAGE, OK
+
+if TYPE_CHECKING:
+    from mauve_rt.analysis.machines import ExecutionTime, Machine
+
+_LEAST_MARGIN = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to analyze, and where missing times come from."""
+    parser.add_argument(
+        "target", metavar="FILE|NODE|BAG", help="an architecture file, an executor's node, or a bag of one"
+    )
+    parser.add_argument(
+        "--budget-from",
+        type=Path,
+        metavar="BAG",
+        help="take times that nobody declares from this bag: the longest that was measured",
+    )
+    parser.add_argument(
+        "--margin", type=float, default=1.2, metavar="X", help="times this (default 1.2), with --budget-from"
+    )
+    parser.add_argument(
+        "--write",
+        action="store_true",
+        help="put the measured times into FILE as max_execution_ns, which the watchdog enforces",
+    )
+    parser.add_argument("--json", action="store_true", help="print it as JSON")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Print the model; returns the exit status."""
+    from mauve_rt.analysis.digraph import digraph_of  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.obstacles import (  # noqa: PLC0415
+        competing_threads,
+        obstacles,
+        obstacles_of_this_machine,
+    )
+
+    if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
+        print(f"mauve: --margin: expected 1 or more, found {args.margin:g}", file=sys.stderr)
+        return BAD_USAGE
+    if args.write and (args.budget_from is None or not Path(args.target).is_file()):
+        print("mauve: --write: expected an architecture FILE and --budget-from BAG", file=sys.stderr)
+        return BAD_USAGE
+    machines, sender_priority = _machines(args.target)
+    if args.budget_from is not None:
+        budgets = _budgets(args.budget_from, args.margin)
+        declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
+        if args.write:
+            _write(Path(args.target), declared, machines)
+    found = []
+    for machine in machines:
+        task = digraph_of(machine)
+        found.append((machine, task, [*obstacles(machine, task)]))
+    assumptions = [*obstacles_of_this_machine(), *competing_threads(sender_priority=sender_priority)]
+    if args.json:
+        told = {"components": [_as_json(*one) for one in found], "assumptions": assumptions}
+        print(json.dumps(told, indent=2))
+        return OK
+    from mauve_rt.cli.analyze_view import print_model  # noqa: PLC0415
+
+    print_model(found, assumptions)
+    return OK
+
+
+def _machines(target: str) -> "tuple[list[Machine], int]":
+    """The components of what is named, and the priority of the executor's sender."""
+    path = Path(target)
+    if not path.exists() and target.startswith("/"):
+        return _of_node(target), 1
+    if path.is_dir() or path.suffix in (".mcap", ".db3"):
+        return _of_bag(path), 1
+    return _of_file(path)
+
+
+def _of_file(path: Path) -> "tuple[list[Machine], int]":
+    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
+    from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
+    from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
+
+    model = load_architecture(path)
+    index = PluginIndex.installed()
+    architecture = build(model, PluginRegistry(), index=index)
+    states = previewed_states(model, architecture)
+    machines = [
+        Machine.of(part, states=states[part.name], is_python=_is_python(part, index))
+        for part in architecture.components()
+    ]
+    return machines, model.sender.priority
+
+
+def _of_node(node: str) -> "list[Machine]":
+    from mauve_msgs.srv import ListComponents  # noqa: PLC0415
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+
+    with connected(first=True) as client:
+        reply = client.call(ListComponents, f"{node}/list_components", ListComponents.Request())
+    return _of_told(reply.components)
+
+
+def _of_bag(path: Path) -> "list[Machine]":
+    import mauve_rt.trace  # noqa: PLC0415
+    from mauve_rt.trace.errors import TraceError  # noqa: PLC0415
+
+    trace = mauve_rt.trace.open(path)
+    if not trace.architecture:
+        raise TraceError(f"bag {path}: it does not tell the architecture; record it again with this version")
+    return _of_told(trace.architecture)
+
+
+def _of_told(components: Iterable[Any]) -> "list[Machine]":
+    from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
+    from mauve_rt.model import PluginIndex  # noqa: PLC0415
+
+    index = PluginIndex.installed()
+    return [Machine.of(part, is_python=_is_python(part, index)) for part in components]
+
+
+def _is_python(part: Any, index: Any) -> bool | None:
+    named = (("shell", part.shell), ("core", part.core), ("fsm", part.fsm))
+    plugins = [index.find(kind, name) for kind, name in named]
+    if any(plugin is not None and plugin.is_python for plugin in plugins):
+        return True
+    return None if None in plugins else False
+
+
+def _budgets(path: Path, margin: float) -> "Mapping[str, Mapping[str, ExecutionTime]]":
+    """What was measured, by component and state. Preemption is in it: too much rather than too little."""
+    import mauve_rt.trace  # noqa: PLC0415
+    from mauve_rt.analysis.machines import ExecutionTime  # noqa: PLC0415
+    from mauve_rt.trace.reading.statistics import all_statistics  # noqa: PLC0415
+
+    statistics = all_statistics(mauve_rt.trace.open(path))
+    return {
+        component: {
+            state: ExecutionTime(
+                math.ceil(measured.max_ns * margin),
+                f"measured in {path.name} (n = {measured.count:,}) x {margin:g}",
+            )
+            for state, measured in one.execution.items()
+            if measured.count
+        }
+        for component, one in statistics.items()
+    }
+
+
+def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]") -> None:
+    """Put what was filled in into the file, or leave it as it is.
+
+    Raises:
+        ArchitectureFileError: the file has no place for it, or would not be one any more.
+    """
+    from mauve_rt.errors import ArchitectureFileError, Problem  # noqa: PLC0415
+    from mauve_rt.model import load_architecture  # noqa: PLC0415
+    from mauve_rt.yaml.insertion import InsertionError, with_entry  # noqa: PLC0415
+
+    text, count = path.read_bytes().decode(), 0
+    for before, after in zip(declared, filled, strict=True):
+        for state in after.states:
+            if state.name not in before.missing or state.time.ns is None:
+                continue
+            place = ("components", after.name, "states", state.name)
+            try:
+                text = with_entry(
+                    text, place, "max_execution_ns", str(state.time.ns), comment=state.time.origin
+                )
+            except InsertionError as error:
+                problem = Problem(line=1, column=1, what=f"no time can be written: {error}")
+                raise ArchitectureFileError(path, [problem]) from error
+            count += 1
+    whole = path.resolve()
+    unfinished = whole.with_name(f".{whole.name}.{os.getpid()}")
+    try:
+        unfinished.write_bytes(text.encode())
+        unfinished.chmod(whole.stat().st_mode)
+        load_architecture(unfinished)
+        unfinished.replace(whole)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    print(
+        f"{path}: {count} times written; the watchdog enforces them from the next start on", file=sys.stderr
+    )
+
+
+def _as_json(machine: "Machine", task: Any, not_provable: list[str]) -> dict[str, Any]:
+    told = asdict(machine)
+    told["states"] = [
+        {"name": state.name, "time_ns": state.time.ns, "origin": state.time.origin}
+        for state in machine.states
+        if not state.is_wait
+    ]
+    return {**told, "jobs": [asdict(job) for job in task.jobs], "not_provable": not_provable}

@@ -1,0 +1,39 @@
+"""Machines for tests of the analysis, in few words."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from mauve_rt.analysis.machines import Machine
+
+MS = 1_000_000
+
+
+def execution(name: str, *successors: str, bound_ms: float = 0.0, initial: bool = False) -> SimpleNamespace:
+    """As mauve_msgs/msg/StateInfo has it."""
+    return _state(name, successors, max_execution_ns=round(bound_ms * MS), is_initial=initial)
+
+
+def wait(name: str, *successors: str, ms: int, initial: bool = False) -> SimpleNamespace:
+    """For a time."""
+    return _state(name, successors, is_wait=True, duration_ns=ms * MS, is_initial=initial)
+
+
+def event(name: str, *successors: str, least_ms: int, initial: bool = False) -> SimpleNamespace:
+    """For an event."""
+    told = {"is_wait": True, "is_event_wait": True, "duration_ns": 2**63 - 1, "is_initial": initial}
+    return _state(name, successors, min_interarrival_ns=least_ms * MS, **told)
+
+
+def _state(name: str, successors: tuple[str, ...], **told: Any) -> SimpleNamespace:
+    usual = dict.fromkeys(("is_initial", "is_wait", "is_event_wait"), False)
+    numbers = ("duration_ns", "min_interarrival_ns", "max_execution_ns", "simulated_execution_ns")
+    return SimpleNamespace(
+        **{**usual, **dict.fromkeys(numbers, 0), "name": name, "successors": successors, **told}
+    )
+
+
+def machine(*states: SimpleNamespace, is_python: bool | None = False, **told: Any) -> Machine:
+    """One that runs on CPU 0 with priority 50."""
+    usual = {"name": "c", "cpus": [0], "priority": 50, "policy": "SCHED_FIFO", "period_ns": 0}
+    component = SimpleNamespace(**{**usual, "deadline_ns": 0, "overrun": "skip", "states": states, **told})
+    return Machine.of(component, is_python=is_python)

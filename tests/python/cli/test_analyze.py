@@ -1,0 +1,154 @@
+"""`mauve analyze` on architecture files: the task model, where its times come from, what cannot be proved."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mauve_rt.cli.main import main
+
+Analyze = Callable[..., tuple[int, str, str]]
+
+ROBOT = """\
+mauve: 1
+components:
+  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+        priority: 40, cpus: [0], properties: {period_ms: 20}, deadline_ns: 5000000,
+        states: {Count: {max_execution_ns: 200000}}}
+  guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/GuardedFsm,
+          priority: 30, properties: {period_ms: 20}}
+  python: {shell: executor_tests/CounterShell, core: executor_tests/PyCounter, fsm: executor_tests/CounterFsm,
+           priority: 20, cpus: [0, 1]}
+"""
+
+
+@pytest.fixture
+def analyze(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Analyze:
+    """analyze(TEXT, WORD...): status, stdout, stderr of a file with that text."""
+
+    def run(text: str, *words: str) -> tuple[int, str, str]:
+        file = tmp_path / "robot.yaml"
+        file.write_text(text, encoding="utf-8")
+        status = main(["analyze", str(file), *words])
+        said = capsys.readouterr()
+        return status, said.out, said.err.replace(f"{tmp_path}/", "")
+
+    return run
+
+
+@pytest.fixture
+def told(analyze: Analyze) -> Callable[..., dict[str, Any]]:
+    """What is told of each component, by its name."""
+
+    def run(text: str, *words: str) -> dict[str, Any]:
+        status, out, err = analyze(text, "--json", *words)
+        assert (status, err) == (0, "")
+        return {component["name"]: component for component in json.loads(out)["components"]}
+
+    return run
+
+
+def test_a_declared_time_of_the_file_or_of_the_code(told: Callable[..., dict[str, Any]]) -> None:
+    found = told(ROBOT)
+    one = found["one"]
+    assert (one["cpus"], one["priority"], one["deadline_ns"]) == ([0], 40, 5_000_000)
+    assert one["states"] == [{"name": "Count", "time_ns": 200_000, "origin": "declared"}]
+    assert [(job["after"], job["until"], job["cost_ns"], job["separation_ns"]) for job in one["jobs"]] == [
+        ("", "Pause", 200_000, 20_000_000),
+        ("Pause", "Pause", 200_000, 20_000_000),
+    ]
+    assert {job["deadline_ns"] for job in one["jobs"]} == {5_000_000}
+    assert one["not_provable"] == []
+    guard = found["guard"]
+    assert guard["states"] == [{"name": "Count", "time_ns": 500_000_000, "origin": "declared"}], "by its fsm"
+    assert {job["deadline_ns"] for job in guard["jobs"]} == {20_000_000}, "the next instant"
+
+
+def test_what_cannot_be_proved_is_said_of_each_component(told: Callable[..., dict[str, Any]]) -> None:
+    found = told(ROBOT)
+    assert found["guard"]["not_provable"] == [
+        "it may run on any CPU: pin it to one (cpus in the architecture file)",
+        "Count takes 500.000 ms, and Pause lasts 20.000 ms: shorten it, or wait longer",
+        "Count takes 500.000 ms, and Pause lasts 20.000 ms: shorten it, or wait longer",
+    ]
+    assert found["python"]["not_provable"] == [
+        "it has parts in Python, which run under the interpreter's lock: write them in C++",
+        "it may run on CPUs 0, 1: pin it to one (cpus in the architecture file)",
+        "no time is known of Count: declare max_execution_ns, or measure (--budget-from BAG)",
+    ]
+
+
+def test_the_model_in_words(analyze: Analyze) -> None:
+    status, out, err = analyze(ROBOT)
+    assert (status, err) == (0, "")
+    assert (
+        "one: CPU 0, priority 40, by its waits, deadline 5.000 ms, overrun skip\n"
+        "  Count: 0.200 ms, declared\n"
+        "  job the start -> Count -> Pause: at most 0.200 ms, the next one 20.000 ms later\n"
+    ) in out
+    assert "  Count: missing\n" in out
+    assert "assumed, as no cost of it is known:\n" in out
+    assert "  sender (1), which sends the messages of bound topics\n" in out
+
+
+def test_a_time_in_virtual_time_is_no_bound(told: Callable[..., dict[str, Any]]) -> None:
+    found = told(ROBOT.replace("max_execution_ns", "simulated_execution_ns"))
+    assert found["one"]["states"] == [{"name": "Count", "time_ns": None, "origin": "missing"}]
+    assert {job["cost_ns"] for job in found["one"]["jobs"]} == {None}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "problem"),
+    [
+        (
+            "deadline_ns: 5000000",
+            "deadline_ns: 0",
+            "robot.yaml:4:76: bad deadline_ns of component 'one': expected at least 1",
+        ),
+        (
+            "deadline_ns: 5000000",
+            "deadline_ns: -1",
+            "robot.yaml:4:76: bad deadline_ns of component 'one': expected at least 1",
+        ),
+        (
+            "max_execution_ns: 200000",
+            "max_execution_ns: 0",
+            "robot.yaml:5:44: bad max_execution_ns in states.Count of component 'one': expected at least 1",
+        ),
+        (
+            "max_execution_ns: 200000",
+            "simulated_execution_ns: -5",
+            "robot.yaml:5:50: bad simulated_execution_ns in states.Count of component 'one': expected at",
+        ),
+        ("max_execution_ns: 200000", "", "expected max_execution_ns or simulated_execution_ns"),
+        ("Count: {max", "Rum: {max", "no such execution state; expected one of Count, found Rum"),
+        ("Count: {max", "Pause: {max", "no such execution state; expected one of Count, found Pause"),
+    ],
+)
+def test_bad_times_are_refused_where_they_stand(
+    analyze: Analyze, before: str, after: str, problem: str
+) -> None:
+    status, out, err = analyze(ROBOT.replace(before, after, 1))
+    assert (status, out) == (2, "")
+    assert problem in err
+    assert "robot.yaml:" in err
+
+
+@pytest.mark.parametrize("margin", ["0.9", "nan", "-1"])
+def test_a_margin_below_one_is_refused(analyze: Analyze, margin: str) -> None:
+    status, _, err = analyze(ROBOT, "--margin", margin)
+    assert status == 2
+    assert "--margin: expected 1 or more" in err
+
+
+@pytest.mark.parametrize("words", [("--write",), ("--write", "--json")])
+def test_to_write_asks_for_a_bag(analyze: Analyze, words: tuple[str, ...]) -> None:
+    status, _, err = analyze(ROBOT, *words)
+    assert (status, err) == (2, "mauve: --write: expected an architecture FILE and --budget-from BAG\n")
+
+
+def test_what_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["analyze", "nowhere.yaml"]) == 2
+    assert "nowhere.yaml" in capsys.readouterr().err
