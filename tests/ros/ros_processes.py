@@ -87,7 +87,7 @@ class ExecutorProcess:
         return self._log.read_text(encoding="utf-8")
 
     def await_output(self, words: str) -> None:
-        """Until it has printed that: a thread of its own writes its log, after what it tells by other ways."""
+        """Until it has printed that: a thread of its own writes the log, after what is told elsewhere."""
         deadline = time.monotonic() + PATIENCE_S
         while words not in self.output:
             assert time.monotonic() < deadline, f"it never printed: {words}\n{self.output}"
