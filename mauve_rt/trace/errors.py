@@ -3,3 +3,8 @@
 
 class TraceError(Exception):
     """Recording or reading a trace failed. str() is one line: what, where, expected, found, remedy."""
+
+
+def libraries_missing(error: ImportError) -> TraceError:
+    """Return the error that says how to get the libraries by which bags are read; recording needs none."""
+    return TraceError(f"reading bags needs more ({error}); install it by: pip install mcap rosbags")

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +18,8 @@ pytestmark = pytest.mark.timeout(600)  # it downloads
 UV = shutil.which("uv") or ""
 INSTALLED = Path(_kernel.__file__).resolve().parents[4]
 SOURCES = Path(mauve_rt.__file__).parents[1]
-OPTIONAL = {"perfetto"}  # no package of apt; `mauve trace export` says so
+LIBRARIES = {"mcap", "rosbags"}  # no package of apt: recording needs neither, what reads bags says so
+OPTIONAL = LIBRARIES | {"perfetto"}  # likewise; `mauve trace export` says so
 
 
 def _pinned(name: str) -> dict[str, str]:
@@ -98,6 +100,14 @@ def test_a_run_is_started_changed_recorded_checked_and_reported(
     assert executor.interrupt() == 0, executor.output
     assert "Traceback" not in executor.output
     mauve = INSTALLED / "bin" / "mauve"
-    for words in (("check", architecture), ("trace", "check", bag), ("report", bag)):
+    run(mauve, "check", architecture, environment=shell)
+    refused = subprocess.run([mauve, "report", bag], env=shell, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "pip install mcap rosbags" in refused.stderr
+    libraries = [f"{name}=={version}" for name, version in _pinned("run").items() if name in LIBRARIES]
+    python = shutil.which("python3", path=shell["PATH"])
+    run(UV, "pip", "install", "--system-certs", "--python", python, *libraries, environment=shell)
+    for words in (("trace", "check", bag), ("report", bag)):
         run(mauve, *words, environment=shell)
     assert (bag / "report.html").stat().st_size > 0

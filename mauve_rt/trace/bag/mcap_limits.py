@@ -5,11 +5,10 @@ what a file's compressed chunks hold together has bounds that grow with the file
 refused, not damaged: a repair would cut it off there.
 """
 
-from importlib import import_module
-from typing import Any, NoReturn
+from typing import NoReturn
 
+from mauve_rt.trace.bag.mcap_library import Chunk, LZ4FrameDecompressor, McapError, ZstdDecompressor
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.format.mcap_records import Bytes, Chunk, McapError
 
 MAX_CHUNK_BYTES = 256 << 20
 """Of a compressed chunk, unpacked."""
@@ -43,7 +42,7 @@ class McapLimits:
         """Return the records in a chunk, as bytes.
 
         Raises:
-            McapError: they are not what the chunk claims, or need a package that is not installed.
+            McapError: they are not what the chunk claims.
             TraceError: they are more than is read.
 
         """
@@ -74,14 +73,14 @@ class McapLimits:
         """
         self._refuse("more records in its compressed chunks than a file of its size holds")
 
-    def define(self, opcode: int, body: Bytes, size: int) -> None:
-        """Count the bytes of a schema or channel that is to be read; `body` begins with its id.
+    def define(self, opcode: int, number: bytes, size: int) -> None:
+        """Count the bytes of a schema or channel that is to be read; `number` is its id.
 
         Raises:
             TraceError: they are more than is read.
 
         """
-        key = (opcode, bytes(body[:2]))
+        key = (opcode, number)
         self._defined_bytes += size - self._definition_bytes.get(key, 0)
         self._definition_bytes[key] = size
         if size > MAX_DEFINITION_BYTES or self._defined_bytes > MAX_DEFINITIONS_BYTES:
@@ -97,7 +96,7 @@ def unpacked(chunk: Chunk) -> bytes:
     """Return the records in a chunk, as bytes: as many as it claims.
 
     Raises:
-        McapError: there are more or fewer, they cannot be uncompressed, or a package for it is not installed.
+        McapError: there are more or fewer, or they cannot be uncompressed.
 
     """
     size = chunk.uncompressed_size
@@ -113,18 +112,13 @@ def unpacked(chunk: Chunk) -> bytes:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """At most one byte more than the chunk claims."""
-    packages = {"zstd": "zstandard", "lz4": "lz4"}
-    if chunk.compression not in packages:
+    """At most one byte more than the chunk claims; the library believes the size that a frame claims."""
+    unpack = {"zstd": _unpacked_zstd, "lz4": _unpacked_lz4}.get(chunk.compression)
+    if unpack is None:
         msg = f"compressed by {chunk.compression!r}, expected zstd or lz4"
         raise McapError(msg)
-    package = packages[chunk.compression]
-    unpack = {"zstd": _unpacked_zstd, "lz4": _unpacked_lz4}[chunk.compression]
     try:
         return unpack(chunk.data, chunk.uncompressed_size + 1)
-    except ModuleNotFoundError as error:
-        msg = f"compressed by {chunk.compression}: install python3-{package} (with pip: {package})"
-        raise McapError(msg) from error
     except MemoryError:
         raise
     except Exception as error:  # each compression has an error of its own
@@ -134,11 +128,10 @@ def _unpacked(chunk: Chunk) -> bytes:
 
 def _unpacked_zstd(data: bytes, limit: int) -> bytes:
     # In a stream: at once, it would believe the size in the frame and not the limit.
-    unpack: Any = import_module("zstandard").ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES)
+    unpack = ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES)
     with unpack.stream_reader(data) as stream:
         return bytes(stream.read(limit))
 
 
 def _unpacked_lz4(data: bytes, limit: int) -> bytes:
-    unpack: Any = import_module("lz4.frame").LZ4FrameDecompressor()
-    return bytes(unpack.decompress(data, max_length=limit))
+    return bytes(LZ4FrameDecompressor().decompress(data, max_length=limit))

@@ -14,11 +14,7 @@ from pathlib import Path
 
 from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.bag.mcap_file import Summary, build_tail
-from mauve_rt.trace.bag.mcap_scan import Found, McapScan, Told
-from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.format.mcap_chunk import Counts
-from mauve_rt.trace.format.mcap_records import (
-    MESSAGE_HEAD,
+from mauve_rt.trace.bag.mcap_library import (
     Channel,
     Chunk,
     ChunkIndex,
@@ -26,11 +22,13 @@ from mauve_rt.trace.format.mcap_records import (
     Message,
     MessageIndex,
     Opcode,
-    OtherRecord,
     Schema,
     serialized,
-    split_records,
 )
+from mauve_rt.trace.bag.mcap_scan import Found, McapScan, Told
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format import mcap_records as ours
+from mauve_rt.trace.format.mcap_chunk import Counts
 from mauve_rt.trace.progress import Progress, silent
 
 _BLOCK_BYTES = 1 << 20
@@ -62,11 +60,9 @@ class _ChunkSeen:
             message_start_time=chunk.message_start_time,
             uncompressed_size=chunk.uncompressed_size,
         )
-        data = found.unpacked
-        for opcode, at, body, _ in split_records(data):
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(data, body)
-                self.messages.setdefault(channel, []).append((log_time, at))
+        for at, one in found.inside:
+            if isinstance(one, Message):
+                self.messages.setdefault(one.channel_id, []).append((one.log_time, at))
 
     def add_index(self, offset: int, end: int, index: MessageIndex) -> None:
         """Take note of a message index behind it."""
@@ -169,8 +165,8 @@ class FileState:
                 crc = _crc(descriptor, self.whole_bytes)
                 data_end = self.whole_bytes + len(self._missing_indexes)
                 summary = Summary(
-                    self.schemas,
-                    self.channels,
+                    [ours.Schema(**vars(one)) for one in self.schemas],
+                    [ours.Channel(**vars(one)) for one in self.channels],
                     self.counts,
                     self._chunk_count,
                     serialized(*self._chunk_indexes),
@@ -197,15 +193,15 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
     counts = Counts()
     chunks = _Chunks()
     chunk_count = 0
-    others = {Opcode.ATTACHMENT: 0, Opcode.METADATA: 0}
+    others = {int(Opcode.ATTACHMENT): 0, int(Opcode.METADATA): 0}
     with McapScan(path) as scan:
         for found in scan.found():
             record = found.record
             chunks.note(found)
             chunk_count += isinstance(record, Chunk)
-            if isinstance(record, OtherRecord) and record.opcode in others:
-                others[Opcode(record.opcode)] += 1
-            for one in found.inside:
+            if found.opcode in others:
+                others[found.opcode] += 1
+            for _, one in found.inside:
                 if isinstance(one, Message):
                     counts.add(one.channel_id, one.log_time)
             progress(scan.whole_bytes / max(scan.size, 1), "examining")
@@ -234,8 +230,8 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             _chunk_indexes=entries,
             _chunk_count=chunk_count,
             _missing_indexes=missing,
-            _attachments=others[Opcode.ATTACHMENT],
-            _metadata=others[Opcode.METADATA],
+            _attachments=others[int(Opcode.ATTACHMENT)],
+            _metadata=others[int(Opcode.METADATA)],
         )
 
 

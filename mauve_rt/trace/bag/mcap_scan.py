@@ -13,10 +13,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from mauve_rt.trace.bag.mcap_file import MAGIC
-from mauve_rt.trace.bag.mcap_limits import McapLimits
-from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.format.mcap_records import (
-    HEAD,
+from mauve_rt.trace.bag.mcap_library import (
     READ_OPCODES,
     Channel,
     Chunk,
@@ -25,19 +22,22 @@ from mauve_rt.trace.format.mcap_records import (
     Footer,
     Header,
     McapError,
+    McapRecord,
     Message,
     Opcode,
-    OtherRecord,
-    Record,
     Schema,
     Statistics,
+    read_message,
     read_record,
     split_records,
 )
+from mauve_rt.trace.bag.mcap_limits import McapLimits
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.mcap_records import HEAD
 
 _FOOTER_BYTES = HEAD.size + 20
 _ATTEMPTS, _PAUSE_S = 3, 0.02  # a flush takes some hundred microseconds
-_UNREADABLE = (ValueError, KeyError, IndexError, EOFError, OverflowError)
+_UNREADABLE = (McapError, ValueError, KeyError, IndexError, EOFError, OverflowError)
 _DEFINITIONS = (int(Opcode.SCHEMA), int(Opcode.CHANNEL))
 _MESSAGE = int(Opcode.MESSAGE)  # an enum is compared more slowly, and there are many
 
@@ -47,11 +47,11 @@ class Found(NamedTuple):
 
     offset: int
     end: int
-    record: Record
-    inside: list[Record]
-    """The records of a chunk, or the record itself."""
-    unpacked: bytes = b""
-    """The bytes of the records in a chunk."""
+    opcode: int
+    record: McapRecord | None
+    """None: one that nobody asks about, of an attachment, metadata or a later version of the format."""
+    inside: list[tuple[int, McapRecord]]
+    """The records of a chunk and their offsets in it, or the record itself."""
 
 
 @dataclass
@@ -129,7 +129,7 @@ class McapScan:
             if isinstance(found.record, DataEnd):
                 self.data_end = found.record
                 self.whole_bytes = found.offset
-            for one in found.inside:
+            for _, one in found.inside:
                 if isinstance(one, Schema):
                     self.schemas[one.id] = one
                 elif isinstance(one, Channel):
@@ -144,7 +144,7 @@ class McapScan:
 
         """
         for found in self.found():
-            for record in found.inside:
+            for _, record in found.inside:
                 if isinstance(record, Message):
                     yield self.channels[record.channel_id], record
 
@@ -165,7 +165,8 @@ class McapScan:
             at = len(tail) - len(MAGIC) - _FOOTER_BYTES
             if tail[at] != Opcode.FOOTER:
                 return Told("the footer is missing")
-            footer = Footer.from_bytes(tail[at + HEAD.size : -len(MAGIC)])
+            footer = read_record(int(Opcode.FOOTER), tail[at + HEAD.size : -len(MAGIC)])
+            assert isinstance(footer, Footer)  # noqa: S101 - for mypy
             begin = footer.summary_start - self.whole_bytes if footer.summary_start else at
             crc = zlib.crc32(tail[begin : at + _FOOTER_BYTES - 4])
             if footer.summary_crc not in (0, crc):
@@ -184,7 +185,7 @@ class McapScan:
             msg = f"bag file {self.path}: the MCAP header cannot be read ({_reason(error)})"
             raise TraceError(msg) from error
         if not isinstance(found.record, Header):
-            msg = f"bag file {self.path}: expected an MCAP header, found a {type(found.record).__name__}"
+            msg = f"bag file {self.path}: expected an MCAP header, found opcode {found.opcode}"
             raise TraceError(msg)
         self.whole_bytes = found.end
         return found.record
@@ -212,20 +213,20 @@ class McapScan:
         if opcode == 0:
             msg = "no record begins here"
             raise ValueError(msg)
-        if opcode not in READ_OPCODES:  # nobody asks what is in it
-            return Found(offset, end, OtherRecord(opcode), [])
+        if opcode not in READ_OPCODES:
+            return Found(offset, end, opcode, None, [])
         data = self._file.read(length)
         if len(data) < length:
             msg = "the file became shorter"
             raise EOFError(msg)
         if opcode in _DEFINITIONS:
-            self._limits.define(opcode, data, length)
+            self._limits.define(opcode, data[:2], length)
         record = read_record(opcode, data)
         if isinstance(record, Chunk):
             return self._chunk(offset, end, record)
         if isinstance(record, Message):
             self._check_channel(record.channel_id, self.channels)
-        return Found(offset, end, record, [record])
+        return Found(offset, end, opcode, record, [(0, record)])
 
     def _chunk(self, offset: int, end: int, chunk: Chunk) -> Found:
         """See that a chunk is what its head promises.
@@ -234,31 +235,30 @@ class McapScan:
             ValueError: it is not.
 
         """
-        unpacked = self._limits.unpacked(chunk)
-        crc = zlib.crc32(unpacked)
+        data = self._limits.unpacked(chunk)
+        crc = zlib.crc32(data)
         if chunk.uncompressed_crc not in (0, crc):
             msg = f"a chunk's CRC does not fit: expected {chunk.uncompressed_crc:08x}, found {crc:08x}"
             raise ValueError(msg)
-        data = memoryview(unpacked)
-        inside: list[Record] = []
+        inside: list[tuple[int, McapRecord]] = []
         channels = set(self.channels)
         count, most = 0, self._limits.records_left(chunk)
-        for count, (opcode, _, begin, stop) in enumerate(split_records(data), start=1):
+        for count, (opcode, at, begin, stop) in enumerate(split_records(data), start=1):
             if count > most:
                 self._limits.refuse_records()
             if opcode == _MESSAGE:
-                message = Message.from_bytes(data[begin:stop])
+                message = read_message(data, begin, stop)
                 if message.channel_id not in channels:
                     self._check_channel(message.channel_id, channels)
-                inside.append(message)
+                inside.append((at, message))
             elif opcode in _DEFINITIONS:  # nothing else belongs here
-                self._limits.define(opcode, data[begin:stop], stop - begin)
+                self._limits.define(opcode, data[begin : begin + 2], stop - begin)
                 record = read_record(opcode, data[begin:stop])
                 if isinstance(record, Channel):
                     channels.add(record.id)
-                inside.append(record)
+                inside.append((at, record))
         self._limits.count(chunk, count)
-        return Found(offset, end, chunk, inside, unpacked)
+        return Found(offset, end, int(Opcode.CHUNK), chunk, inside)
 
     @staticmethod
     def _check_channel(channel_id: int, channels: Collection[int]) -> None:
@@ -270,7 +270,7 @@ class McapScan:
 def _told(summary: bytes) -> Told:
     told = Told()
     for opcode, _, body, end in split_records(summary):
-        record = read_record(opcode, summary[body:end])
+        record = read_record(opcode, summary[body:end]) if opcode in READ_OPCODES else None
         if isinstance(record, Statistics):
             told.statistics = record
         elif isinstance(record, ChunkIndex):

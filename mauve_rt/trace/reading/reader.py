@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from mauve_rt.trace.bag.files import bag_files
+from mauve_rt.trace.bag.mcap_library import Channel
 from mauve_rt.trace.bag.mcap_scan import McapScan
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, decode_batch
 from mauve_rt.trace.format.kinds import RecordKind, kinds_told
-from mauve_rt.trace.format.mcap_records import Channel
 from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.format.records import RECORD, Records
 from mauve_rt.trace.progress import Progress, silent
@@ -98,6 +98,7 @@ class _Content:
             if type_name == _BATCH_TYPE:
                 self._kinds.update(kinds_told(_record_definition(scan, channel)))
         try:
+            # Not by rosbags: it makes an object of each record, in 1.0 us; here a record takes 0.002 us.
             if type_name == _BATCH_TYPE:
                 self._topics.add(channel.topic)
                 self._batches.append(decode_batch(data))
@@ -108,6 +109,9 @@ class _Content:
                 self._add_architecture(self._types.decoded(scan, channel, data))
         except TraceError as error:
             msg = f"bag file {scan.path}: {error}"
+            raise TraceError(msg) from error
+        except (AttributeError, TypeError, ValueError) as error:
+            msg = f"bag file {scan.path}: topic {channel.topic}: its messages are no {type_name} ({error})"
             raise TraceError(msg) from error
 
     def _add_architecture(self, said: Any) -> None:

@@ -22,19 +22,21 @@ MODULES = {
     "catkin_pkg": ("python3-catkin-pkg-modules", "catkin-pkg"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
-    "mcap": ("", "mcap"),  # no distribution packages it: the tests' only
+    "lz4": ("", "mcap"),  # comes with it
+    "mcap": ("", "mcap"),
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
     "pandas": ("python3-pandas", "pandas"),
     "perfetto": ("", "perfetto"),
     "pytest": ("python3-pytest", "pytest"),
     "rich": ("python3-rich", "rich"),
-    "rosbags": ("", "rosbags"),  # no distribution packages it: the tests' only
+    "rosbags": ("", "rosbags"),
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
     "yaml": ("python3-yaml", "PyYAML"),
     "zstandard": ("", "mcap"),  # comes with it
 }
-OPTIONAL = {"perfetto"}  # rosdep has no key; where it is used it says how to get it
+# rosdep has no key; where they are used they say how to get them
+OPTIONAL = {"lz4", "mcap", "perfetto", "rosbags", "zstandard"}
 # Of CMake's packages that rosdep calls otherwise: its keys (rosdep/base.yaml); none if nothing is installed.
 CMAKE_PACKAGES: dict[str, set[str]] = {
     "GTest": {"gtest", "google-mock"},
