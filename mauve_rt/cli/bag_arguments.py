@@ -3,14 +3,15 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from mauve_rt.trace.bag.files import is_bag_folder
 from mauve_rt.trace.errors import TraceError
 
 
 def bags_in(path: Path) -> list[Path]:
     """Return the bags right below a folder that is none itself, by name; where there are none, the path."""
-    if not path.is_dir() or any(path.glob("*.mcap")):
+    if not path.is_dir() or is_bag_folder(path):
         return [path]
-    return sorted({file.parent for file in path.glob("*/*.mcap")}) or [path]
+    return sorted(filter(is_bag_folder, path.iterdir())) or [path]
 
 
 def all_bags(paths: Iterable[Path]) -> list[Path]:

@@ -20,7 +20,7 @@ __all__ = ["TraceError", "open"]
 
 
 def open(path: str | Path, *, progress: Progress = silent) -> "Trace":  # noqa: A001 - as gzip.open
-    """Read the trace in a bag: a rosbag2 folder with MCAP files, or one such file.
+    """Read the trace in a bag: a rosbag2 folder with MCAP files or sqlite3's, or one such file.
 
     Also of a recorder that runs. What a kill left half-written is left out, and told in `Trace.files`.
 

@@ -215,7 +215,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
         damage = scan.damage or told.damage or _untrue(told, counts, entries)
         return FileState(
             path=path,
-            library=scan.header.library,
+            library=scan.library,
             damage=damage,
             size=scan.size,
             whole_bytes=whole_bytes,

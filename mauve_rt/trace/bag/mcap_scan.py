@@ -104,6 +104,11 @@ class McapScan:
         self._file.close()
 
     @property
+    def library(self) -> str:
+        """What wrote the file, by its own words."""
+        return str(self.header.library)
+
+    @property
     def size(self) -> int:
         """Bytes of the file now."""
         return os.fstat(self._file.fileno()).st_size

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.trace.bag.files import bag_files
+from mauve_rt.trace.bag.files import bag_files, is_sqlite
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
 from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
 from mauve_rt.trace.errors import TraceError
@@ -54,6 +54,9 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
         TraceError: it is no bag, or cannot be read.
 
     """
+    if is_sqlite(path):
+        msg = f"bag {path}: its storage is sqlite3; only MCAP files are examined and repaired here"
+        raise TraceError(msg)
     files = bag_files(path)
     states, unreadable = [], {}
     for index, file in enumerate(files):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.trace.bag.files import is_sqlite
 from mauve_rt.trace.bag.repair import BagState, examine_bag
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.progress import Progress, part, silent
@@ -43,7 +44,8 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         TraceError: it is no bag with a trace, or cannot be read.
 
     """
-    state = examine_bag(path, progress=part(progress, 0.0, 0.5))
+    examining = part(progress, 0.0, 0.5)
+    state = BagState(path, (), "", {}, {}) if is_sqlite(path) else examine_bag(path, progress=examining)
     found = [Finding(text, is_damage=True) for text in state.damages()]
     if state.unreadable:
         return found

@@ -9,12 +9,12 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from mauve_rt.trace.bag.files import bag_files
+from mauve_rt.trace.bag.files import MCAP, bag_files
 from mauve_rt.trace.bag.mcap_library import Channel
 from mauve_rt.trace.bag.mcap_scan import McapScan
 from mauve_rt.trace.errors import TraceError
@@ -27,6 +27,9 @@ from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_polici
 from mauve_rt.trace.reading.decisions import RULES, traced_decisions
 from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message
 from mauve_rt.trace.reading.trace import Trace
+
+if TYPE_CHECKING:
+    from mauve_rt.trace.bag.sqlite_scan import SqliteScan
 
 _PACKAGE = "mauve_msgs/msg"
 _BATCH_TYPE = f"{_PACKAGE}/TraceBatch"
@@ -47,7 +50,7 @@ _FIELD = re.compile(r"^\s*([a-z]\w*)\s+([a-z]\w*)\s*(?:#.*)?$", re.MULTILINE)
 
 
 def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
-    """Read the trace in a bag: a rosbag2 folder with MCAP files, or one such file.
+    """Read the trace in a bag: a rosbag2 folder with MCAP files or sqlite3's, or one such file.
 
     Also of a recorder that runs. What a kill left half-written is left out, and told in `Trace.files`.
 
@@ -62,13 +65,21 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
     sizes = [file.stat().st_size for file in files]
     done = 0
     for file, size in zip(files, sizes, strict=True):
-        with McapScan(file) as scan:
+        with _scan(file) as scan:
             for channel, message in scan.messages():
                 content.add(scan, channel, message.data)
                 progress((done + scan.whole_bytes) / max(sum(sizes), 1), "reading")
-            content.files.append(BagFile(file, scan.header.library, scan.whole_bytes, scan.damage))
+            content.files.append(BagFile(file, scan.library, scan.whole_bytes, scan.damage))
         done += size
     return content.trace(files)
+
+
+def _scan(file: Path) -> "McapScan | SqliteScan":
+    if file.suffix == MCAP:
+        return McapScan(file)
+    from mauve_rt.trace.bag.sqlite_scan import SqliteScan  # noqa: PLC0415 - 50 ms, and seldom needed
+
+    return SqliteScan(file)
 
 
 class _Content:
@@ -88,7 +99,7 @@ class _Content:
         self._types = _Types()
         self._kinds: dict[int, RecordKind] = {}
 
-    def add(self, scan: McapScan, channel: Channel, data: bytes) -> None:
+    def add(self, scan: "McapScan | SqliteScan", channel: Channel, data: bytes) -> None:
         type_name = scan.type_of(channel)
         self._all_topics[channel.topic] = (type_name, self._all_topics.get(channel.topic, ("", 0))[1] + 1)
         if type_name not in _OWN_TYPES:
@@ -161,7 +172,7 @@ class _Types:
     def __init__(self) -> None:
         self._decoders: dict[tuple[str, bytes], Decoder] = {}
 
-    def decoded(self, scan: McapScan, channel: Channel, data: bytes) -> Any:
+    def decoded(self, scan: "McapScan | SqliteScan", channel: Channel, data: bytes) -> Any:
         """Return a message as an object.
 
         Raises:
@@ -182,7 +193,7 @@ class _Types:
             raise TraceError(msg) from error
 
 
-def _record_definition(scan: McapScan, channel: Channel) -> str:
+def _record_definition(scan: "McapScan | SqliteScan", channel: Channel) -> str:
     """Return the text of TraceRecord.msg in the definition of a topic of batches.
 
     Raises:
@@ -198,7 +209,7 @@ def _record_definition(scan: McapScan, channel: Channel) -> str:
         expected = ", ".join(" ".join(field) for field in _RECORD_FIELDS)
         msg = (
             f"bag file {scan.path}: topic {channel.topic} was written by another version of mauve_rt "
-            f"('{scan.header.library}'): expected records of {expected}; found {shown}; read it with that one"
+            f"('{scan.library}'): expected records of {expected}; found {shown}; read it with that one"
         )
         raise TraceError(msg)
     return text
@@ -264,7 +275,7 @@ def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.
     waiting: list[tuple[int, int, Message]] = []
     count = 0
     for file in files:
-        with McapScan(file) as scan:
+        with _scan(file) as scan:
             for channel, message in scan.messages():
                 type_name = scan.type_of(channel)
                 if not ({channel.topic, type_name} & set(topics) if topics else type_name not in _OWN_TYPES):

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mauve_rt.trace
+from mauve_rt.trace.bag.files import SUFFIXES
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reading.trace import Trace, merge_traces
@@ -36,7 +37,7 @@ def bag_names(paths: Sequence[Path]) -> list[str]:
         twice = next(path for path in resolved if resolved.count(path) > 1)
         msg = f"bag {twice}: named twice; each bag of a run is wanted once"
         raise TraceError(msg)
-    parts = [path.with_suffix("").parts if path.suffix == ".mcap" else path.parts for path in resolved]
+    parts = [path.with_suffix("").parts if path.suffix in SUFFIXES else path.parts for path in resolved]
     longest = max(map(len, parts))
     candidates = (["_".join(one[-count:]) for one in parts] for count in range(1, longest + 1))
     return next(names for names in candidates if len(set(names)) == len(names))

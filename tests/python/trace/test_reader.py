@@ -224,9 +224,3 @@ def test_files_of_several_versions_are_refused(tmp_path: Path):
         TraceError, match=r"bag_1\.mcap: .* written by another version .* found .* uint8 more"
     ):
         mauve_rt.trace.open(tmp_path / "bag")
-
-
-def test_a_sqlite_bag_says_how_to_convert_it(tmp_path: Path):
-    (tmp_path / "x.db3").write_bytes(b"")
-    with pytest.raises(TraceError, match=r"its storage is sqlite3: `ros2 bag convert`"):
-        mauve_rt.trace.open(tmp_path)
