@@ -1,6 +1,5 @@
-"""Messages read by the definitions in a bag, held against rosbags and against rclpy."""
+"""Messages read by the definitions in a bag, held against rclpy."""
 
-import contextlib
 import dataclasses
 import random
 import string
@@ -10,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mauve_rt.trace.format.definitions import find_definition
 from mauve_rt.trace.format.message_decoding import Decoder
@@ -97,22 +94,13 @@ def plain(value: Any) -> Any:
 
 
 @pytest.mark.parametrize("type_name", TYPES)
-def test_it_reads_what_rclpy_writes_as_rosbags_does(type_name: str):
-    definition = find_definition(type_name).text
-    decoder = Decoder(type_name, definition)
-    store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(definition, type_name))
+def test_it_reads_what_rclpy_writes(type_name: str):
+    decoder = Decoder(type_name, find_definition(type_name).text)
     dice = random.Random(type_name)  # noqa: S311 - no cryptography
-    compared = 0
     for _ in range(30):
         message = filled(message_class(type_name)(), dice)
-        data = serialize_message(message)
-        found = plain(decoder.decode(data))
-        assert without_dummy(found) == plain(message)
-        with contextlib.suppress(SerdeError):  # it refuses the room that DDS leaves behind an empty sequence
-            assert found == plain(store.deserialize_cdr(data, type_name))
-            compared += 1
-    assert compared >= 10
+        found = decoder.decode(serialize_message(message))
+        assert without_dummy(plain(found)) == plain(message)
 
 
 def without_dummy(message: dict[str, Any]) -> dict[str, Any]:

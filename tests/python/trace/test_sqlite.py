@@ -1,5 +1,6 @@
 """Bags whose storage is sqlite3, as others record them: read as ours are, within bounds."""
 
+import random
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -140,3 +141,23 @@ def test_half_a_database_is_refused_in_a_line(sqlite_bag: Path, size: int):
     with pytest.raises(TraceError, match="cannot be read as a sqlite3 bag") as refused:
         mauve_rt.trace.open(sqlite_bag)
     assert "\n" not in str(refused.value)
+
+
+def test_a_database_with_bytes_flipped_is_read_or_refused_in_a_line(sqlite_bag: Path):
+    (file,) = sqlite_bag.glob("*.db3")
+    whole = file.read_bytes()
+    errors = []
+    for seed in range(150):
+        chance = random.Random(seed)  # noqa: S311 - no cryptography
+        changed = bytearray(whole)
+        for _ in range(chance.choice([1, 2, 8])):
+            changed[chance.randrange(len(changed))] = chance.choice([0, 1, 0x7F, 0xFF, chance.randrange(256)])
+        file.write_bytes(changed)
+        try:
+            trace = mauve_rt.trace.open(sqlite_bag)
+            list(trace.messages())
+            check_bag(sqlite_bag)
+        except TraceError as error:
+            errors.append(str(error))
+    assert all("\n" not in error for error in errors)
+    assert 0 < len(errors) < 150
