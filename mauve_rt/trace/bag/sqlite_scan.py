@@ -50,14 +50,9 @@ class SqliteScan:
             _refuse_bombs(path)
             self._reader = Reader(path)
             self._reader.open()
+            self._declare()
         except Exception as error:  # rosbags, apsw and sqlite3 raise what they meet in foreign tables
             raise self._unreadable(error) from error
-        for one in self._reader.connections:
-            is_msg = one.msgdef.format == MessageDefinitionFormat.MSG
-            encoding = one.ext.serialization_format if isinstance(one.ext, ConnectionExtRosbag2) else ""
-            definition = one.msgdef.data.encode()
-            self.schemas[one.id] = Schema(one.id, definition, "ros2msg" if is_msg else "", str(one.msgtype))
-            self.channels[one.id] = Channel(one.id, str(one.topic), encoding, {}, one.id)
 
     def __enter__(self) -> Self:
         """Return the pass itself: the file is open from its construction."""
@@ -87,6 +82,15 @@ class SqliteScan:
     def type_of(self, channel: Channel) -> str:
         """Type of a channel's messages, package/msg/Name."""
         return str(self.schemas[channel.schema_id].name)
+
+    def _declare(self) -> None:
+        """Take in the topics and their types."""
+        for one in self._reader.connections:
+            is_msg = one.msgdef.format == MessageDefinitionFormat.MSG
+            encoding = one.ext.serialization_format if isinstance(one.ext, ConnectionExtRosbag2) else ""
+            definition = one.msgdef.data.encode()
+            self.schemas[one.id] = Schema(one.id, definition, "ros2msg" if is_msg else "", str(one.msgtype))
+            self.channels[one.id] = Channel(one.id, str(one.topic), encoding, {}, one.id)
 
     def _unreadable(self, error: Exception) -> TraceError:
         reason = " ".join(str(error).split()) or type(error).__name__

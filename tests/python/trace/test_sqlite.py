@@ -106,6 +106,7 @@ def test_a_folder_of_bags_of_both_storages_is_named_as_one(
         ("UPDATE messages SET timestamp = 'now'", "cannot be read as a sqlite3 bag"),
         ("UPDATE message_definitions SET encoding = 'x'", "cannot be read as a sqlite3 bag"),
         ("UPDATE message_definitions SET encoded_message_definition = 'x'", "definition"),
+        ("UPDATE message_definitions SET encoded_message_definition = x'00'", "has no attribute 'encode'"),
         ("UPDATE topics SET type = 5", "found no topic of type mauve_msgs/msg/TraceBatch"),
         (MANY_TOPICS, "expected at most 5,000 topics, found 5,00"),
     ],
