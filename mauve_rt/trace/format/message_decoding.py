@@ -4,6 +4,7 @@ Not by installed message classes: a bag can be read where none are. What stays o
 and compiles code for each field, and for each element of an array of fixed length that holds no numbers.
 """
 
+import dataclasses
 import struct
 from collections.abc import Mapping
 from typing import Any
@@ -38,8 +39,9 @@ class Decoder:
         try:
             types = get_types_from_msg(definition, type_name)
             _check(types)
-            self._store = get_typestore(Stores.EMPTY)
+            self._store: Any = get_typestore(Stores.EMPTY)
             self._store.register(types)
+            self._store.types |= {name: self._plain(name) for name in types}
             self._type = self._store.get_msgdef(next(iter(types)))
         except (MemoryError, ValueError):
             raise
@@ -52,6 +54,12 @@ class Decoder:
         except Exception as error:  # the code that rosbags writes of a definition can fail in any way
             msg = f"the definition cannot be read ({' '.join(str(error).split())[:200]})"
             raise ValueError(msg) from error
+
+    def _plain(self, name: str) -> type:
+        """Return a class of the fields alone: in rosbags' own constants and `__msgtype__` are fields, too."""
+        count = len(self._store.fielddefs[name][1])
+        names = [one.name for one in dataclasses.fields(self._store.types[name])[:count]]
+        return dataclasses.make_dataclass(name.rpartition("/")[2], names)
 
     def decode(self, data: bytes) -> Any:
         """Return a message.

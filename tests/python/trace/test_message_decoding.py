@@ -74,7 +74,7 @@ def single_value_of(kind: str, dice: random.Random) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """A message of any of the three as numbers, texts, lists and mappings."""
+    """A message of either as numbers, texts, lists and mappings."""
     if isinstance(value, np.ndarray | list | tuple):
         return [plain(one) for one in value]
     if isinstance(value, np.generic):
@@ -82,12 +82,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value[0]
     if dataclasses.is_dataclass(value):
-        names = [one.name for one in dataclasses.fields(value)]
-        return {
-            name: plain(getattr(value, name))
-            for name in names
-            if name.strip("_").islower() and name != "__msgtype__"
-        }
+        return {one.name: plain(getattr(value, one.name)) for one in dataclasses.fields(value)}
     if hasattr(value, "get_fields_and_field_types"):
         return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
     return [plain(one) for one in value] if hasattr(value, "typecode") else value
@@ -125,3 +120,4 @@ def test_what_cannot_be_read_says_why():
     constants = Decoder("a/msg/M", "uint8 ONE=1\nint32 x # = a number\nstring[<=2] s\nfloat32[<=3] f 1.0\n")
     said = constants.decode(b"\0\1\0\0\7\0\0\0\1\0\0\0\2\0\0\0a\0\0\0\0\0\0\0")
     assert (said.x, said.s, list(said.f)) == (7, ["a"], [])
+    assert [one.name for one in dataclasses.fields(said)] == ["x", "s", "f"]
