@@ -28,17 +28,7 @@ from typing import NamedTuple
 from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
-from mauve_rt.trace.format.mcap_records import (
-    Channel,
-    DataEnd,
-    Footer,
-    Header,
-    Opcode,
-    Schema,
-    Statistics,
-    SummaryOffset,
-    serialized,
-)
+from mauve_rt.trace.format.mcap_records import Opcode, record
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -54,11 +44,11 @@ class McapFile:
 
         """
         self.path = path
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
+        self._schemas: list[bytes] = []
+        self._channels: list[bytes] = []
         self._chunk = self._written = PendingChunk()
         self._chunk_indexes = bytearray()
-        start = MAGIC + serialized(Header(profile, library))
+        start = MAGIC + record(Opcode.HEADER, profile=profile, library=library)
         self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
         self._before = self._now
         self._descriptor = -1
@@ -95,23 +85,26 @@ class McapFile:
 
     def add_schema(self, name: str, *, encoding: str, data: bytes) -> int:
         """Declare a schema; returns its id."""
-        schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
+        schema_id = len(self._schemas) + 1
+        schema = record(Opcode.SCHEMA, id=schema_id, data=data, encoding=encoding, name=name)
         self._schemas.append(schema)
-        self._chunk.records += serialized(schema)
-        return schema.id
+        self._chunk.records += schema
+        return schema_id
 
     def add_channel(self, topic: str, *, schema_id: int, encoding: str, metadata: dict[str, str]) -> int:
         """Declare a channel; returns its id."""
-        channel = Channel(
-            id=len(self._channels) + 1,
+        channel_id = len(self._channels) + 1
+        channel = record(
+            Opcode.CHANNEL,
+            id=channel_id,
             topic=topic,
             message_encoding=encoding,
             metadata=metadata,
             schema_id=schema_id,
         )
         self._channels.append(channel)
-        self._chunk.records += serialized(channel)
-        return channel.id
+        self._chunk.records += channel
+        return channel_id
 
     def add_message(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
         """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
@@ -198,8 +191,9 @@ class _Finished(NamedTuple):
 class Summary(NamedTuple):
     """What the end of a file tells of its data section."""
 
-    schemas: Sequence[Schema]
-    channels: Sequence[Channel]
+    schemas: Sequence[bytes]
+    """Their records; so with the channels."""
+    channels: Sequence[bytes]
     counts: Counts
     chunk_count: int
     chunk_indexes: bytes
@@ -210,8 +204,9 @@ class Summary(NamedTuple):
 
 def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
     """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known."""
-    end = serialized(DataEnd(data_crc))
-    statistics = Statistics(
+    end = record(Opcode.DATA_END, data_section_crc=data_crc)
+    statistics = record(
+        Opcode.STATISTICS,
         attachment_count=summary.attachment_count,
         channel_count=len(summary.channels),
         channel_message_counts=summary.counts.by_channel,
@@ -223,18 +218,21 @@ def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
         schema_count=len(summary.schemas),
     )
     groups = (
-        (Opcode.SCHEMA, serialized(*summary.schemas)),
-        (Opcode.CHANNEL, serialized(*summary.channels)),
-        (Opcode.STATISTICS, serialized(statistics)),
+        (Opcode.SCHEMA, b"".join(summary.schemas)),
+        (Opcode.CHANNEL, b"".join(summary.channels)),
+        (Opcode.STATISTICS, statistics),
         (Opcode.CHUNK_INDEX, summary.chunk_indexes),
     )
     at = summary_start = data_end + len(end)
     offsets = []
     for opcode, group in groups:
         if group:
-            offsets.append(SummaryOffset(group_opcode=opcode, group_start=at, group_length=len(group)))
+            place = record(
+                Opcode.SUMMARY_OFFSET, group_opcode=opcode, group_start=at, group_length=len(group)
+            )
+            offsets.append(place)
         at += len(group)
-    body = b"".join(group for _, group in groups) + serialized(*offsets)
-    footer = serialized(Footer(summary_start=summary_start, summary_offset_start=at, summary_crc=0))[:-4]
+    body = b"".join((*(group for _, group in groups), *offsets))
+    footer = record(Opcode.FOOTER, summary_start=summary_start, summary_offset_start=at, summary_crc=0)[:-4]
     crc = zlib.crc32(footer, zlib.crc32(body))
     return b"".join((end, body, footer, struct.pack("<I", crc), MAGIC))

@@ -27,7 +27,6 @@ from mauve_rt.trace.bag.mcap_library import (
 )
 from mauve_rt.trace.bag.mcap_scan import Found, McapScan, Told
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.format import mcap_records as ours
 from mauve_rt.trace.format.mcap_chunk import Counts
 from mauve_rt.trace.progress import Progress, silent
 
@@ -165,8 +164,8 @@ class FileState:
                 crc = _crc(descriptor, self.whole_bytes)
                 data_end = self.whole_bytes + len(self._missing_indexes)
                 summary = Summary(
-                    [ours.Schema(**vars(one)) for one in self.schemas],
-                    [ours.Channel(**vars(one)) for one in self.channels],
+                    [serialized(one) for one in self.schemas],
+                    [serialized(one) for one in self.channels],
                     self.counts,
                     self._chunk_count,
                     serialized(*self._chunk_indexes),

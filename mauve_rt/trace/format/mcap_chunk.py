@@ -4,7 +4,7 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 
-from mauve_rt.trace.format.mcap_records import HEAD, ChunkIndex, Opcode
+from mauve_rt.trace.format.mcap_records import HEAD, Opcode, record
 
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MESSAGE_FIXED_BYTES = 22
@@ -74,7 +74,8 @@ class PendingChunk:
             index_offsets[channel_id] = offset + chunk_length + len(indexes)
             indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries))
             indexes += entries
-        index = ChunkIndex(
+        index = record(
+            Opcode.CHUNK_INDEX,
             chunk_length=chunk_length,
             chunk_start_offset=offset,
             compression="",
@@ -85,4 +86,4 @@ class PendingChunk:
             message_start_time=self.counts.start_ns,
             uncompressed_size=size,
         )
-        return [head, self.records, indexes], index.to_bytes()
+        return [head, self.records, indexes], index

@@ -5,7 +5,6 @@ workspace records without it. Reading takes the library's records (`mauve_rt.tra
 """
 
 import struct
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -29,119 +28,26 @@ class Opcode(IntEnum):
     DATA_END = 0x0F
 
 
-class Record:
-    """What all have in common: `_LAYOUTS` says how each is laid out."""
-
-    __slots__: tuple[str, ...] = ()
-
-    def to_bytes(self) -> bytes:
-        """Return the whole record, its opcode and length before it."""
-        opcode, layout = _LAYOUTS[type(self)]
-        fields = zip(layout, type(self).__slots__, strict=True)
-        body = b"".join(_built(code, getattr(self, name)) for code, name in fields)
-        return HEAD.pack(opcode, len(body)) + body
-
-
-@dataclass(slots=True)
-class Header(Record):
-    """The first record."""
-
-    profile: str
-    library: str
-
-
-@dataclass(slots=True)
-class Footer(Record):
-    """The last record."""
-
-    summary_start: int
-    summary_offset_start: int
-    summary_crc: int
-
-
-@dataclass(slots=True)
-class Schema(Record):
-    """A type's definition."""
-
-    id: int
-    name: str
-    encoding: str
-    data: bytes
-
-
-@dataclass(slots=True)
-class Channel(Record):
-    """A topic."""
-
-    id: int
-    schema_id: int
-    topic: str
-    message_encoding: str
-    metadata: dict[str, str]
-
-
-@dataclass(slots=True)
-class ChunkIndex(Record):
-    """Where a chunk is, and its message indexes."""
-
-    message_start_time: int
-    message_end_time: int
-    chunk_start_offset: int
-    chunk_length: int
-    message_index_offsets: dict[int, int]
-    message_index_length: int
-    compression: str
-    compressed_size: int
-    uncompressed_size: int
-
-
-@dataclass(slots=True)
-class Statistics(Record):
-    """What the data section holds."""
-
-    message_count: int
-    schema_count: int
-    channel_count: int
-    attachment_count: int
-    metadata_count: int
-    chunk_count: int
-    message_start_time: int
-    message_end_time: int
-    channel_message_counts: dict[int, int]
-
-
-@dataclass(slots=True)
-class SummaryOffset(Record):
-    """Where the records of one kind are in the summary."""
-
-    group_opcode: int
-    group_start: int
-    group_length: int
-
-
-@dataclass(slots=True)
-class DataEnd(Record):
-    """What ends the data section."""
-
-    data_section_crc: int
-
-
-_LAYOUTS: dict[type[Record], tuple[Opcode, str]] = {
-    Header: (Opcode.HEADER, "ss"),
-    Footer: (Opcode.FOOTER, "QQI"),
-    Schema: (Opcode.SCHEMA, "Hssb"),
-    Channel: (Opcode.CHANNEL, "HHsst"),
-    ChunkIndex: (Opcode.CHUNK_INDEX, "QQQQnQsQQ"),
-    Statistics: (Opcode.STATISTICS, "QHIIIIQQn"),
-    SummaryOffset: (Opcode.SUMMARY_OFFSET, "BQQ"),
-    DataEnd: (Opcode.DATA_END, "I"),
+_LAYOUTS = {
+    Opcode.HEADER: "profile:s library:s",
+    Opcode.FOOTER: "summary_start:Q summary_offset_start:Q summary_crc:I",
+    Opcode.SCHEMA: "id:H name:s encoding:s data:b",
+    Opcode.CHANNEL: "id:H schema_id:H topic:s message_encoding:s metadata:t",
+    Opcode.CHUNK_INDEX: "message_start_time:Q message_end_time:Q chunk_start_offset:Q chunk_length:Q"
+    " message_index_offsets:n message_index_length:Q compression:s compressed_size:Q uncompressed_size:Q",
+    Opcode.STATISTICS: "message_count:Q schema_count:H channel_count:I attachment_count:I metadata_count:I"
+    " chunk_count:I message_start_time:Q message_end_time:Q channel_message_counts:n",
+    Opcode.SUMMARY_OFFSET: "group_opcode:B group_start:Q group_length:Q",
+    Opcode.DATA_END: "data_section_crc:I",
 }
-"""Opcode and fields: numbers as struct has them; s: text; b: bytes; t: text by text; n: number by number."""
+"""Fields: numbers as struct has them; s: text; b: bytes; t: text by text; n: number by number."""
+_FIELDS = {opcode: [field.split(":") for field in layout.split()] for opcode, layout in _LAYOUTS.items()}
 
 
-def serialized(*records: Record) -> bytes:
-    """Return the bytes of records, one behind the other."""
-    return b"".join(record.to_bytes() for record in records)
+def record(opcode: Opcode, **fields: Any) -> bytes:
+    """Return a whole record, its opcode and length before it. Fields are named as in the library."""
+    body = b"".join(_built(code, fields[name]) for name, code in _FIELDS[opcode])
+    return HEAD.pack(opcode, len(body)) + body
 
 
 def _built(code: str, value: Any) -> bytes:
