@@ -11,7 +11,7 @@ from typing import IO
 
 import yaml
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, MessageIndex, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, MessageIndex, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.rosbag2 import Reader
 
@@ -66,7 +66,7 @@ def _assert_file(file: Path) -> Counter[str]:
         assert (index.message_start_time, index.message_end_time) == (min(times), max(times))
         assert set(index.message_index_offsets) == {message.channel_id for message in _messages(inside)}
     everything = [record for record, inside in found for record in (record, *inside)]
-    assert {type(record) for record, _ in found[1:-1]} <= {Chunk, MessageIndex, DataEnd}
+    assert {type(record) for record, _ in found[1:-1]} <= {Chunk, MessageIndex, Metadata, DataEnd}
     statistics = summary.statistics
     assert statistics is not None
     by_channel = Counter(record.channel_id for record in everything if isinstance(record, Message))

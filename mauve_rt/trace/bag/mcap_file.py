@@ -2,8 +2,8 @@
 
 On disk, always:
 
-    magic, Header | Chunk, MessageIndex..., Chunk, MessageIndex..., | DataEnd, summary, summary offsets,
-    Footer, magic
+    magic, Header | Chunk, MessageIndex..., Chunk, MessageIndex..., | Metadata..., DataEnd, summary,
+    summary offsets, Footer, magic
                                                                       '------------------- the tail
                                                                       ----------------'
 
@@ -21,7 +21,7 @@ import functools
 import os
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -46,6 +46,7 @@ class McapFile:
         self.path = path
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
+        self._metadata: dict[str, dict[str, str]] = {}
         self._chunk = self._written = PendingChunk()
         self._chunk_indexes = bytearray()
         start = MAGIC + record(Opcode.HEADER, profile=profile, library=library)
@@ -105,6 +106,10 @@ class McapFile:
         self._channels.append(channel)
         self._chunk.records += channel
         return channel_id
+
+    def set_metadata(self, name: str, fields: dict[str, str]) -> None:
+        """Let the next flush that writes messages put a metadata record of that name into the file."""
+        self._metadata[name] = dict(fields)
 
     def add_message(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
         """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
@@ -172,7 +177,7 @@ class McapFile:
 
     def _finished(self, counts: Counts, chunk_count: int, data_end: int, data_crc: int) -> "_Finished":
         summary = Summary(self._schemas, self._channels, counts, chunk_count, bytes(self._chunk_indexes))
-        tail = build_tail(summary, data_end=data_end, data_crc=data_crc)
+        tail = build_tail(summary, data_end=data_end, data_crc=data_crc, metadata=self._metadata)
         return _Finished(counts, chunk_count, data_end, data_crc, len(self._chunk_indexes), tail)
 
 
@@ -200,10 +205,22 @@ class Summary(NamedTuple):
     """ChunkIndex records, one behind the other."""
     attachment_count: int = 0
     metadata_count: int = 0
+    """Records that stand before the end of the data section."""
 
 
-def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
-    """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known."""
+def build_tail(
+    summary: Summary, *, data_end: int, data_crc: int, metadata: Mapping[str, Mapping[str, str]] | None = None
+) -> bytes:
+    """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known.
+
+    `metadata`: records, by name, that it begins with.
+    """
+    told = [record(Opcode.METADATA, name=name, metadata=fields) for name, fields in (metadata or {}).items()]
+    indexes = b""
+    for name, one in zip(metadata or (), told, strict=True):
+        indexes += record(Opcode.METADATA_INDEX, offset=data_end, length=len(one), name=name)
+        data_end += len(one)
+        data_crc = data_crc and zlib.crc32(one, data_crc)
     end = record(Opcode.DATA_END, data_section_crc=data_crc)
     statistics = record(
         Opcode.STATISTICS,
@@ -214,7 +231,7 @@ def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
         message_count=summary.counts.messages,
         message_end_time=summary.counts.end_ns,
         message_start_time=summary.counts.start_ns,
-        metadata_count=summary.metadata_count,
+        metadata_count=summary.metadata_count + len(told),
         schema_count=len(summary.schemas),
     )
     groups = (
@@ -222,6 +239,7 @@ def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
         (Opcode.CHANNEL, b"".join(summary.channels)),
         (Opcode.STATISTICS, statistics),
         (Opcode.CHUNK_INDEX, summary.chunk_indexes),
+        (Opcode.METADATA_INDEX, indexes),
     )
     at = summary_start = data_end + len(end)
     offsets = []
@@ -235,4 +253,4 @@ def build_tail(summary: Summary, *, data_end: int, data_crc: int) -> bytes:
     body = b"".join((*(group for _, group in groups), *offsets))
     footer = record(Opcode.FOOTER, summary_start=summary_start, summary_offset_start=at, summary_crc=0)[:-4]
     crc = zlib.crc32(footer, zlib.crc32(body))
-    return b"".join((end, body, footer, struct.pack("<I", crc), MAGIC))
+    return b"".join((*told, end, body, footer, struct.pack("<I", crc), MAGIC))

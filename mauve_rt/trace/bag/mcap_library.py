@@ -32,6 +32,7 @@ try:
         McapRecord,
         Message,
         MessageIndex,
+        Metadata,
         Schema,
         Statistics,
     )
@@ -51,6 +52,7 @@ __all__ = [
     "McapRecord",
     "Message",
     "MessageIndex",
+    "Metadata",
     "Opcode",
     "Schema",
     "Statistics",
@@ -74,10 +76,11 @@ _KINDS: dict[int, Any] = {
     int(Opcode.CHUNK): Chunk,
     int(Opcode.CHUNK_INDEX): ChunkIndex,
     int(Opcode.STATISTICS): Statistics,
+    int(Opcode.METADATA): Metadata,
     int(Opcode.DATA_END): DataEnd,
 }
 READ_OPCODES = frozenset({*_KINDS, _MESSAGE, _MESSAGE_INDEX})
-"""Of records that are read; attachments, metadata and those of later versions are passed over."""
+"""Of records that are read; attachments and those of later versions are passed over."""
 
 
 class _Body(ReadDataStream):

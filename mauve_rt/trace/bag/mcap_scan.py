@@ -31,7 +31,7 @@ from mauve_rt.trace.bag.mcap_library import (
     read_record,
     split_records,
 )
-from mauve_rt.trace.bag.mcap_limits import McapLimits
+from mauve_rt.trace.bag.mcap_limits import MAX_DEFINITION_BYTES, McapLimits
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_records import HEAD
 
@@ -49,7 +49,7 @@ class Found(NamedTuple):
     end: int
     opcode: int
     record: McapRecord | None
-    """None: one that nobody asks about, of an attachment, metadata or a later version of the format."""
+    """None: one that nobody asks about, of an attachment or a later version of the format."""
     inside: list[tuple[int, McapRecord]]
     """The records of a chunk and their offsets in it, or the record itself."""
 
@@ -218,7 +218,7 @@ class McapScan:
         if opcode == 0:
             msg = "no record begins here"
             raise ValueError(msg)
-        if opcode not in READ_OPCODES:
+        if opcode not in READ_OPCODES or (opcode == Opcode.METADATA and length > MAX_DEFINITION_BYTES):
             return Found(offset, end, opcode, None, [])
         data = self._file.read(length)
         if len(data) < length:

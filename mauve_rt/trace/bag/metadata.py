@@ -8,6 +8,8 @@ from typing import NamedTuple
 from mauve_rt.trace.format.mcap_chunk import Counts
 
 METADATA = "metadata.yaml"
+CUSTOM_DATA = "mauve_rt"
+"""Name of the record by which each MCAP file tells the custom data of metadata.yaml, as of its last flush."""
 _VERSION = 9  # what Jazzy writes
 
 

@@ -1,5 +1,6 @@
 """Whole bags: what is wrong with one, and making it right."""
 
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ class BagState:
     metadata_damage: str
     """What is wrong with metadata.yaml; empty when nothing is, or when a single file was asked about."""
     custom_data: Mapping[str, str]
-    """What metadata.yaml tells beside."""
+    """What the last file, which is never older than metadata.yaml, tells beside; else that."""
     unreadable: Mapping[Path, str]
     """Files of which nothing can be read, beside others, and why."""
 
@@ -67,12 +68,14 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
             if len(files) == 1:
                 raise
             unreadable[file] = str(error).removeprefix(f"bag file {file}: ")
+    custom_data: Mapping[str, str] = {}
+    for state in states:
+        custom_data = state.custom_data or custom_data
     if not path.is_dir():
-        return BagState(path, tuple(states), "", {}, {})
-    try:
-        custom_data = _custom_data(_read_metadata(path))
-    except TraceError:
-        custom_data = {}
+        return BagState(path, tuple(states), "", custom_data, {})
+    if not custom_data:
+        with contextlib.suppress(TraceError):
+            custom_data = _custom_data(_read_metadata(path))
     return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable)
 
 

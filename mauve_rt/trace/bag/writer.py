@@ -11,7 +11,14 @@ from typing import Self
 import mauve_rt
 from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.bag.mcap_file import McapFile
-from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
+from mauve_rt.trace.bag.metadata import (
+    CUSTOM_DATA,
+    METADATA,
+    BagFileCounts,
+    BagTopic,
+    named_files,
+    write_metadata,
+)
 from mauve_rt.trace.bag.recorded import TopicQos
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
@@ -143,7 +150,7 @@ class BagWriter:
         self._file.add_message(known.channel_id, log_time_ns, data, publish_time_ns=published_ns)
 
     def set_custom_data(self, key: str, value: str) -> None:
-        """Put a word about the recording into metadata.yaml at the next flush."""
+        """Put a word about the recording into metadata.yaml and the present file at the next flush."""
         if self._custom_data.get(key) != value:
             self._custom_data[key] = value
             self._stale = True
@@ -174,6 +181,8 @@ class BagWriter:
         """
         if self._file.is_waiting:
             self._stale = True
+        if self._custom_data:
+            self._file.set_metadata(CUSTOM_DATA, self._custom_data)
         self._file.flush()
         if self._stale:
             try:

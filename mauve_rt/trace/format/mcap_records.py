@@ -24,6 +24,8 @@ class Opcode(IntEnum):
     MESSAGE_INDEX = 0x07
     CHUNK_INDEX = 0x08
     STATISTICS = 0x0B
+    METADATA = 0x0C
+    METADATA_INDEX = 0x0D
     SUMMARY_OFFSET = 0x0E
     DATA_END = 0x0F
 
@@ -37,6 +39,8 @@ _LAYOUTS = {
     " message_index_offsets:n message_index_length:Q compression:s compressed_size:Q uncompressed_size:Q",
     Opcode.STATISTICS: "message_count:Q schema_count:H channel_count:I attachment_count:I metadata_count:I"
     " chunk_count:I message_start_time:Q message_end_time:Q channel_message_counts:n",
+    Opcode.METADATA: "name:s metadata:t",
+    Opcode.METADATA_INDEX: "offset:Q length:Q name:s",
     Opcode.SUMMARY_OFFSET: "group_opcode:B group_start:Q group_length:Q",
     Opcode.DATA_END: "data_section_crc:I",
 }

@@ -25,17 +25,13 @@ from mauve_rt.trace.format.records import RECORD, Records
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.reading.decisions import RULES, traced_decisions
-from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message
+from mauve_rt.trace.reading.facts import OWN_TYPES, BagFile, Deployment, Loss, Message
 from mauve_rt.trace.reading.trace import Trace
 
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan
 
-_PACKAGE = "mauve_msgs/msg"
-_BATCH_TYPE = f"{_PACKAGE}/TraceBatch"
-_NAMES_TYPE = f"{_PACKAGE}/TraceNames"
-_ARCHITECTURE_TYPE = f"{_PACKAGE}/TraceArchitecture"
-_OWN_TYPES = (_BATCH_TYPE, _NAMES_TYPE, _ARCHITECTURE_TYPE)
+_BATCH_TYPE, _NAMES_TYPE, _ARCHITECTURE_TYPE = OWN_TYPES
 _DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
 _NOTHING = Batch(0, 0, (), (), b"")
 _NO_RECORDS = np.empty(0, RECORD)
@@ -102,7 +98,7 @@ class _Content:
     def add(self, scan: "McapScan | SqliteScan", channel: Channel, data: bytes) -> None:
         type_name = scan.type_of(channel)
         self._all_topics[channel.topic] = (type_name, self._all_topics.get(channel.topic, ("", 0))[1] + 1)
-        if type_name not in _OWN_TYPES:
+        if type_name not in OWN_TYPES:
             return
         if (scan.path, channel.id) not in self._known:
             self._known.add((scan.path, channel.id))
@@ -278,7 +274,7 @@ def _messages(files: list[Path], topics: tuple[str, ...], pairs: npt.NDArray[np.
         with _scan(file) as scan:
             for channel, message in scan.messages():
                 type_name = scan.type_of(channel)
-                if not ({channel.topic, type_name} & set(topics) if topics else type_name not in _OWN_TYPES):
+                if not ({channel.topic, type_name} & set(topics) if topics else type_name not in OWN_TYPES):
                     continue
                 log_time_ns = message.log_time
                 said = types.decoded(scan, channel, message.data)

@@ -15,12 +15,13 @@ from pathlib import Path
 import pytest
 from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
-from mcap.records import Message
+from mcap.records import Message, Metadata
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.recorded import TopicQos
+from mauve_rt.trace.bag.repair import examine_bag, repair_bag
 from mauve_rt.trace.bag.writer import BagWriter
 
 T0 = 1_700_000_000_000_000_000
@@ -100,6 +101,61 @@ def test_metadata_tells_what_the_file_holds(tmp_path: Path):
         assert topics["/robot/words"].msgdef.data == "string data\n"
         (qos,) = topics["/robot/n"].connections[0].ext.offered_qos_profiles
         assert (qos.depth, qos.durability.name, qos.reliability.name) == (1, "TRANSIENT_LOCAL", "RELIABLE")
+
+
+def records_of(file: Path) -> dict[str, dict[str, str]]:
+    """Metadata records, as mcap finds them by the summary and, the same, from the begin."""
+    with file.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        indexed = {one.name: one.metadata for one in reader.iter_metadata()}
+        statistics = reader.get_summary().statistics
+        stream.seek(0)
+        records = StreamReader(stream, validate_crcs=True).records
+        found = {one.name: one.metadata for one in records if isinstance(one, Metadata)}
+    assert indexed == found
+    assert statistics.metadata_count == len(found)
+    return found
+
+
+def test_each_file_tells_the_custom_data_as_of_its_last_flush(tmp_path: Path):
+    directory = tmp_path / "bag"
+    bag = BagWriter(directory)
+    write(bag, [1])
+    bag.flush()
+    assert records_of(directory / "bag_0.mcap") == {}
+    for number in range(3):
+        write(bag, [2 + number])
+        bag.set_custom_data("count", str(number))
+        bag.flush()
+        assert records_of(directory / "bag_0.mcap") == {"mauve_rt": {"count": str(number)}}
+        assert examine_bag(directory).custom_data == {"count": str(number)}
+    bag.split()
+    bag.set_custom_data("count", "many")
+    write(bag, [9])
+    bag.close()
+    told = [records_of(directory / f"bag_{number}.mcap")["mauve_rt"]["count"] for number in range(2)]
+    assert told == ["2", "many"]
+    assert examine_bag(directory).custom_data == {"count": "many"}
+    assert examine_bag(directory / "bag_0.mcap").custom_data == {"count": "2"}, "a file by itself, too"
+    assert_rosbag2_reads(directory)
+
+
+def test_a_file_knows_more_than_metadata_that_is_older(tmp_path: Path):
+    directory = tmp_path / "bag"
+    bag = BagWriter(directory)
+    bag.set_custom_data("lost", "0")
+    write(bag, [1])
+    bag.flush()
+    older = (directory / "metadata.yaml").read_bytes()
+    bag.set_custom_data("lost", "7")
+    write(bag, [2])
+    bag.close()
+    (directory / "metadata.yaml").write_bytes(older)  # as of a kill between the two
+    state = examine_bag(directory)
+    assert state.custom_data == {"lost": "7"}
+    repair_bag(state)
+    assert examine_bag(directory).custom_data == {"lost": "7"}
+    assert read(directory)[-1][1] == 2
 
 
 def test_metadata_older_than_the_file_still_opens(tmp_path: Path):

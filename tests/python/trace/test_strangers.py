@@ -43,8 +43,9 @@ def text(size: int) -> bytes:
 
 
 def fill(bag: BagWriter, *, flushes: int = 20, size: int = 10) -> None:
-    """Two topics, one of which comes later, and one without a message."""
+    """Two topics, one of which comes later, and one without a message; and words about the recording."""
     bag.add_topic("/silent", TEXT)
+    bag.set_custom_data("about", "x" * 3000)
     for flush in range(flushes):
         for topic in ("/early", "/late")[: 1 + (flush > flushes // 2)]:
             bag.add_topic(topic, TEXT)

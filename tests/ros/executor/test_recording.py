@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from mcap.reader import make_reader
 from ros_processes import ExecutorProcess
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64
@@ -222,6 +223,9 @@ def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tm
     assert check_bag(tmp_path / "bag") == []
     ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
     assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0}
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        (told,) = make_reader(stream).iter_metadata()
+    assert json.loads(told.metadata[LEDGER]) == ledger, "the file by itself tells it, too"
 
 
 def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):
