@@ -29,6 +29,7 @@ MODULES = {
     "pandas": ("python3-pandas", "pandas"),
     "perfetto": ("", "perfetto"),
     "pytest": ("python3-pytest", "pytest"),
+    "response_time_analysis": ("", "response-time-analysis"),  # likewise: the tests' only
     "rich": ("python3-rich", "rich"),
     "rosbags": ("", "rosbags"),
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
