@@ -6,8 +6,9 @@
 #define MCAP_COMPRESSION_NO_ZSTD
 #include <cstdio>
 #include <map>
-#include <mcap/reader.hpp>
 #include <string>
+
+#include <mcap/reader.hpp>
 
 namespace {
 
