@@ -37,12 +37,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="put the measured times into FILE as max_execution_ns, which the watchdog enforces",
     )
+    parser.add_argument(
+        "--wakeup-us",
+        type=float,
+        default=0.0,
+        metavar="X",
+        help="how long after its instant a thread begins at the latest, on that machine (default 0)",
+    )
     parser.add_argument("--json", action="store_true", help="print it as JSON")
 
 
 def main(args: argparse.Namespace) -> int:
     """Print the model; returns the exit status."""
-    from mauve_rt.analysis.digraph import digraph_of  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.bounds import bounds_of  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.digraph import digraph_of  # noqa: PLC0415
     from mauve_rt.analysis.obstacles import (  # noqa: PLC0415
         competing_threads,
         obstacles,
@@ -51,6 +59,9 @@ def main(args: argparse.Namespace) -> int:
 
     if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
         print(f"mauve: --margin: expected 1 or more, found {args.margin:g}", file=sys.stderr)
+        return BAD_USAGE
+    if not math.isfinite(args.wakeup_us) or args.wakeup_us < 0:
+        print(f"mauve: --wakeup-us: expected 0 or more, found {args.wakeup_us:g}", file=sys.stderr)
         return BAD_USAGE
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         print("mauve: --write: expected an architecture FILE and --budget-from BAG", file=sys.stderr)
@@ -65,14 +76,21 @@ def main(args: argparse.Namespace) -> int:
     for machine in machines:
         task = digraph_of(machine)
         found.append((machine, task, [*obstacles(machine, task)]))
-    assumptions = [*obstacles_of_this_machine(), *competing_threads(sender_priority=sender_priority)]
+    bounds = bounds_of(found, wakeup_ns=round(args.wakeup_us * 1e3))
+    assumptions = [
+        f"threads begin {args.wakeup_us:g} us after their instants at the latest (--wakeup-us)",
+        "components hold the locks of resources for no time",
+        *obstacles_of_this_machine(),
+        *competing_threads(sender_priority=sender_priority),
+    ]
     if args.json:
-        told = {"components": [_as_json(*one) for one in found], "assumptions": assumptions}
+        parts = [{**_as_json(*one), "response": asdict(bounds[one[0].name])} for one in found]
+        told = {"components": parts, "assumptions": assumptions}
         print(json.dumps(told, indent=2))
         return OK
     from mauve_rt.cli.analyze_view import print_model  # noqa: PLC0415
 
-    print_model(found, assumptions)
+    print_model(found, bounds, assumptions)
     return OK
 
 

@@ -1,15 +1,18 @@
 """A task model to look at."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from mauve_rt.analysis.bounds import Bound
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 
 
 def print_model(
-    found: Sequence[tuple[Machine, DigraphTask, Sequence[str]]], assumptions: Sequence[str]
+    found: Sequence[tuple[Machine, DigraphTask, Sequence[str]]],
+    bounds: Mapping[str, Bound],
+    assumptions: Sequence[str],
 ) -> None:
-    """Print each component: its states, its jobs, what cannot be proved of it; then what is assumed."""
+    """Print each component: its states, its jobs, its bound, what cannot be proved; then what is assumed."""
     for machine, task, not_provable in found:
         print(f"{machine.name}: {_scheduling(machine)}")
         for state in machine.states:
@@ -19,7 +22,9 @@ def print_model(
             print(f"  job {_job(job)}")
         for why in not_provable:
             print(f"  not provable: {why}")
-    print("assumed, as no cost of it is known:")
+        if not not_provable:
+            print(f"  response {_response(bounds[machine.name])}")
+    print("assumed, and for threads no cost is known:")
     for each in assumptions:
         print(f"  {each}")
 
@@ -29,6 +34,13 @@ def _scheduling(machine: Machine) -> str:
     rhythm = f"period {in_ms(machine.period_ns)}" if machine.period_ns else "by its waits"
     deadline = in_ms(machine.deadline_ns) if machine.deadline_ns else "the next instant"
     return f"{cpus}, priority {machine.priority}, {rhythm}, deadline {deadline}, overrun {machine.overrun}"
+
+
+def _response(bound: Bound) -> str:
+    if bound.response_ns is None:
+        return f"without a bound: {bound.reason}"
+    met = "met" if bound.meets_deadline else "not proved to be met"
+    return f"at most {in_ms(bound.response_ns)}, its shortest deadline of {in_ms(bound.deadline_ns)} is {met}"
 
 
 def _job(job: Job) -> str:

@@ -764,6 +764,15 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/analysis/test_digraph.py::test_of_several_ways_to_a_wait_the_costliest_counts",
         "python/analysis/test_digraph.py::test_no_run_of_any_machine_is_outside_of_its_digraph",
     ),
+    "Where all that may delay a component is known, it says a bound of its response time": (
+        "python/analysis/test_bounds.py::test_where_one_that_may_delay_it_is_unknown_there_is_no_bound",
+        "python/analysis/test_bounds.py::test_those_of_higher_priority_delay_those_below_and_not_the_reverse",
+        "python/cli/test_analyze.py::test_the_model_in_words",
+    ),
+    "by busy windows under fixed priorities, FIFO among equals": (
+        "python/analysis/test_oracle.py::test_fixed_priority_with_jitter_and_blocking",
+        "python/analysis/test_simulation.py::test_no_response_time_exceeds_its_bound",
+    ),
     "what cannot be proved of a component is said, with the remedy": (
         "python/cli/test_analyze.py::test_what_cannot_be_proved_is_said_of_each_component",
     ),

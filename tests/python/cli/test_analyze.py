@@ -89,7 +89,9 @@ def test_the_model_in_words(analyze: Analyze) -> None:
         "  job the start -> Count -> Pause: at most 0.200 ms, the next one 20.000 ms later\n"
     ) in out
     assert "  Count: missing\n" in out
-    assert "assumed, as no cost of it is known:\n" in out
+    assert "  response without a bound: guard may delay it, and nothing is proved of that\n" not in out
+    assert "  response at most 0.200 ms, its shortest deadline of 5.000 ms is met\n" in out
+    assert "assumed, and for threads no cost is known:\n" in out
     assert "  sender (1), which sends the messages of bound topics\n" in out
 
 
@@ -134,6 +136,18 @@ def test_bad_times_are_refused_where_they_stand(
     assert (status, out) == (2, "")
     assert problem in err
     assert "robot.yaml:" in err
+
+
+def test_the_latency_of_the_machine_is_in_the_bound(told: Callable[..., dict[str, Any]]) -> None:
+    response = told(ROBOT, "--wakeup-us", "50")["one"]["response"]
+    assert response == {"response_ns": 250_000, "deadline_ns": 5_000_000, "reason": ""}
+
+
+@pytest.mark.parametrize("latency", ["-1", "inf"])
+def test_a_latency_that_cannot_be_is_refused(analyze: Analyze, latency: str) -> None:
+    status, _, err = analyze(ROBOT, "--wakeup-us", latency)
+    assert status == 2
+    assert "--wakeup-us: expected 0 or more" in err
 
 
 @pytest.mark.parametrize("margin", ["0.9", "nan", "-1"])
