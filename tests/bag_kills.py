@@ -56,7 +56,7 @@ def kill_in_a_write(bag: Path, *, size: int, split_every: int, at: int) -> list[
             child.stdout.readline()
         bytes_before = sum(file.stat().st_size for file in bag.glob("*.mcap"))
         while sum(file.stat().st_size for file in bag.glob("*.mcap")) == bytes_before:
-            pass
+            assert child.poll() is None, "it ended by itself"
         child.kill()
         said = child.stdout.readlines()
     until(lambda: has_ended(keeper), "the keeper's end")
