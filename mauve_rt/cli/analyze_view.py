@@ -40,7 +40,7 @@ def _response(bound: Bound) -> str:
     if bound.response_ns is None:
         return f"without a bound: {bound.reason}"
     met = "met" if bound.meets_deadline else "not proved to be met"
-    return f"at most {in_ms(bound.response_ns)}, its shortest deadline of {in_ms(bound.deadline_ns)} is {met}"
+    return f"at most {in_ms(bound.response_ns)}, its deadline of {in_ms(bound.deadline_ns)} is {met}"
 
 
 def _job(job: Job) -> str:

@@ -90,7 +90,7 @@ def test_the_model_in_words(analyze: Analyze) -> None:
     ) in out
     assert "  Count: missing\n" in out
     assert "  response without a bound: guard may delay it, and nothing is proved of that\n" not in out
-    assert "  response at most 0.200 ms, its shortest deadline of 5.000 ms is met\n" in out
+    assert "  response at most 0.200 ms, its deadline of 5.000 ms is met\n" in out
     assert "assumed, and for threads no cost is known:\n" in out
     assert "  sender (1), which sends the messages of bound topics\n" in out
 

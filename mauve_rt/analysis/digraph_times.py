@@ -1,0 +1,141 @@
+"""Response times of digraph tasks on one CPU under SCHED_FIFO: each job of each path in a busy window.
+
+What `window` is for sporadic tasks; the same conventions of intervals, and of equal priorities. Where the
+paths of all tasks that delay a job are few, each combination of them is tried: exact. Else of each such task
+the most that it can ask for counts, which may be of one path at one instant and of another at the next:
+sound, and more than one run can show.
+
+Source: Stigge, Yi, "Combinatorial Abstraction Refinement for Feasibility Analysis of Static Priorities",
+Real-Time Systems 51, 2015: its abstract test and its exact one, without the refinement between the two.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product, takewhile
+
+from mauve_rt.analysis.demand import Demand, Path, Staircase, cost_of, paths, utilization_of
+from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.window import UnboundedError, least_time_ns
+
+_MOST_COMBINATIONS = 64
+
+
+@dataclass(frozen=True)
+class Component:
+    """A digraph task, the cost of each job known, with a thread of its own."""
+
+    task: DigraphTask
+    priority: int
+
+
+@dataclass(frozen=True)
+class JobTime:
+    """The bound of one kind of job, from its arrival to its finish."""
+
+    job: Job
+    response_ns: int
+
+
+@dataclass(frozen=True)
+class DigraphTimes:
+    """The bounds of one component."""
+
+    jobs: tuple[JobTime, ...] = ()
+    reason: str = ""
+    """Why there are none."""
+
+    @property
+    def response_ns(self) -> int | None:
+        """The longest."""
+        return None if self.reason else max((one.response_ns for one in self.jobs), default=0)
+
+
+def digraph_times(components: Sequence[Component], *, jitter_ns: int = 0) -> dict[str, DigraphTimes]:
+    """The bounds of all components of one CPU, by name; each release is delayed by up to `jitter_ns`."""
+    demands = {one.task.name: Demand(one.task, jitter_ns=jitter_ns) for one in components}
+    loads = {one.task.name: utilization_of(one.task) for one in components}
+    return {one.task.name: _times(one, components, demands, loads, jitter_ns) for one in components}
+
+
+def _times(
+    one: Component,
+    components: Sequence[Component],
+    demands: Mapping[str, Demand],
+    loads: Mapping[str, Fraction],
+    jitter_ns: int,
+) -> DigraphTimes:
+    higher = [other.task.name for other in components if other.priority > one.priority]
+    equal = [other.task.name for other in components if other.priority == one.priority and other is not one]
+    load = sum((loads[name] for name in (*higher, *equal, one.task.name)), start=Fraction(0))
+    if load >= 1:
+        return DigraphTimes(reason=f"the utilization at this priority is {float(load):.4g}: nothing is left")
+    try:
+        level = _Level(
+            demands[one.task.name], [demands[name] for name in higher], [demands[name] for name in equal]
+        )
+        end_ns = level.window_ns
+        longest: dict[Job, int] = {}
+        for path in _within(one.task, end_ns + jitter_ns):
+            arrival_ns = path.release_ns - jitter_ns
+            response_ns = level.finish_ns(path) - arrival_ns
+            longest[path.job] = max(response_ns, longest.get(path.job, 0))
+    except UnboundedError as reason:
+        return DigraphTimes(reason=str(reason))
+    return DigraphTimes(tuple(JobTime(job, longest[job]) for job in one.task.jobs))
+
+
+def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
+    """The paths whose last job is released before the window can end."""
+    return takewhile(lambda path: path.release_ns < end_ns, paths(task))
+
+
+class _Level:
+    """What can delay the jobs of a task."""
+
+    def __init__(self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand]) -> None:
+        everything = (own, *higher, *equal)
+        self.window_ns = least_time_ns(lambda length_ns: sum(one.in_ns(length_ns) for one in everything), 1)
+        """The longest busy window: the least L > 0 with the demand of all in [0, L) <= L."""
+        each = _of_each_path((*higher, *equal), self.window_ns)
+        self._delays = [_Delay(one[: len(higher)], one[len(higher) :]) for one in each]
+
+    def finish_ns(self, path: Path) -> int:
+        """When the last job of a path is done at the latest, from the window's start on."""
+        return max(delay.finish_ns(path) for delay in self._delays)
+
+
+def _of_each_path(demands: Sequence[Demand], until_ns: int) -> list[tuple[Staircase, ...]]:
+    """Combinations of paths of these tasks; where they are too many, the one of all that each can ask for."""
+    found: list[list[Staircase]] = []
+    left = _MOST_COMBINATIONS
+    for demand in demands:
+        ways = demand.of_each_path(until_ns, most=left)
+        if ways is None:
+            return [tuple(demands)]
+        found.append(ways)
+        left //= max(len(ways), 1)
+    return [*product(*found)]
+
+
+@dataclass(frozen=True)
+class _Delay:
+    """The jobs of other tasks, by one combination of their paths."""
+
+    higher: tuple[Staircase, ...]
+    equal: tuple[Staircase, ...]
+
+    def finish_ns(self, path: Path) -> int:
+        """As _Level's."""
+        equal_ns = 0
+        if self.equal:
+            before_ns = path.work_ns - cost_of(path.job)
+            others = (*self.higher, *self.equal)
+            start_ns = least_time_ns(
+                lambda time_ns: before_ns + sum(one.until_ns(time_ns) for one in others), before_ns
+            )
+            equal_ns = sum(one.until_ns(start_ns) for one in self.equal)
+        fixed_ns = path.work_ns + equal_ns
+        return least_time_ns(
+            lambda end_ns: fixed_ns + sum(one.in_ns(end_ns) for one in self.higher), fixed_ns
+        )
