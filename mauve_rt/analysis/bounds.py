@@ -1,11 +1,36 @@
 """Bounds of the response times of an architecture's components, as far as all that delays them is known."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
-from mauve_rt.analysis.digraph import DigraphTask
+from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, digraph_times
 from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.obstacles import obstacles
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A component under analysis."""
+
+    machine: Machine
+    task: DigraphTask
+    obstacles: tuple[str, ...]
+    """What keeps it from being proved."""
+
+    @classmethod
+    def of(cls, machine: Machine) -> Self:
+        """With its jobs, its period where it does not run yet, and what is missing."""
+        task = digraph_of(machine)
+        if not machine.period_ns and not any(state.is_event_wait for state in machine.states):
+            machine = replace(machine, period_ns=period_of(task))
+        return cls(machine, task, tuple(obstacles(machine)))
+
+    @property
+    def name(self) -> str:
+        """The component's."""
+        return self.machine.name
 
 
 @dataclass(frozen=True)
@@ -24,45 +49,40 @@ class Bound:
         return self.response_ns is not None and self.response_ns <= self.deadline_ns
 
 
-def bounds_of(
-    found: Sequence[tuple[Machine, DigraphTask, Sequence[str]]], *, wakeup_ns: int = 0
-) -> dict[str, Bound]:
-    """The bound of each component; `found`: with what keeps it from being proved (`obstacles`).
+def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:
+    """The bound of each component.
 
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this machine.
     """
-    proved = [
-        (machine, Component(task, machine.priority))
-        for machine, task, not_provable in found
-        if not not_provable
-    ]
     times: dict[str, DigraphTimes] = {}
-    for cpus in {machine.cpus for machine, _ in proved}:
-        here = [component for machine, component in proved if machine.cpus == cpus]
-        times |= digraph_times(here, jitter_ns=wakeup_ns)
-    machines = [machine for machine, _, _ in found]
-    return {machine.name: _bound(machine, task, machines, times) for machine, task, _ in found}
+    for here in by_cpu(subjects):
+        components = [Component(subject.task, subject.machine.priority) for subject in here]
+        times |= digraph_times(components, jitter_ns=wakeup_ns)
+    return {subject.name: _bound(subject, subjects, times) for subject in subjects}
 
 
-def _bound(
-    machine: Machine, task: DigraphTask, machines: Sequence[Machine], times: Mapping[str, DigraphTimes]
-) -> Bound:
-    deadline_ns = min((job.deadline_ns for job in task.jobs), default=0)
-    if machine.name not in times:
+def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:
+    """Those without obstacles, each of which runs on one CPU."""
+    known = [subject for subject in subjects if not subject.obstacles]
+    cpus = sorted({subject.machine.cpus for subject in known})
+    return [[subject for subject in known if subject.machine.cpus == each] for each in cpus]
+
+
+def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
+    deadline_ns = min((job.deadline_ns for job in subject.task.jobs), default=0)
+    if subject.obstacles:
         return Bound(None, deadline_ns, "it is not provable")
-    unknown = [
-        other.name
-        for other in machines
-        if other.name not in times and other.priority >= machine.priority and _may_run_on(other, machine.cpus)
-    ]
+    unknown = [other.name for other in subjects if other.obstacles and _may_delay(other, subject)]
     if unknown:
         return Bound(None, deadline_ns, f"{', '.join(unknown)} may delay it, and nothing is proved of that")
-    found = times[machine.name]
+    found = times[subject.name]
     if found.reason:
         return Bound(None, deadline_ns, found.reason)
-    closest = min(found.jobs, key=lambda one: one.job.deadline_ns - one.response_ns)
-    return Bound(closest.response_ns, closest.job.deadline_ns)
+    closest = min(found.jobs, key=lambda one: one.job.deadline_ns - one.response_ns, default=None)
+    return Bound(closest.response_ns, closest.job.deadline_ns) if closest else Bound(0, 0)
 
 
-def _may_run_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
-    return not machine.cpus or bool({*machine.cpus} & {*cpus})
+def _may_delay(other: Subject, subject: Subject) -> bool:
+    cpus = {*other.machine.cpus}
+    meet = not cpus or bool(cpus & {*subject.machine.cpus})
+    return meet and other.machine.priority >= subject.machine.priority

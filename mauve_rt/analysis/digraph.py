@@ -10,6 +10,9 @@ Source: Stigge, Ekberg, Guan, Yi: The Digraph Real-Time Task Model, RTAS 2011.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from math import gcd
+
+import networkx as nx
 
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, State
 
@@ -55,6 +58,24 @@ class DigraphTask:
         """Of a job; None: one is not known."""
         costs = [job.cost_ns for job in self.jobs if job.cost_ns is not None]
         return None if len(costs) < len(self.jobs) else max(costs, default=0)
+
+
+def period_of(task: DigraphTask) -> int:
+    """The greatest common divisor of its cycles' lengths, which the kernel calls g; 0: it has no cycle.
+
+    Of a component without waits for events: there no instants lie on a grid.
+    """
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    for job in task.jobs:
+        if job.separation_ns != FOREVER_NS:
+            graph.add_edge(job.after, job.until, length=job.separation_ns)
+    period = 0
+    for waits in nx.strongly_connected_components(graph):
+        inside = graph.subgraph(waits)
+        at_ns = nx.single_source_dijkstra_path_length(inside, min(waits), weight="length")
+        for before, after in inside.edges:
+            period = gcd(period, at_ns[before] + inside.edges[before, after]["length"] - at_ns[after])
+    return period
 
 
 def digraph_of(machine: Machine) -> DigraphTask:

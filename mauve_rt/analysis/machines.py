@@ -29,6 +29,8 @@ class State:
     is_wait: bool
     separation_ns: int
     """Of a wait: the least time from the release before it to that at its end; FOREVER_NS: none comes."""
+    latest_ns: int
+    """Of a wait: the longest such time; of a wait for an event its timeout."""
     is_event_wait: bool
     successors: tuple[str, ...]
     time: ExecutionTime = ExecutionTime()
@@ -43,6 +45,7 @@ class State:
             is_initial=bool(told.is_initial),
             is_wait=bool(told.is_wait),
             separation_ns=int(told.min_interarrival_ns if told.is_event_wait else told.duration_ns),
+            latest_ns=int(told.duration_ns),
             is_event_wait=bool(told.is_event_wait),
             successors=tuple(told.successors),
             time=ExecutionTime(bound_ns, "declared") if bound_ns else ExecutionTime(),
@@ -60,7 +63,9 @@ class Machine:
     policy: str
     """As read back from the thread; empty: it does not run yet."""
     period_ns: int
-    """0: it waits for events, or does not run yet."""
+    """g; 0: it waits for events, or does not run yet."""
+    offset_ns: int
+    """Of its instants, from the epoch on."""
     deadline_ns: int
     """From a release to the next wait; 0: the next instant."""
     overrun: str
@@ -77,6 +82,7 @@ class Machine:
             priority=int(told.priority),
             policy=told.policy,
             period_ns=int(told.period_ns),
+            offset_ns=int(told.offset_ns),
             deadline_ns=int(told.deadline_ns),
             overrun=told.overrun,
             states=tuple(State.of(state) for state in (told.states if states is None else states)),

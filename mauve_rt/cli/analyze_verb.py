@@ -1,4 +1,4 @@
-"""`mauve analyze FILE|NODE|BAG`: the task model of an architecture, for an analysis of its timing."""
+"""`mauve analyze FILE|NODE|BAG`: does each component of an architecture meet its deadline?"""
 
 import argparse
 import json
@@ -10,9 +10,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mauve_rt.cli.verb import BAD_USAGE, OK
+from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
 
 if TYPE_CHECKING:
+    from mauve_rt.analysis.bounds import Subject
     from mauve_rt.analysis.machines import ExecutionTime, Machine
 
 _LEAST_MARGIN = 1.0
@@ -44,18 +45,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="how long after its instant a thread begins at the latest, on that machine (default 0)",
     )
+    parser.add_argument(
+        "--witness",
+        type=Path,
+        metavar="DIR",
+        help="of what is not schedulable, write the run that misses a deadline: a bag for `mauve report`",
+    )
     parser.add_argument("--json", action="store_true", help="print it as JSON")
 
 
 def main(args: argparse.Namespace) -> int:
-    """Print the model; returns the exit status."""
-    from mauve_rt.analysis.bounds import bounds_of  # noqa: PLC0415 - only this verb
-    from mauve_rt.analysis.digraph import digraph_of  # noqa: PLC0415
-    from mauve_rt.analysis.obstacles import (  # noqa: PLC0415
-        competing_threads,
-        obstacles,
-        obstacles_of_this_machine,
-    )
+    """Print the model and the verdict; returns the exit status: 0 schedulable, 1 not, 3 not proved."""
+    from mauve_rt.analysis.bounds import Subject, bounds_of  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
+    from mauve_rt.analysis.verdict import Outcome, judge  # noqa: PLC0415
 
     if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
         print(f"mauve: --margin: expected 1 or more, found {args.margin:g}", file=sys.stderr)
@@ -72,26 +75,27 @@ def main(args: argparse.Namespace) -> int:
         declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
         if args.write:
             _write(Path(args.target), declared, machines)
-    found = []
-    for machine in machines:
-        task = digraph_of(machine)
-        found.append((machine, task, [*obstacles(machine, task)]))
-    bounds = bounds_of(found, wakeup_ns=round(args.wakeup_us * 1e3))
-    assumptions = [
-        f"threads begin {args.wakeup_us:g} us after their instants at the latest (--wakeup-us)",
-        "components hold the locks of resources for no time",
-        *obstacles_of_this_machine(),
-        *competing_threads(sender_priority=sender_priority),
-    ]
+    wakeup_ns = round(args.wakeup_us * 1e3)
+    subjects = [Subject.of(machine) for machine in machines]
+    bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
+    verdict = judge(subjects, bounds, wakeup_ns=wakeup_ns)
+    assumptions = [*assumptions_about(wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
     if args.json:
-        parts = [{**_as_json(*one), "response": asdict(bounds[one[0].name])} for one in found]
-        told = {"components": parts, "assumptions": assumptions}
-        print(json.dumps(told, indent=2))
-        return OK
-    from mauve_rt.cli.analyze_view import print_model  # noqa: PLC0415
+        parts = [{**_as_json(subject), "response": asdict(bounds[subject.name])} for subject in subjects]
+        judged = {"outcome": verdict.outcome, "sentence": verdict.sentence}
+        print(json.dumps({"components": parts, "verdict": judged, "assumptions": assumptions}, indent=2))
+    else:
+        from mauve_rt.cli.analyze_view import print_model, print_verdict  # noqa: PLC0415
 
-    print_model(found, bounds, assumptions)
-    return OK
+        print_model(subjects, bounds)
+        print_verdict(verdict, subjects, assumptions)
+    if verdict.witness is not None and args.witness is not None:
+        from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
+
+        write_witness(args.witness, [subject.machine for subject in subjects], verdict.witness)
+        print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
+    statuses = {Outcome.SCHEDULABLE: OK, Outcome.NOT_SCHEDULABLE: REFUSED}
+    return statuses.get(verdict.outcome, NOT_PROVED)
 
 
 def _machines(target: str) -> "tuple[list[Machine], int]":
@@ -213,11 +217,13 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
     )
 
 
-def _as_json(machine: "Machine", task: Any, not_provable: list[str]) -> dict[str, Any]:
+def _as_json(subject: "Subject") -> dict[str, Any]:
+    machine = subject.machine
     told = asdict(machine)
     told["states"] = [
         {"name": state.name, "time_ns": state.time.ns, "origin": state.time.origin}
         for state in machine.states
         if not state.is_wait
     ]
-    return {**told, "jobs": [asdict(job) for job in task.jobs], "not_provable": not_provable}
+    jobs = [asdict(job) for job in subject.task.jobs]
+    return {**told, "jobs": jobs, "not_provable": list(subject.obstacles)}

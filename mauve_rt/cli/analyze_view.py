@@ -1,32 +1,49 @@
-"""A task model to look at."""
+"""A task model and a verdict to look at."""
 
 from collections.abc import Mapping, Sequence
 
-from mauve_rt.analysis.bounds import Bound
-from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.bounds import Bound, Subject
+from mauve_rt.analysis.digraph import Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
+from mauve_rt.analysis.verdict import Outcome, Verdict
 
 
-def print_model(
-    found: Sequence[tuple[Machine, DigraphTask, Sequence[str]]],
-    bounds: Mapping[str, Bound],
-    assumptions: Sequence[str],
-) -> None:
-    """Print each component: its states, its jobs, its bound, what cannot be proved; then what is assumed."""
-    for machine, task, not_provable in found:
-        print(f"{machine.name}: {_scheduling(machine)}")
-        for state in machine.states:
+def print_model(subjects: Sequence[Subject], bounds: Mapping[str, Bound]) -> None:
+    """Print each component: its states, its jobs, its bound."""
+    for subject in subjects:
+        print(f"{subject.name}: {_scheduling(subject.machine)}")
+        for state in subject.machine.states:
             if not state.is_wait:
                 print(f"  {state.name}: {state.time}")
-        for job in task.jobs:
+        for job in subject.task.jobs:
             print(f"  job {_job(job)}")
-        for why in not_provable:
-            print(f"  not provable: {why}")
-        if not not_provable:
-            print(f"  response {_response(bounds[machine.name])}")
-    print("assumed, and for threads no cost is known:")
-    for each in assumptions:
-        print(f"  {each}")
+        if not subject.obstacles:
+            print(f"  response {_response(bounds[subject.name])}")
+
+
+def print_verdict(verdict: Verdict, subjects: Sequence[Subject], assumptions: Sequence[str]) -> None:
+    """Print it, with what it takes for granted."""
+    if verdict.outcome == Outcome.SCHEDULABLE:
+        _print_list(f"{verdict.sentence}, if", assumptions)
+    elif verdict.outcome == Outcome.NOT_SCHEDULABLE:
+        _print_list(f"{verdict.sentence}, if", _REACHED)
+    elif verdict.outcome == Outcome.NOT_PROVABLE:
+        found = [f"{subject.name}: {why}" for subject in subjects for why in subject.obstacles]
+        _print_list(f"{verdict.sentence}", found)
+    else:
+        print(verdict.sentence)
+
+
+_REACHED = (
+    "guards let each component go the way that it goes in this run",
+    "each execution takes all of the time that is said of its state",
+)
+
+
+def _print_list(head: str, lines: Sequence[str]) -> None:
+    print(head)
+    for line in lines:
+        print(f"  {line}")
 
 
 def _scheduling(machine: Machine) -> str:

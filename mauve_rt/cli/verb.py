@@ -9,7 +9,7 @@ from mauve_rt.cli.pipe import piped
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.trace.errors import TraceError
 
-OK, REFUSED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+OK, REFUSED, BAD_USAGE, NOT_PROVED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 @dataclass(frozen=True)

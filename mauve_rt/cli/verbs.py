@@ -295,7 +295,7 @@ VERBS = (
     ),
     Verb(
         "analyze",
-        "show the task model of an architecture: what each component executes, how often and how long",
+        "say whether each component of an architecture meets its deadline, and show the task model",
         analyze_verb.add_arguments,
         analyze_verb.main,
     ),

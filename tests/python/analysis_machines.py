@@ -34,6 +34,6 @@ def _state(name: str, successors: tuple[str, ...], **told: Any) -> SimpleNamespa
 
 def machine(*states: SimpleNamespace, is_python: bool | None = False, **told: Any) -> Machine:
     """One that runs on CPU 0 with priority 50."""
-    usual = {"name": "c", "cpus": [0], "priority": 50, "policy": "SCHED_FIFO", "period_ns": 0}
+    usual = {"name": "c", "cpus": [0], "priority": 50, "policy": "SCHED_FIFO", "period_ns": 0, "offset_ns": 0}
     component = SimpleNamespace(**{**usual, "deadline_ns": 0, "overrun": "skip", "states": states, **told})
     return Machine.of(component, is_python=is_python)

@@ -749,6 +749,26 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "mauve analyze robot.yaml # of a file": (
         "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
     ),
+    "mauve analyze robot.yaml --witness DIR": (
+        "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
+    ),
+    "`schedulable` (exit status 0) is a proof under the conditions that stand below it": (
+        "python/cli/test_analyze.py::test_what_is_schedulable_is_so_under_conditions",
+        "python/analysis/test_verdict.py::test_no_miss_is_found_where_the_bounds_are_met",
+        "python/analysis/test_digraph_times.py::test_no_run_is_above_its_bound",
+    ),
+    "`not schedulable` (1) says who misses which deadline through whom, and has a run that shows it": (
+        "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
+        "python/analysis/test_verdict.py::test_runs_are_those_of_the_other_simulation",
+    ),
+    "else nothing is proved (3), and it says what to declare": (
+        "python/cli/test_analyze.py::test_the_model_in_words",
+        "python/analysis/test_verdict.py::test_an_offset_that_prevents_the_miss_leaves_it_not_proved",
+    ),
+    "path by path through the fsms": (
+        "python/analysis/test_digraph_times.py::test_never_more_than_as_a_sporadic_task",
+        "python/analysis/test_digraph_times.py::test_the_bounds_are_within_5_percent_of_exact_for_95_percent",
+    ),
     "mauve analyze robot.yaml --budget-from DIR --margin 1.2": (
         "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
     ),

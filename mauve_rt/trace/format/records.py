@@ -36,6 +36,10 @@ class ReconfigurationPhase(IntEnum):
     TAKE = 2
 
 
+DEADLINE_MISSED = "deadline missed"
+"""Name of a record of kind MARK at a deadline, in a bag that an analysis wrote; `a`: how late, in ns."""
+
+
 IN_VAIN = 2
 """Value of `b` in records of kind ARMED: the change was called off; nothing was changed."""
 

@@ -1,4 +1,4 @@
-"""Traces made by hand, for tests and benchmarks of what reads traces."""
+"""Traces that no executor recorded: of a schedule that an analysis found, of tests and benchmarks."""
 
 import struct
 from collections import deque

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.format.records import DEADLINE_MISSED, Kind
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.decisions import ExplainedDecision, explained_decisions
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
@@ -33,6 +33,14 @@ class Fault(NamedTuple):
     time_ns: int
 
 
+class DeadlineMiss(NamedTuple):
+    """A deadline that passed, in a schedule that an analysis wrote."""
+
+    component: str
+    time_ns: int
+    late_ns: int
+
+
 @dataclass(frozen=True)
 class Analysis:
     """A trace and what is known about it."""
@@ -51,6 +59,8 @@ class Analysis:
     """What the page's clock counts from."""
     decisions: list[ExplainedDecision] = field(default_factory=list)
     """Of the executor's rules, by time."""
+    misses: list[DeadlineMiss] = field(default_factory=list)
+    """Marked as such: what runs marks overruns."""
 
     @property
     def duration_ns(self) -> int:
@@ -107,6 +117,7 @@ def analyse(
         end_ns=end_ns,
         zero_ns=begin_ns if zero_ns is None else zero_ns,
         decisions=explained_decisions(trace),
+        misses=_misses(trace),
     )
 
 
@@ -131,3 +142,13 @@ def _faults(trace: Trace) -> list[Fault]:
         for row in np.atleast_1d(trace.of(component, Kind.FAULT))
     ]
     return sorted(found, key=lambda fault: fault.time_ns)
+
+
+def _misses(trace: Trace) -> list[DeadlineMiss]:
+    found = [
+        DeadlineMiss(component, int(row["time_ns"]), int(row["a"]))
+        for component in trace.components
+        for row in np.atleast_1d(trace.of(component, Kind.MARK))
+        if trace.name(int(row["name"])) == DEADLINE_MISSED
+    ]
+    return sorted(found, key=lambda miss: miss.time_ns)

@@ -28,6 +28,7 @@ def sentences_on(analysis: Analysis, machine: Machine) -> list[Sentence]:
     """Return all of them, the most serious first."""
     return ranked(
         [
+            *_misses(analysis),
             *_overruns(analysis, machine),
             *_stalls(analysis, machine),
             *_swaps(analysis),
@@ -42,6 +43,12 @@ def sentences_on(analysis: Analysis, machine: Machine) -> list[Sentence]:
 def ranked(sentences: Iterable[Sentence]) -> list[Sentence]:
     """Return them with the most serious first; equals stay in order."""
     return sorted(sentences, key=lambda one: _RANKS.index(one.level))
+
+
+def _misses(analysis: Analysis) -> Iterator[Sentence]:
+    for one in analysis.misses[:_NAMED]:
+        at = time_text(one.time_ns - analysis.zero_ns)
+        yield Sentence(BAD, f"{one.component} missed its deadline at {at} by {time_text(one.late_ns)}.")
 
 
 def _scope(analysis: Analysis) -> Iterator[Sentence]:

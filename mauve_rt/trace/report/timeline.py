@@ -47,6 +47,7 @@ def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) 
     """Instants to look around: reconfigurations, decisions, what went wrong, begin and end."""
     found: list[Any] = [[analysis.begin_ns, analysis.end_ns]]
     found.append([one.traced.time_ns for one in analysis.decisions[:_JUMPS]])
+    found.append([one.time_ns for one in analysis.misses[:_JUMPS]])
     found += [[swap.measured.parked_ns, swap.measured.armed_ns] for swap in analysis.swaps[:_SHOWN_SWAPS]]
     for component, kinds in markers.items():
         for kind, entries in kinds:
@@ -170,6 +171,11 @@ def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, l
                 found[kind] += _places(row, worst["time_ns"] - late - analysis.begin_ns, late)
     for kind in ("wakeup", "response"):
         found[kind] = _worst_releases(analysis, f"{kind}_ns")
+    rows = {name: index for index, name in enumerate(analysis.trace.components)}
+    found["miss"] = [
+        [rows[one.component], one.time_ns - analysis.begin_ns, one.late_ns]
+        for one in analysis.misses[:_JUMPS]
+    ]
     for kind in ("swap", "overrun", "fault"):
         found[kind].sort(key=lambda place: place[1])
     return found

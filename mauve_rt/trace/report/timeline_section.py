@@ -10,6 +10,7 @@ from mauve_rt.trace.report.units import counted, time_text
 _JUMPS = (
     ("swap", "Reconfigurations"),
     ("decision", "Decisions"),
+    ("miss", "Deadlines missed"),
     ("overrun", "Overruns"),
     ("fault", "Faults"),
     ("wakeup", "Worst wake-ups"),

@@ -91,6 +91,8 @@ def _wrong(analysis: Analysis, machine: Machine) -> Iterator[str]:
     missed = sum(swap.measured.missed_releases or 0 for swap in analysis.swaps)
     if analysis.faults:
         yield counted(len(analysis.faults), "fault")
+    if analysis.misses:
+        yield counted(len(analysis.misses), "missed deadline")
     if overruns:
         releases = counted(sum(one.releases for one in found), "release")
         least = "at least " if analysis.trace.lost else ""

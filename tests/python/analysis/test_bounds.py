@@ -4,10 +4,8 @@ from types import SimpleNamespace
 
 from analysis_machines import MS, execution, machine, wait
 
-from mauve_rt.analysis.bounds import Bound, bounds_of
-from mauve_rt.analysis.digraph import digraph_of
+from mauve_rt.analysis.bounds import Bound, Subject, bounds_of
 from mauve_rt.analysis.machines import Machine
-from mauve_rt.analysis.obstacles import obstacles
 
 
 def loop(name: str, cost_ms: float, period_ms: int, **told: object) -> Machine:
@@ -19,11 +17,7 @@ def loop(name: str, cost_ms: float, period_ms: int, **told: object) -> Machine:
 
 
 def bounds(*machines: Machine, wakeup_ns: int = 0) -> dict[str, Bound]:
-    found = []
-    for one in machines:
-        task = digraph_of(one)
-        found.append((one, task, [*obstacles(one, task)]))
-    return bounds_of(found, wakeup_ns=wakeup_ns)
+    return bounds_of([Subject.of(one) for one in machines], wakeup_ns=wakeup_ns)
 
 
 def test_those_of_higher_priority_delay_those_below_and_not_the_reverse() -> None:

@@ -16,6 +16,14 @@
     return [time - half * 0.6, time + length + half];
   }
 
+  // A page about a missed deadline opens there.
+  mauve.openAtMiss = function (timeline) {
+    const [place] = timeline.model.jumps.miss;
+    if (!place) return;
+    timeline.show(...around(timeline, "miss", place));
+    timeline.choose(place[0]);
+  };
+
   mauve.listenForJumps = function (timeline) {
     const bar = timeline.root.parentElement.querySelector(".toolbar");
     for (const box of bar.querySelectorAll("[data-jump]")) {

@@ -69,6 +69,7 @@
     mauve.listenForInput(mauve.timeline);
     mauve.listenForHover(mauve.timeline);
     mauve.listenForJumps(mauve.timeline);
+    mauve.openAtMiss(mauve.timeline);
   }
 
   listenForTheme();

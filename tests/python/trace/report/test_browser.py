@@ -9,6 +9,7 @@ import pytest
 from headless_browser import Browser, started_browser
 from synthetic_traces import deploy, long_trace, overrun, run, swap, trace_of
 
+from mauve_rt.trace.format.records import DEADLINE_MISSED, Kind
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import write_report
 
@@ -118,6 +119,23 @@ def test_a_single_overrun_is_seen_from_afar_and_reached_by_its_button(browser: B
     tip = browser.evaluate("document.getElementById('tip').innerText")
     assert "overrun" in tip
     assert "late by" in tip
+
+
+def test_a_page_about_a_missed_deadline_opens_there(browser: Browser, tmp_path: Path):
+    source = SyntheticSource(["control", "guidance"])
+    for component in source.components:
+        deploy(source, component)
+        run(source, component, 400)
+    source.add("guidance", Kind.MARK, source.now_ns, name=DEADLINE_MISSED, a=1_000_000)
+    path = tmp_path / "report.html"
+    write_report(path, trace_of(source))
+    browser.open(path)
+    begin, end = view(browser)
+    time = browser.evaluate("mauve.timeline.model.rows[1].markers.find(one => one.kind == 'mark').time[0]")
+    whole = browser.evaluate("mauve.timeline.model.duration")
+    assert begin < time < end
+    assert end - begin < whole / 4
+    assert not browser.complaints
 
 
 def test_hovering_tells_a_state_and_its_times(browser: Browser, page: Path):

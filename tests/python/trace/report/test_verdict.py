@@ -15,7 +15,7 @@ from synthetic_traces import (
     trace_of,
 )
 
-from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.format.records import DEADLINE_MISSED, Kind
 from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.synthetic import SyntheticSource
@@ -52,6 +52,18 @@ def test_overruns_name_the_component_and_what_took_the_time():
     assert "late overran once" in said(found)
     assert "skipped 1 instant; in that cycle its state act took longest, 11 ms" in said(found)
     assert "good had no overrun" in said(found)
+
+
+def test_a_deadline_that_an_analysis_marked_as_missed_is_told():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    run(source, "c", 5)
+    at_ns = source.now_ns + MS
+    source.add("c", Kind.MARK, at_ns, name=DEADLINE_MISSED, a=2 * MS)
+    found = verdict_on(trace_of(source))
+    assert (found.level, found.sentence) == ("bad", "No: 1 missed deadline.")
+    assert "c missed its deadline at" in said(found)
+    assert "by 2 ms." in said(found)
 
 
 def test_a_late_wake_up_is_not_blamed_on_a_state():

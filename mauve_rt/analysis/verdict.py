@@ -1,0 +1,71 @@
+"""Does each component meet its deadline? Yes, no, or not proved, in one sentence."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mauve_rt.analysis.bounds import Bound, Subject, by_cpu
+from mauve_rt.analysis.machines import in_ms
+from mauve_rt.analysis.schedule import Cycle, Member, Schedule
+from mauve_rt.analysis.witness import RUNS, witness_of
+
+
+class Outcome(StrEnum):
+    """What is known."""
+
+    SCHEDULABLE = "schedulable"
+    NOT_SCHEDULABLE = "not schedulable"
+    NOT_PROVABLE = "not provable"
+    NOT_PROVED = "not proved"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer."""
+
+    outcome: Outcome
+    why: str
+    """What stands behind the outcome's word in the sentence."""
+    witness: Schedule | None = None
+    """Of what is not schedulable: a run in which a deadline is missed."""
+
+    @property
+    def sentence(self) -> str:
+        """As `schedulable: every component meets its deadline`."""
+        return f"{self.outcome}: {self.why}"
+
+
+def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns: int = 0) -> Verdict:
+    """The verdict on components and their bounds; both with the same `wakeup_ns`."""
+    late = [subject for subject in subjects if not bounds[subject.name].meets_deadline]
+    for here in by_cpu(subjects):
+        if any(subject in late for subject in here):
+            members = [Member(subject.machine, subject.task) for subject in here]
+            found = witness_of(members, wakeup_ns=wakeup_ns)
+            if found is not None and found.missed is not None:
+                return Verdict(Outcome.NOT_SCHEDULABLE, _miss(found, found.missed), found)
+    missing = [subject.name for subject in subjects if subject.obstacles]
+    if missing:
+        return Verdict(Outcome.NOT_PROVABLE, f"something is missing of {', '.join(missing)}")
+    if late:
+        reasons = "; ".join(_too_long(subject.name, bounds[subject.name]) for subject in late)
+        return Verdict(Outcome.NOT_PROVED, f"{reasons}; none of {RUNS} runs misses a deadline")
+    return Verdict(Outcome.SCHEDULABLE, "every component meets its deadline")
+
+
+def _miss(schedule: Schedule, missed: Cycle) -> str:
+    shares = schedule.shares_ns(missed)
+    parts = [f"{in_ms(share_ns)} of {name}" for name, share_ns in shares.items() if name != missed.component]
+    parts.append(f"{in_ms(shares.get(missed.component, 0))} of its own")
+    idle_ns = missed.finish_ns - missed.nominal_ns - sum(shares.values())
+    parts += [f"{in_ms(idle_ns)} until its thread begins"] if idle_ns else []
+    return (
+        f"{missed.component} misses its deadline at {in_ms(missed.deadline_ns)} after the start and ends "
+        f"at {in_ms(missed.finish_ns)}: {' + '.join(parts)}"
+    )
+
+
+def _too_long(name: str, bound: Bound) -> str:
+    if bound.response_ns is None:
+        return f"{name} has no bound ({bound.reason})"
+    return f"{name} has a bound of {in_ms(bound.response_ns)} and a deadline of {in_ms(bound.deadline_ns)}"

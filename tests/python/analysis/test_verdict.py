@@ -1,0 +1,265 @@
+"""Verdicts: schedulable, not (with a run that shows it), not proved, not provable; and the runs."""
+
+from itertools import pairwise
+from math import gcd
+from random import Random
+
+import networkx as nx
+import pytest
+from analysis_machines import MS, event, execution, machine, wait
+from random_digraphs import random_digraph
+from schedule_simulation import RUN, Release, simulate
+
+from mauve_rt.analysis import Task
+from mauve_rt.analysis.bounds import Subject, bounds_of
+from mauve_rt.analysis.digraph import START, DigraphTask, Job, digraph_of, period_of
+from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.schedule import Cycle, Member, Schedule, run
+from mauve_rt.analysis.verdict import Outcome, Verdict, judge
+from mauve_rt.analysis.witness import witness_of
+
+
+def loop(name: str, cost_ms: float, period_ms: int, priority: int, **told: object) -> Machine:
+    return machine(
+        execution("Run", "Pause", bound_ms=cost_ms, initial=True),
+        wait("Pause", "Run", ms=period_ms),
+        name=name,
+        priority=priority,
+        **told,
+    )
+
+
+def verdict(*machines: Machine, wakeup_ns: int = 0) -> Verdict:
+    subjects = [Subject.of(one) for one in machines]
+    return judge(subjects, bounds_of(subjects, wakeup_ns=wakeup_ns), wakeup_ns=wakeup_ns)
+
+
+# ---- the sentence
+
+
+def test_schedulable() -> None:
+    found = verdict(loop("high", 1, 4, 60), loop("low", 3, 8, 50))
+    assert found.sentence == "schedulable: every component meets its deadline"
+    assert found.witness is None
+
+
+def test_not_schedulable_says_who_misses_when_and_what_held_it_up() -> None:
+    found = verdict(
+        loop("high", 2, 5, 60), loop("mid", 3, 20, 55), loop("low", 4, 20, 50, deadline_ns=10 * MS)
+    )
+    assert found.sentence == (
+        "not schedulable: low misses its deadline at 10.000 ms after the start and ends at 13.000 ms: "
+        "6.000 ms of high + 3.000 ms of mid + 4.000 ms of its own"
+    )
+
+
+def test_a_late_wake_up_is_named() -> None:
+    assert "+ 0.500 ms until its thread begins" in verdict(loop("one", 9.8, 10, 50), wakeup_ns=MS // 2).why
+
+
+def test_an_offset_that_prevents_the_miss_leaves_it_not_proved() -> None:
+    high, low = loop("high", 4, 10, 60), loop("low", 5, 10, 50, offset_ns=5 * MS, deadline_ns=6 * MS)
+    found = verdict(high, low)
+    assert found.outcome == Outcome.NOT_PROVED
+    assert found.why == (
+        "low has a bound of 9.000 ms and a deadline of 6.000 ms; none of 64 runs misses a deadline"
+    )
+
+
+def test_what_is_missing_is_not_provable_but_a_miss_is_a_miss() -> None:
+    unknown = loop("unknown", 0, 10, 70)
+    assert verdict(unknown, loop("one", 1, 10, 50)).sentence == (
+        "not provable: something is missing of unknown"
+    )
+    assert verdict(unknown, loop("one", 11, 10, 50)).outcome == Outcome.NOT_SCHEDULABLE
+
+
+def test_a_job_longer_than_its_wait_misses_its_deadline() -> None:
+    found = verdict(loop("one", 12, 10, 50))
+    assert found.why == (
+        "one misses its deadline at 10.000 ms after the start and ends at 12.000 ms: 12.000 ms of its own"
+    )
+
+
+def test_another_cpu_has_its_own_run() -> None:
+    found = verdict(loop("good", 9, 10, 90), loop("bad", 11, 10, 50, cpus=[1]))
+    assert found.witness is not None
+    assert {cycle.component for cycle in found.witness.cycles} == {"bad"}
+
+
+def test_an_event_can_come_at_the_worst_time() -> None:
+    sporadic = machine(
+        event("Await", "Run", least_ms=20, initial=True),
+        execution("Run", "Await", bound_ms=4),
+        name="sporadic",
+        priority=60,
+    )
+    found = verdict(sporadic, loop("low", 5, 10, 50, offset_ns=3 * MS, deadline_ns=8 * MS))
+    assert found.outcome == Outcome.NOT_SCHEDULABLE
+    assert "4.000 ms of sporadic + 5.000 ms of its own" in found.why
+
+
+# ---- the run
+
+
+class Drawn:
+    """Any way, any lateness; what was taken, by component."""
+
+    def __init__(self, random: Random) -> None:
+        self.random = random
+
+    def first(self, member: Member) -> tuple[Job, int]:
+        return self.random.choice(member.task.jobs), self.random.randint(0, 30)
+
+    def next(self, member: Member, job: Job) -> tuple[Job, int] | None:
+        following = member.task.after(job)
+        later = job.separation_ns + self.random.choice((0, 0, self.random.randint(0, 20)))
+        return (self.random.choice(following), later) if following else None
+
+    def late_ns(self) -> int:
+        return self.random.choice((0, 0, 2))
+
+
+def member(task: DigraphTask, priority: int) -> Member:
+    """Each job of a state of its own."""
+    states = [
+        execution(f"{job.after}-{job.until}", job.until, bound_ms=(job.cost_ns or 0) / MS)
+        for job in task.jobs
+    ]
+    jobs = tuple(
+        Job(job.after, (f"{job.after}-{job.until}",), job.cost_ns, job.until, job.separation_ns, 10**9)
+        for job in task.jobs
+    )
+    return Member(
+        machine(*states, name=task.name, priority=priority, overrun="catch_up"), DigraphTask(task.name, jobs)
+    )
+
+
+def random_schedule(seed: int) -> tuple[list[Member], Schedule]:
+    random = Random(seed)  # noqa: S311 - not for secrets
+    members = [
+        member(random_digraph(random, f"T{number}", share=0.25), random.randint(1, 3)) for number in range(3)
+    ]
+    return members, run(members, Drawn(random), most_jobs=60)
+
+
+def test_runs_are_those_of_the_other_simulation() -> None:
+    compared = 0
+    for seed in range(300):
+        members, schedule = random_schedule(seed)
+        urgency = {one.task.name: one.machine.priority for one in members}
+        begins = [(urgency[cycle.component], cycle.ready_ns) for cycle in schedule.cycles]
+        if len(set(begins)) < len(begins):
+            continue  # who goes first is left open
+        order = {one.task.name: number for number, one in enumerate(members)}
+        tasks = [
+            Task(name=name, cpu=0, priority=one.machine.priority, separation_ns=1, cost_ns=1, deadline_ns=1)
+            for name, one in zip(order, members, strict=True)
+        ]
+        done: dict[str, list[Cycle]] = {name: [] for name in order}
+        for cycle in schedule.cycles:
+            done[cycle.component].append(cycle)
+        releases = {
+            name: [
+                Release(one.nominal_ns, max(one.nominal_ns, one.ready_ns), [(RUN, one.job.cost_ns or 0)])
+                for one in cycles
+            ]
+            for name, cycles in done.items()
+        }
+        expected = simulate(tasks, releases)
+        for name, cycles in done.items():
+            if cycles and all(one.finish_ns >= 0 for one in cycles):
+                assert max(one.finish_ns - one.nominal_ns for one in cycles) == expected[name], (seed, name)
+                compared += 1
+    assert compared > 150
+
+
+def test_one_has_the_processor_and_it_is_one_of_the_most_urgent() -> None:
+    for seed in range(200):
+        members, schedule = random_schedule(seed)
+        urgency = {one.task.name: one.machine.priority for one in members}
+        assert all(one.end_ns <= other.begin_ns for one, other in pairwise(schedule.slices)), seed
+        for name, begin_ns, end_ns in schedule.slices:
+            pending = {
+                cycle.component
+                for cycle in schedule.cycles
+                if cycle.ready_ns < end_ns and (cycle.finish_ns < 0 or cycle.finish_ns > begin_ns)
+            }
+            assert urgency[name] == max(urgency[one] for one in pending), (seed, begin_ns)
+
+
+def test_the_witness_is_the_same_each_time() -> None:
+    def found() -> Schedule | None:
+        machines = [loop("a", 3, 10, 50), loop("b", 5, 14, 50), loop("c", 3, 17, 40, deadline_ns=11 * MS)]
+        return witness_of([Member(one, digraph_of(one)) for one in machines])
+
+    assert found() is not None
+    assert found() == found()
+
+
+def test_no_miss_is_found_where_the_bounds_are_met() -> None:
+    met = missed = 0
+    for seed in range(60):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        machines = [
+            loop(f"T{number}", random.randint(1, 6), random.randint(8, 30), 1 + number) for number in range(3)
+        ]
+        subjects = [Subject.of(one) for one in machines]
+        found = witness_of([Member(one.machine, one.task) for one in subjects])
+        if all(bound.meets_deadline for bound in bounds_of(subjects).values()):
+            met += 1
+            assert found is None, seed
+        else:
+            missed += found is not None
+    assert met > 15
+    assert missed > 5
+
+
+class Twice(Drawn):
+    """A short job, and from then on long ones."""
+
+    def __init__(self, short: Job, long: Job) -> None:
+        self.jobs = (short, long)
+
+    def first(self, _member: Member) -> tuple[Job, int]:
+        return self.jobs[0], 0
+
+    def next(self, _member: Member, _job: Job) -> tuple[Job, int]:
+        return self.jobs[1], 10 * MS
+
+    def late_ns(self) -> int:
+        return 0
+
+
+@pytest.mark.parametrize(
+    ("policy", "nominals"), [("catch_up", [0, 10, 20]), ("skip", [0, 10, 30]), ("fault", [0, 10])]
+)
+def test_after_an_overrun_it_goes_on_as_its_policy_says(policy: str, nominals: list[int]) -> None:
+    one = machine(
+        execution("Short", "Pause", bound_ms=1),
+        execution("Long", "Pause", bound_ms=12),
+        overrun=policy,
+        period_ns=10 * MS,
+    )
+    jobs = [Job("Pause", (name,), 1, "Pause", 10 * MS, 100 * MS) for name in ("Short", "Long")]
+    found = run([Member(one, DigraphTask("c", tuple(jobs)))], Twice(*jobs), most_jobs=3)
+    assert [cycle.nominal_ns // MS for cycle in found.cycles] == nominals
+
+
+# ---- the grid
+
+
+def test_the_period_is_the_greatest_divisor_of_all_cycles() -> None:
+    for seed in range(100):
+        task = random_digraph(Random(seed), "T", share=0.5, most_waits=4)  # noqa: S311 - not for secrets
+        lengths = {job.until: job.separation_ns for job in task.jobs}
+        graph = nx.DiGraph((job.after, job.until) for job in task.jobs)
+        cycles = [sum(lengths[wait] for wait in cycle) for cycle in nx.simple_cycles(graph)]
+        assert period_of(task) == gcd(*cycles), seed
+
+
+def test_what_leads_into_the_cycle_does_not_count() -> None:
+    assert period_of(digraph_of(loop("one", 1, 10, 50))) == 10 * MS
+    job = Job(START, (), 1, "A", 7, 7)
+    assert period_of(DigraphTask("c", (job, Job("A", (), 1, "B", 3, 3), Job("B", (), 1, "A", 7, 7)))) == 10
+    assert period_of(DigraphTask("c", (job,))) == 0
