@@ -12,8 +12,11 @@ class FreeFsm : public Fsm<TestShell, TestCore> {
  public:
   explicit FreeFsm(Define how) : how_(std::move(how)) {}
   void define() override { how_(*this); }
+  /// In virtual time it takes as long as its bound says.
   State& run(const std::string& name, time_ns_t max_execution_ns = 0) {
-    return execution(name, "act", &TestCore::act, max_execution_ns);
+    State& state = execution(name, "act", &TestCore::act, max_execution_ns);
+    state.simulated_execution_ns = max_execution_ns;
+    return state;
   }
   void when_set(State& from, State& to) { transition(from, "is_set", &TestCore::is_set, to); }
   TestShell& ports() const { return shell(); }

@@ -6,11 +6,12 @@
 
 namespace mauve::testing {
 
-/// A component of one execution state with a declared time, and one wait.
+/// A component of one execution state, which takes as long as its bound says, and one wait.
 struct BudgetFsm : Fsm<TestShell, TestCore> {
   void define() override {
-    State& run = execution("Run", "act", &TestCore::act,
-                           us_to_ns(static_cast<std::int64_t>(shell().gain.value() * 1000)));
+    const time_ns_t time_ns = us_to_ns(static_cast<std::int64_t>(shell().gain.value() * 1000));
+    State& run = execution("Run", "act", &TestCore::act, time_ns);
+    run.simulated_execution_ns = time_ns;
     State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
     set_initial(run);
     next(run, pause);
