@@ -16,7 +16,7 @@ from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.machines import FOREVER_NS
 from mauve_rt.analysis.window import MOST_STEPS, UnboundedError
 
-_MOST_PATHS = 500  # that are looked at, of a task
+_MOST_PATHS = 100  # that are looked at, of a task
 
 
 class Path(NamedTuple):
@@ -172,10 +172,15 @@ def utilization_of(task: DigraphTask) -> Fraction:
 
 def _better_cycle(task: DigraphTask, ratio: Fraction) -> list[Job] | None:
     """A cycle whose work exceeds `ratio` of its length, by Bellman and Ford; None: there is none."""
-    gains = {job: Fraction(0) for job in task.jobs}
-    before: dict[Job, Job] = {}
+    gains = dict.fromkeys(range(len(task.jobs)), 0)  # times the ratio's denominator
+    before: dict[int, int] = {}
+    numbers = {job: number for number, job in enumerate(task.jobs)}
     edges = [
-        (job, other, cost_of(job) - ratio * job.separation_ns)
+        (
+            numbers[job],
+            numbers[other],
+            cost_of(job) * ratio.denominator - ratio.numerator * job.separation_ns,
+        )
         for job in task.jobs
         if job.separation_ns != FOREVER_NS
         for other in task.after(job)
@@ -190,10 +195,10 @@ def _better_cycle(task: DigraphTask, ratio: Fraction) -> list[Job] | None:
     cycle = [at]
     while (at := before[at]) != cycle[0]:
         cycle.append(at)
-    return cycle
+    return [task.jobs[number] for number in cycle]
 
 
-def _relax(gains: dict[Job, Fraction], before: dict[Job, Job], job: Job, other: Job, gain: Fraction) -> bool:
+def _relax(gains: dict[int, int], before: dict[int, int], job: int, other: int, gain: int) -> bool:
     if gains[job] + gain <= gains[other]:
         return False
     gains[other], before[other] = gains[job] + gain, job
