@@ -25,7 +25,7 @@ def obstacles(machine: Machine, task: DigraphTask) -> Iterator[str]:
         yield "nothing tells its states: it is not configured, or was recorded by an earlier version"
     if machine.missing:
         names = ", ".join(machine.missing)
-        yield f"no time is known of {names}: declare max_execution_ns, or measure (--budget-from BAG)"
+        yield f"no time is known of {names}: declare wcet_ns, or measure (--budget-from BAG)"
     for job in task.jobs:
         if job.cost_ns is not None and job.separation_ns != FOREVER_NS and job.cost_ns > job.separation_ns:
             takes = f"{' -> '.join(job.states)} takes {in_ms(job.cost_ns)}"
