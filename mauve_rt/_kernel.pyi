@@ -61,6 +61,7 @@ class StateTimes(TypedDict, total=False):
 
     max_execution_ns: int | None  # the bound that the watchdog enforces
     simulated_execution_ns: int | None  # what it takes in virtual time
+    wcet_ns: int | None  # worst case for the timing analysis; not enforced
 
 @final
 class TaskSetting:
@@ -160,6 +161,7 @@ class DescribedState:
     max_execution_ns: Final[int]  # of an execution state: its bound; 0: none
     simulated_execution_ns: Final[int]  # what it takes in virtual time
     successors: Final[list[str]]  # in the order in which guards are asked; last the one without a guard
+    wcet_ns: Final[int]  # of an execution state: its worst case; 0: not declared
 
 @final
 class ComponentDescription:
@@ -284,7 +286,7 @@ class FsmBuilder:
     """Takes the declarations of a state machine written in Python; states by their names."""
 
     def execution(
-        self, name: str, method: str, max_execution_ns: int, simulated_execution_ns: int
+        self, name: str, method: str, max_execution_ns: int, simulated_execution_ns: int, wcet_ns: int
     ) -> None: ...
     def wait(self, name: str, duration_ns: int) -> None: ...
     def wait_event(self, name: str, port: str, timeout_ns: int, min_interarrival_ns: int) -> None: ...

@@ -39,7 +39,6 @@ class State:
     @classmethod
     def of(cls, told: Any) -> Self:
         """Of a mauve_msgs/msg/StateInfo, or what has the same fields."""
-        bound_ns = int(told.max_execution_ns)
         return cls(
             name=told.name,
             is_initial=bool(told.is_initial),
@@ -48,8 +47,17 @@ class State:
             latest_ns=int(told.duration_ns),
             is_event_wait=bool(told.is_event_wait),
             successors=tuple(told.successors),
-            time=ExecutionTime(bound_ns, "declared") if bound_ns else ExecutionTime(),
+            time=_declared_time(told),
         )
+
+
+def _declared_time(told: Any) -> ExecutionTime:
+    """The worst case, which a bag of an earlier version lacks; else the bound that is enforced."""
+    if wcet_ns := int(getattr(told, "wcet_ns", 0)):
+        return ExecutionTime(wcet_ns, "declared")
+    if bound_ns := int(told.max_execution_ns):
+        return ExecutionTime(bound_ns, "declared (its bound)")
+    return ExecutionTime()
 
 
 @dataclass(frozen=True)

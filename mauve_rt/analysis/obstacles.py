@@ -24,7 +24,7 @@ def obstacles(machine: Machine) -> Iterator[str]:
         yield "nothing tells its states: it is not configured, or was recorded by an earlier version"
     if machine.missing:
         names = ", ".join(machine.missing)
-        yield f"no time is known of {names}: declare max_execution_ns, or measure (--budget-from BAG)"
+        yield f"no time is known of {names}: declare wcet_ns, or measure (--budget-from BAG)"
 
 
 def assumptions_about(*, wakeup_us: float = 0.0, sender_priority: int = 1) -> Iterator[str]:

@@ -198,7 +198,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("min_interarrival_ns", &S::min_interarrival_ns)
       .def_readonly("max_execution_ns", &S::max_execution_ns)
       .def_readonly("simulated_execution_ns", &S::simulated_execution_ns)
-      .def_readonly("successors", &S::successors);
+      .def_readonly("successors", &S::successors)
+      .def_readonly("wcet_ns", &S::wcet_ns);
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription")
       .def_readonly("name", &C::name)

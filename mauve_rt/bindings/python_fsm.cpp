@@ -37,11 +37,12 @@ class PythonFsm final : public FsmBase {
   // What the object declares the machine with.
 
   void add_execution(const std::string& name, const std::string& method, time_ns_t max_execution_ns,
-                     time_ns_t simulated_execution_ns) {
+                     time_ns_t simulated_execution_ns, time_ns_t wcet_ns) {
     State& state = FsmBase::add_execution(name);
     state.action = add_method(Method::action(method, method_count(), &NoCppCore::run));
     state.max_execution_ns = max_execution_ns;
     state.simulated_execution_ns = simulated_execution_ns;
+    state.wcet_ns = wcet_ns;
   }
   void add_wait(const std::string& name, time_ns_t duration_ns) { wait(name, duration_ns); }
   void add_event_wait(const std::string& name, const std::string& port, time_ns_t timeout_ns,
@@ -109,7 +110,7 @@ std::unique_ptr<FsmBase> make_python_fsm(const PartFactory& factory) {
 void bind_python_fsm(py::module_& module) {
   py::class_<PythonFsm>(module, "FsmBuilder")
       .def("execution", &PythonFsm::add_execution, py::arg("name"), py::arg("method"),
-           py::arg("max_execution_ns"), py::arg("simulated_execution_ns"))
+           py::arg("max_execution_ns"), py::arg("simulated_execution_ns"), py::arg("wcet_ns"))
       .def("wait", &PythonFsm::add_wait, py::arg("name"), py::arg("duration_ns"))
       .def("wait_event", &PythonFsm::add_event_wait, py::arg("name"), py::arg("port"), py::arg("timeout_ns"),
            py::arg("min_interarrival_ns"))

@@ -17,15 +17,16 @@ SettingValue from_python(const TaskSetting& setting, const SettingValue& example
   }
 }
 
-/// {"Run": {"max_execution_ns": 1000, "simulated_execution_ns": 0}}; either may be left out, or be None.
+/// {"Run": {"max_execution_ns": 1000, "simulated_execution_ns": 0, "wcet_ns": 900}}; each may be left out, or be None.
 std::vector<DeclaredState> declared_states(py::handle value) {
   std::vector<DeclaredState> states;
   for (const auto& [name, times] : value.cast<std::map<std::string, py::dict>>()) {
-    DeclaredState state{.name = name, .max_execution_ns = {}, .simulated_execution_ns = {}};
+    DeclaredState state{.name = name, .max_execution_ns = {}, .simulated_execution_ns = {}, .wcet_ns = {}};
     for (const auto& [key, time] : times) {
       const auto word = key.cast<std::string>();
       auto* const kept = word == "max_execution_ns"         ? &state.max_execution_ns
                          : word == "simulated_execution_ns" ? &state.simulated_execution_ns
+                         : word == "wcet_ns"                ? &state.wcet_ns
                                                             : nullptr;
       if (kept == nullptr) throw py::type_error("states: a state has no time '" + word + "'");
       *kept = time.cast<std::optional<time_ns_t>>();

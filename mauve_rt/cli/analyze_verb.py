@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--write",
         action="store_true",
-        help="put the measured times into FILE as max_execution_ns, which the watchdog enforces",
+        help="put the measured times into FILE as wcet_ns, which nothing enforces",
     )
     parser.add_argument(
         "--wakeup-us",
@@ -196,9 +196,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
                 continue
             place = ("components", after.name, "states", state.name)
             try:
-                text = with_entry(
-                    text, place, "max_execution_ns", str(state.time.ns), comment=state.time.origin
-                )
+                text = with_entry(text, place, "wcet_ns", str(state.time.ns), comment=state.time.origin)
             except InsertionError as error:
                 problem = Problem(line=1, column=1, what=f"no time can be written: {error}")
                 raise ArchitectureFileError(path, [problem]) from error
@@ -212,9 +210,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
         unfinished.replace(whole)
     finally:
         unfinished.unlink(missing_ok=True)
-    print(
-        f"{path}: {count} times written; the watchdog enforces them from the next start on", file=sys.stderr
-    )
+    print(f"{path}: {count} times written as wcet_ns; nothing enforces them", file=sys.stderr)
 
 
 def _as_json(subject: "Subject") -> dict[str, Any]:

@@ -19,10 +19,11 @@
 `alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
 `installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
 `deadline_ns` and `states` are what the timing analysis asks for: how long after a release its work is to be
-done, and how long a state executes. `max_execution_ns` is a bound, which the watchdog enforces;
-`simulated_execution_ns` is what it takes in virtual time, and no bound:
+done, and how long a state executes. `wcet_ns` is its worst-case execution time; only the analysis takes it,
+and nothing enforces it. `max_execution_ns` is a bound, which the watchdog enforces; the analysis takes it of
+a state without `wcet_ns`. `simulated_execution_ns` is what it takes in virtual time, and no bound:
 
-    control: {..., deadline_ns: 5000000, states: {Control: {max_execution_ns: 200000}}}
+    control: {..., deadline_ns: 5000000, states: {Control: {wcet_ns: 200000, max_execution_ns: 1000000}}}
 
 `trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
 does not fit is counted as lost. A state that lasts longer than `hung_after_ms` is told as hung: an error in
@@ -64,6 +65,7 @@ from mauve_rt.model.kinds import (
 )
 from mauve_rt.model.resource_kinds import given_kinds, read_parameters
 from mauve_rt.model.section import Part, Section, setting
+from mauve_rt.model.words import listed
 from mauve_rt.model.yaml_file import Location
 
 PropertyValue = bool | int | float | str
@@ -254,12 +256,18 @@ class StateModel(Section):
 
     max_execution_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)  # the watchdog enforces it
     simulated_execution_ns: int | None = setting(Whole(0, _LONGEST_NS), default=None)  # in virtual time
+    wcet_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)  # for the analysis; not enforced
 
     def misfit(self) -> Fault | None:
-        """One of them at least."""
-        if self.max_execution_ns is None and self.simulated_execution_ns is None:
-            return Fault((), "form", limit="max_execution_ns or simulated_execution_ns or both of them")
-        return None
+        """One of them at least, and no worst case above the bound."""
+        if (self.wcet_ns, self.max_execution_ns, self.simulated_execution_ns) == (None, None, None):
+            return Fault((), "form", limit=f"at least one of {listed(self.settings)}")
+        if self.wcet_ns is None or self.max_execution_ns is None or self.wcet_ns <= self.max_execution_ns:
+            return None
+        limit = f"at most max_execution_ns, which is {self.max_execution_ns}"
+        fault = Fault(("wcet_ns",), "form", limit=limit, found=self.wcet_ns)
+        fault.hint = "lower wcet_ns, or raise max_execution_ns"
+        return fault
 
 
 class ComponentModel(Section):

@@ -130,6 +130,7 @@ class Section:
             found = values if misfit.found is None else misfit.found
             inside = (*place, *misfit.place)
             faults.append(Fault(inside, misfit.what, limit=misfit.limit, found=found, known=misfit.known))
+            faults[-1].hint = misfit.hint
 
 
 class Part(Kind):

@@ -60,13 +60,16 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         *,
         max_execution_ns: int = 0,
         simulated_execution_ns: int = 0,
+        wcet_ns: int = 0,
     ) -> State:
         """A state that runs a method of the core, given by its name or as `HoverCore.follow`.
 
         `max_execution_ns` is its bound, which the watchdog enforces, 0: none; `simulated_execution_ns` is
-        what it takes in virtual time.
+        what it takes in virtual time; `wcet_ns` is its worst-case execution time, which the timing analysis
+        takes and nothing enforces, 0: not declared.
         """
-        self._machine.execution(name, _method_name(method), max_execution_ns, simulated_execution_ns)
+        times = (max_execution_ns, simulated_execution_ns, wcet_ns)
+        self._machine.execution(name, _method_name(method), *times)
         return State(name)
 
     def wait(self, name: str, duration_ns: int) -> State:

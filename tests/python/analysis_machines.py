@@ -8,9 +8,12 @@ from mauve_rt.analysis.machines import Machine
 MS = 1_000_000
 
 
-def execution(name: str, *successors: str, bound_ms: float = 0.0, initial: bool = False) -> SimpleNamespace:
+def execution(
+    name: str, *successors: str, bound_ms: float = 0.0, wcet_ms: float = 0.0, initial: bool = False
+) -> SimpleNamespace:
     """As mauve_msgs/msg/StateInfo has it."""
-    return _state(name, successors, max_execution_ns=round(bound_ms * MS), is_initial=initial)
+    times = {"max_execution_ns": round(bound_ms * MS), "wcet_ns": round(wcet_ms * MS)}
+    return _state(name, successors, is_initial=initial, **times)
 
 
 def wait(name: str, *successors: str, ms: int, initial: bool = False) -> SimpleNamespace:
@@ -26,7 +29,7 @@ def event(name: str, *successors: str, least_ms: int, initial: bool = False) -> 
 
 def _state(name: str, successors: tuple[str, ...], **told: Any) -> SimpleNamespace:
     usual = dict.fromkeys(("is_initial", "is_wait", "is_event_wait"), False)
-    numbers = ("duration_ns", "min_interarrival_ns", "max_execution_ns", "simulated_execution_ns")
+    numbers = ("duration_ns", "min_interarrival_ns", "max_execution_ns", "simulated_execution_ns", "wcet_ns")
     return SimpleNamespace(
         **{**usual, **dict.fromkeys(numbers, 0), "name": name, "successors": successors, **told}
     )

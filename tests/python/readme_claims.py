@@ -793,7 +793,20 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/analysis/test_oracle.py::test_fixed_priority_with_jitter_and_blocking",
         "python/analysis/test_simulation.py::test_no_response_time_exceeds_its_bound",
     ),
-    "what cannot be proved of a component is said, with the remedy": (
+    "Times are *declared*, *measured* or *missing*": (
+        "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+        "python/cli/test_analyze.py::test_the_model_in_words",
+    ),
+    "The worst-case execution time of a state is `wcet_ns`: the analysis takes it, and nothing enforces it": (
+        "python/cli/test_analyze.py::test_a_worst_case_comes_before_the_bound_that_is_enforced",
+        "DeclaredStates.NothingEnforcesTheWorstCase",
+        "DeclaredStates.WorstCaseTakesNoVirtualTime",
+    ),
+    "For a state without `wcet_ns` the analysis takes `max_execution_ns`, the bound that the": (
+        "python/analysis/test_machines.py::test_the_worst_case_comes_before_the_bound",
+        "DeclaredStates.BoundFaultsWhatLastsLonger",
+    ),
+    "What cannot be proved of a component is said, with the remedy": (
         "python/cli/test_analyze.py::test_what_cannot_be_proved_is_said_of_each_component",
     ),
     "Times and deadlines stand in the code of an fsm or in the architecture file": (

@@ -41,7 +41,7 @@ std::string text_of(const DeclaredState& state) {
     return time_ns ? std::to_string(*time_ns) : "as the fsm says";
   };
   return state.name + " max_execution_ns " + time(state.max_execution_ns) + " simulated_execution_ns " +
-         time(state.simulated_execution_ns);
+         time(state.simulated_execution_ns) + " wcet_ns " + time(state.wcet_ns);
 }
 
 std::string text_of(const ComponentFacts& facts) {

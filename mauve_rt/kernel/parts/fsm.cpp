@@ -311,20 +311,23 @@ std::vector<DescribedState> FsmBase::describe_states() const {
                    .min_interarrival_ns = state->min_interarrival_ns,
                    .max_execution_ns = state->max_execution_ns,
                    .simulated_execution_ns = state->simulated_execution_ns,
-                   .successors = {}});
+                   .successors = {},
+                   .wcet_ns = state->wcet_ns});
     for (const State* next : successors(*state)) all.back().successors.push_back(next->name);
   }
   return all;
 }
 
-void FsmBase::take_declared_times() noexcept {
+void FsmBase::take_declared_times() {
   for (const DeclaredState& declared : declared_states_) {
     for (const auto& state : states_) {
       if (state->name != declared.name || state->is_wait) continue;
       state->max_execution_ns = declared.max_execution_ns.value_or(state->max_execution_ns);
       state->simulated_execution_ns = declared.simulated_execution_ns.value_or(state->simulated_execution_ns);
+      state->wcet_ns = declared.wcet_ns.value_or(state->wcet_ns);
     }
   }
+  for (const auto& state : states_) check_wcet(state->name, state->wcet_ns, state->max_execution_ns);
 }
 
 void FsmBase::cleanup_hook() {

@@ -57,6 +57,9 @@ void check_states(const std::vector<DeclaredState>& states, const std::string& c
   for (std::size_t i = 0; i < states.size(); ++i) {
     check_time(states[i], "max_execution_ns", states[i].max_execution_ns, 1);
     check_time(states[i], "simulated_execution_ns", states[i].simulated_execution_ns, 0);
+    check_time(states[i], "wcet_ns", states[i].wcet_ns, 1);
+    check_wcet(states[i].name, states[i].wcet_ns.value_or(0), states[i].max_execution_ns.value_or(0),
+               component);
     for (std::size_t other = 0; other < i; ++other) {
       if (states[other].name != states[i].name) continue;
       throw Error(ErrorCode::duplicate_name, "a state is declared twice",

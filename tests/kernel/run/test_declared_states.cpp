@@ -13,6 +13,7 @@ struct OwnTimesFsm : TestFsm {
   void define() override {
     State& run = execution("Run", "act", &TestCore::act, ms_to_ns(7));
     run.simulated_execution_ns = us_to_ns(30);
+    run.wcet_ns = ms_to_ns(2);
     State& more = execution("More", "act", &TestCore::act);
     State& pause = wait("Pause", ms_to_ns(2));
     set_initial(run);
@@ -55,6 +56,20 @@ TYPED_TEST(DeclaredStates, StandInThePlaceOfTheFsmsOwn) {
   EXPECT_EQ(0, this->state_of(component, "More").max_execution_ns);
 }
 
+TYPED_TEST(DeclaredStates, WorstCaseStandsInThePlaceOfTheFsmsOwn) {
+  Component& component = this->add("c", 2, {.states = {{.name = "Run", .wcet_ns = ms_to_ns(3)}}});
+  component.allow({"t/OwnTimes"}, true);
+  this->deploy();
+  EXPECT_EQ(ms_to_ns(3), this->state_of(component, "Run").wcet_ns);
+  EXPECT_EQ(0, this->state_of(component, "Run").max_execution_ns) << "a worst case is no bound";
+  EXPECT_EQ(0, this->state_of(component, "Pause").wcet_ns);
+  Transaction other;
+  other.replace_fsm("c", "t/OwnTimes");
+  this->commit(other);
+  EXPECT_EQ(ms_to_ns(3), this->state_of(component, "Run").wcet_ns) << "also of a new fsm";
+  EXPECT_EQ(0, this->state_of(component, "More").wcet_ns);
+}
+
 TYPED_TEST(DeclaredStates, DescribeTheMachine) {
   Component& component = this->add("c");
   component.allow({"t/OwnTimes"}, true);
@@ -68,6 +83,7 @@ TYPED_TEST(DeclaredStates, DescribeTheMachine) {
   EXPECT_TRUE(states[0].is_initial);
   EXPECT_THAT(states[0].successors, ElementsAre("Pause", "More"));
   EXPECT_EQ(ms_to_ns(7), states[0].max_execution_ns);
+  EXPECT_EQ(ms_to_ns(2), states[0].wcet_ns);
   EXPECT_TRUE(states[2].is_wait);
   EXPECT_FALSE(states[2].is_event_wait);
   EXPECT_EQ(ms_to_ns(2), states[2].duration_ns);
@@ -86,6 +102,27 @@ TYPED_TEST(DeclaredStates, BoundFaultsWhatLastsLonger) {
   is_slow.store(true);
   this->way.until([&] { return this->state("c") == ComponentState::faulted; }, "the fault");
   this->way.shutdown();
+}
+
+TYPED_TEST(DeclaredStates, NothingEnforcesTheWorstCase) {
+  Component& component = this->add("c", 2, {.states = {{.name = "Run", .wcet_ns = 1}}});
+  if (!TestFixture::is_virtual) {
+    this->core(component).work = [] { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
+  }
+  this->deploy();
+  this->run_for(ms_to_ns(30));
+  EXPECT_EQ(ComponentState::running, this->state("c"));
+  EXPECT_EQ("", component.task().fault().what);
+  EXPECT_LT(0, this->core(component).runs);
+  this->way.shutdown();
+}
+
+TYPED_TEST(DeclaredStates, WorstCaseTakesNoVirtualTime) {
+  if (!TestFixture::is_virtual) GTEST_SKIP() << "on threads a state takes what it takes";
+  Component& component = this->add("c", 2, {.states = {{.name = "Run", .wcet_ns = ms_to_ns(3)}}});
+  this->deploy();
+  this->run_for(ms_to_ns(20));
+  EXPECT_EQ(0U, component.task().statistics().overruns.load());
 }
 
 TYPED_TEST(DeclaredStates, TimeInVirtualTimeIsNoBound) {
@@ -110,6 +147,10 @@ TYPED_TEST(DeclaredStates, AWaitHasNoTimes) {
   EXPECT_THAT(this->refused_at_configure({{"Pause", ms_to_ns(1), {}}}).what(), HasSubstr("found Pause"));
 }
 
+TYPED_TEST(DeclaredStates, AWaitHasNoWorstCase) {
+  EXPECT_THAT(this->refused_at_configure({{.name = "Pause", .wcet_ns = 1}}).what(), HasSubstr("found Pause"));
+}
+
 TYPED_TEST(DeclaredStates, TimesThatCannotBeAreRefused) {
   const auto why = [&](std::vector<DeclaredState> states) {
     return std::string(this->refusal([&] { this->add("c", 2, {.states = std::move(states)}); }).what());
@@ -118,7 +159,35 @@ TYPED_TEST(DeclaredStates, TimesThatCannotBeAreRefused) {
   EXPECT_THAT(why({{"Run", -1, {}}}), HasSubstr("expected 1 to"));
   EXPECT_THAT(why({{"Run", {}, -1}}),
               HasSubstr("state Run, simulated_execution_ns: a state's time is out of range; expected 0 to"));
+  EXPECT_THAT(why({{.name = "Run", .wcet_ns = 0}}), HasSubstr("state Run, wcet_ns"));
+  EXPECT_THAT(why({{.name = "Run", .wcet_ns = -1}}), HasSubstr("expected 1 to"));
   EXPECT_THAT(why({{"Run", 1, {}}, {"Run", 2, {}}}), HasSubstr("declared twice"));
+}
+
+TYPED_TEST(DeclaredStates, WorstCaseAboveTheBoundIsRefused) {
+  const Error declared = this->refusal(
+      [this] { this->add("c", 2, {.states = {{.name = "Run", .max_execution_ns = 10, .wcet_ns = 11}}}); });
+  EXPECT_EQ(ErrorCode::out_of_range, declared.code());
+  EXPECT_THAT(
+      declared.what(),
+      HasSubstr("component 'c': state Run, wcet_ns: the worst-case execution time of a state is longer "
+                "than its bound; expected at most max_execution_ns, which is 10 ns, found 11; lower"));
+  Component& component = this->add("c", 2, {.states = {{"Run", 10, {}, 10}}});
+  component.allow({"t/OwnTimes"}, true);
+  this->architecture.configure();
+}
+
+/// The bound of the one comes from the fsm's code, of the other from the declaration.
+TYPED_TEST(DeclaredStates, WorstCaseAboveTheFsmsOwnBoundIsRefused) {
+  Component& component = this->add("c", 2, {.states = {{.name = "Run", .wcet_ns = ms_to_ns(8)}}});
+  component.allow({"t/OwnTimes"}, true);
+  this->deploy();
+  Transaction other;
+  other.replace_fsm("c", "t/OwnTimes");
+  const Error above = this->refusal([&] { this->commit(other); });
+  EXPECT_THAT(above.what(),
+              HasSubstr("expected at most max_execution_ns, which is 7000000 ns, found 8000000"));
+  EXPECT_EQ(ms_to_ns(8), this->state_of(component, "Run").wcet_ns) << "the old fsm goes on";
 }
 
 TEST(Deadline, IsCheckedAndKept) {

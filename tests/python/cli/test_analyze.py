@@ -12,12 +12,14 @@ from mauve_rt.cli.main import main
 
 Analyze = Callable[..., tuple[int, str, str]]
 
+BOUND = "declared (its bound)"
+
 ROBOT = """\
 mauve: 1
 components:
   one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
         priority: 40, cpus: [0], properties: {period_ms: 20}, deadline_ns: 5000000,
-        states: {Count: {max_execution_ns: 200000}}}
+        states: {Count: {wcet_ns: 200000}}}
   guard: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/GuardedFsm,
           priority: 30, properties: {period_ms: 20}}
   python: {shell: executor_tests/CounterShell, core: executor_tests/PyCounter, fsm: executor_tests/CounterFsm,
@@ -63,8 +65,15 @@ def test_a_declared_time_of_the_file_or_of_the_code(told: Callable[..., dict[str
     assert {job["deadline_ns"] for job in one["jobs"]} == {5_000_000}
     assert one["not_provable"] == []
     guard = found["guard"]
-    assert guard["states"] == [{"name": "Count", "time_ns": 500_000_000, "origin": "declared"}], "by its fsm"
+    assert guard["states"] == [{"name": "Count", "time_ns": 500_000_000, "origin": BOUND}], "by its fsm"
     assert {job["deadline_ns"] for job in guard["jobs"]} == {20_000_000}, "the next instant"
+
+
+def test_a_worst_case_comes_before_the_bound_that_is_enforced(told: Callable[..., dict[str, Any]]) -> None:
+    both = told(ROBOT.replace("wcet_ns: 200000", "max_execution_ns: 900000, wcet_ns: 200000"))["one"]
+    assert both["states"] == [{"name": "Count", "time_ns": 200_000, "origin": "declared"}]
+    bound = told(ROBOT.replace("wcet_ns", "max_execution_ns"))["one"]
+    assert bound["states"] == [{"name": "Count", "time_ns": 200_000, "origin": BOUND}]
 
 
 def test_what_cannot_be_proved_is_said_of_each_component(told: Callable[..., dict[str, Any]]) -> None:
@@ -75,7 +84,7 @@ def test_what_cannot_be_proved_is_said_of_each_component(told: Callable[..., dic
     assert found["python"]["not_provable"] == [
         "it has parts in Python, which run under the interpreter's lock: write them in C++",
         "it may run on CPUs 0, 1: pin it to one (cpus in the architecture file)",
-        "no time is known of Count: declare max_execution_ns, or measure (--budget-from BAG)",
+        "no time is known of Count: declare wcet_ns, or measure (--budget-from BAG)",
     ]
 
 
@@ -95,7 +104,7 @@ def test_the_model_in_words(analyze: Analyze) -> None:
         "  guard: it may run on any CPU: pin it to one (cpus in the architecture file)\n"
         "  python: it has parts in Python, which run under the interpreter's lock: write them in C++\n"
         "  python: it may run on CPUs 0, 1: pin it to one (cpus in the architecture file)\n"
-        "  python: no time is known of Count: declare max_execution_ns, or measure (--budget-from BAG)\n"
+        "  python: no time is known of Count: declare wcet_ns, or measure (--budget-from BAG)\n"
     )
 
 
@@ -145,7 +154,7 @@ def test_the_latency_decides(analyze: Analyze) -> None:
 
 
 def test_a_time_in_virtual_time_is_no_bound(told: Callable[..., dict[str, Any]]) -> None:
-    found = told(ROBOT.replace("max_execution_ns", "simulated_execution_ns"))
+    found = told(ROBOT.replace("wcet_ns", "simulated_execution_ns"))
     assert found["one"]["states"] == [{"name": "Count", "time_ns": None, "origin": "missing"}]
     assert {job["cost_ns"] for job in found["one"]["jobs"]} == {None}
 
@@ -164,18 +173,37 @@ def test_a_time_in_virtual_time_is_no_bound(told: Callable[..., dict[str, Any]])
             "robot.yaml:4:76: bad deadline_ns of component 'one': expected at least 1",
         ),
         (
-            "max_execution_ns: 200000",
+            "wcet_ns: 200000",
             "max_execution_ns: 0",
             "robot.yaml:5:44: bad max_execution_ns in states.Count of component 'one': expected at least 1",
         ),
         (
-            "max_execution_ns: 200000",
+            "wcet_ns: 200000",
+            "wcet_ns: 0",
+            "robot.yaml:5:35: bad wcet_ns in states.Count of component 'one': expected at least 1",
+        ),
+        (
+            "wcet_ns: 200000",
+            "max_execution_ns: 199999, wcet_ns: 200000",
+            "expected at most max_execution_ns, which is 199999, found 200000; lower wcet_ns, or raise",
+        ),
+        (
+            "fsm: executor_tests/GuardedFsm,",
+            "fsm: executor_tests/GuardedFsm, states: {Count: {wcet_ns: 500000001}},",
+            "expected at most max_execution_ns, which is 500000000 ns, found 500000001; lower wcet_ns",
+        ),
+        (
+            "wcet_ns: 200000",
             "simulated_execution_ns: -5",
             "robot.yaml:5:50: bad simulated_execution_ns in states.Count of component 'one': expected at",
         ),
-        ("max_execution_ns: 200000", "", "expected max_execution_ns or simulated_execution_ns"),
-        ("Count: {max", "Rum: {max", "no such execution state; expected one of Count, found Rum"),
-        ("Count: {max", "Pause: {max", "no such execution state; expected one of Count, found Pause"),
+        (
+            "wcet_ns: 200000",
+            "",
+            "expected at least one of max_execution_ns, simulated_execution_ns or wcet_ns",
+        ),
+        ("Count: {wcet", "Rum: {wcet", "no such execution state; expected one of Count, found Rum"),
+        ("Count: {wcet", "Pause: {wcet", "no such execution state; expected one of Count, found Pause"),
     ],
 )
 def test_bad_times_are_refused_where_they_stand(

@@ -35,10 +35,11 @@ def test_rule_13_every_instant_is_run_and_the_trace_is_the_same_every_time():
 
 
 class CostlyFsm(ActFsm):
-    """Acts for 5 ms of virtual time, every 2 ms; its bound is no time that it takes."""
+    """Acts for 5 ms of virtual time, every 2 ms; its bound and its worst case are no time that it takes."""
 
     def define(self) -> None:
-        act = self.execution("Act", "act", max_execution_ns=7 * MS, simulated_execution_ns=5 * MS)
+        times = {"max_execution_ns": 7 * MS, "simulated_execution_ns": 5 * MS, "wcet_ns": 1 * MS}
+        act = self.execution("Act", "act", **times)
         pause = self.wait("Pause", 2 * MS)
         self.set_initial(act)
         self.next(act, pause)
@@ -52,6 +53,8 @@ class CostlyFsm(ActFsm):
         ({"Act": {"simulated_execution_ns": 0}}, False),
         ({"Act": {"simulated_execution_ns": 5 * MS, "max_execution_ns": 8 * MS}}, True),
         ({"Act": {"max_execution_ns": None}}, True),
+        ({"Act": {"wcet_ns": 6 * MS}}, True),
+        ({"Act": {"wcet_ns": 6 * MS, "simulated_execution_ns": 0}}, False),
     ],
 )
 def test_an_execution_takes_what_is_declared_and_its_bound_is_none(
@@ -70,7 +73,28 @@ def test_an_execution_takes_what_is_declared_and_its_bound_is_none(
     wanted = states.get("Act", {})
     assert act.max_execution_ns == (wanted.get("max_execution_ns") or 7 * MS)
     assert act.simulated_execution_ns == wanted.get("simulated_execution_ns", 5 * MS)
+    assert act.wcet_ns == wanted.get("wcet_ns", 1 * MS)
     simulation.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("wcet_ns", "expected"),
+    [
+        (
+            8 * MS,
+            "state Act, wcet_ns: .*at most max_execution_ns, which is 7000000 ns, found 8000000",
+        ),
+        (0, "state Act, wcet_ns: a state's time is out of range; expected 1 to"),
+    ],
+)
+def test_a_worst_case_that_cannot_be_is_refused(built: Stage, wcet_ns: int, expected: str):
+    def configure() -> None:
+        states = {"Act": {"wcet_ns": wcet_ns}}
+        built.architecture.add_component("c", CountShell, CountCore, CostlyFsm, states=states)
+        built.architecture.configure()
+
+    with pytest.raises(MauveError, match=expected):
+        configure()
 
 
 def test_rule_13_transactions_and_callbacks_act_at_their_instants(pair: Stage):

@@ -130,7 +130,9 @@ class OtherCore(Core[HoverShell]):
 
 class HoverFsm(Fsm[HoverShell, HoverCore]):
     def define(self) -> None:
-        follow = self.execution("Follow", HoverCore.follow, max_execution_ns=us_to_ns(500))
+        follow = self.execution(
+            "Follow", HoverCore.follow, max_execution_ns=us_to_ns(500), wcet_ns=us_to_ns(200)
+        )
         again = self.execution("Again", "follow")
         rest = self.wait("Rest", ms_to_ns(20) if self.shell.eager.value else s_to_ns(1))
         assert_type(follow, State)

@@ -21,7 +21,7 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     architecture: Path, start_executor: Callable[..., Any], graph: Any, domain: int, tmp_path: Path
 ) -> None:
     text = architecture.read_text(encoding="utf-8")
-    declared = "counter: {deadline_ns: 7000000, states: {Count: {max_execution_ns: 900000000}}, "
+    declared = "counter: {deadline_ns: 7000000, states: {Count: {wcet_ns: 900000000}}, "
     architecture.write_text(text.replace("counter: {", declared, 1), encoding="utf-8")
     bag = tmp_path / "bag"
     executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
@@ -62,10 +62,10 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     words = ["--budget-from", str(bag), "--margin", str(MARGIN), "--write"]
     done = subprocess.run([*command, *words], capture_output=True, text=True, check=False, timeout=200)
     assert done.returncode == NOT_PROVED, done.stderr
-    assert "2 times written; the watchdog enforces them" in done.stderr
+    assert "2 times written as wcet_ns; nothing enforces them" in done.stderr
     after = architecture.read_text(encoding="utf-8")
-    entry = f"states: {{Count: {{max_execution_ns: {state['time_ns']}}}}},  # {state['origin']}\n"
+    entry = f"states: {{Count: {{wcet_ns: {state['time_ns']}}}}},  # {state['origin']}\n"
     assert entry in after
-    assert re.sub(r"states: \{Count: \{max_execution_ns: \d+\}\},  # measured.*\n *", "", after) == before
+    assert re.sub(r"states: \{Count: \{wcet_ns: \d+\}\},  # measured.*\n *", "", after) == before
     written = analyzed(str(architecture))
     assert written["guard"]["states"] == [{**state, "origin": "declared"}]

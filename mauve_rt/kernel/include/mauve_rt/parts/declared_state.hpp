@@ -14,7 +14,13 @@ struct DeclaredState {
   std::string name{};
   std::optional<time_ns_t> max_execution_ns{};        // the bound that the watchdog enforces; > 0
   std::optional<time_ns_t> simulated_execution_ns{};  // what it takes in virtual time; >= 0
+  std::optional<time_ns_t> wcet_ns{};                 // worst case for the timing analysis; not enforced; > 0
   bool operator==(const DeclaredState&) const = default;
 };
+
+/// Checks the worst-case execution time of a state; 0: not declared. Throws Error (out_of_range) for a time that is no
+/// length of time, or is above the state's max_execution_ns (0: none). [setup]
+void check_wcet(const std::string& state, time_ns_t wcet_ns, time_ns_t max_execution_ns,
+                const std::string& component = {});
 
 }  // namespace mauve

@@ -111,6 +111,7 @@ struct State {
   std::size_t action{kNone};            // of an execution state
   time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
+  time_ns_t wcet_ns{0};  // its worst-case execution time, for the timing analysis; 0: not declared
   std::vector<Transition> transitions;  // the first whose guard holds is taken; of a wait, when it has ended
   State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
@@ -128,7 +129,8 @@ struct DescribedState {
   time_ns_t max_execution_ns{0};        // of an execution state: its bound; 0: none
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
   std::vector<std::string>
-      successors{};  // in the order in which guards are asked; last the one without a guard
+      successors{};      // in the order in which guards are asked; last the one without a guard
+  time_ns_t wcet_ns{0};  // of an execution state: its worst case; 0: not declared
 };
 
 /// An fsm seen without its types.
@@ -193,7 +195,7 @@ class FsmBase : public Configurable {
   void cleanup_hook() override;
 
  private:
-  void take_declared_times() noexcept;
+  void take_declared_times();
 
   std::vector<std::unique_ptr<State>> states_;
   std::vector<Method> methods_;
