@@ -27,13 +27,14 @@ sys.exit(not (ok and os.path.exists(os.path.join(sysconfig.get_paths()["include"
 PYTHON
 }
 
-# requirement_files SET: what must be there for `base` (to build and to run), `tests` or `lint`.
+# requirement_files SET: what must be there for `base` (to build and to run), `tests`, `lint` or `docs`.
 requirement_files() {
   local names=(run build) name
   [[ -n $jazzy ]] || names+=(ros-wheels ros-wheels-build)
   case $1 in
     tests) names+=(test) ;;
     lint) names+=(test lint) ;;
+    docs) names=(docs) ;; # pages are built without MAUVE RT
   esac
   for name in "${names[@]}"; do echo "$MAUVE_ROOT/requirements/$name.txt"; done
 }
@@ -57,9 +58,16 @@ has_python_packages() {
 }
 
 ensure_python_packages() {
+  if $only_docs; then
+    ensure_python_set docs
+    return
+  fi
   ensure_python_set base
   if $with_tests || $with_benchmarks; then ensure_python_set tests; fi # benchmarks read bags as others do
-  if $with_lint; then ensure_python_set lint; fi
+  if $with_lint; then
+    ensure_python_set lint
+    ensure_python_set docs # scripts/lint builds the documentation
+  fi
 }
 
 ensure_python_set() {

@@ -992,8 +992,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
     ),
     # ---- the house
-    "`scripts/lint` checks style, types, layers and includes": (
+    "`scripts/lint` checks style, types, layers and includes, and builds `docs/` (`scripts/docs`)": (
         "python/project/test_readme_scripts.py::test_ci_runs_every_tool_and_every_test",
+        "python/project/test_docs.py::test_lint_builds_the_pages",
     ),
     "Knows neither ROS nor Python": (_KERNEL_ALONE,),
     "| folder | what |": ("python/project/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
@@ -1018,7 +1019,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
     "On the disk the demo takes",  # figures of one day
-    "`scripts/lint` takes 0.2 GB more",
+    "`scripts/lint` takes 0.3 GB more",
     "The demo's verdict is about its supervisors' swaps",
     "MAUVE RT is a component framework on ROS 2 Jazzy",
     "It implements and extends the design of D",

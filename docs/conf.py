@@ -1,0 +1,23 @@
+"""How scripts/docs makes a site of these pages: Sphinx reads MyST Markdown, furo draws the pages."""
+
+import logging
+
+project = "MAUVE RT"
+html_title = "MAUVE RT"
+
+extensions = ["myst_parser"]
+myst_heading_anchors = 4  # `page.md#a-heading` is a link that the build checks
+myst_enable_extensions = ["colon_fence"]  # ::: around what is no code
+# A kind of page may have no page yet. Sphinx gives that warning no type, so suppress_warnings cannot name it.
+logging.getLogger("sphinx.sphinx.directives.other").addFilter(
+    lambda record: getattr(record, "subtype", "") != "empty_glob"
+)
+
+highlight_language = "none"
+smartquotes = False  # words of a program stay as they are typed
+
+html_theme = "furo"
+html_show_copyright = False
+html_show_sourcelink = False
+html_copy_source = False
+html_show_search_summary = False  # a browser lets a page from a file read no other page
