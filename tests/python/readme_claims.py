@@ -1,8 +1,6 @@
 """What README claims, and what fails when a claim is false.
 
-A claim is quoted in README's own words. Its proofs are tests, `stage/room/test_file.py::test_name` below
-tests/ or mauve_examples/tests/, or `Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows
-of scripts/bench, `bench: WORDS`.
+A claim is quoted in README's own words. Its proofs are tests, programs and rows of scripts/bench: proofs.py.
 test_readme_claims.py holds this table to README and to what there is, and README to this table.
 """
 

@@ -23,6 +23,7 @@ MODULES = {
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "lz4": ("", "mcap"),  # comes with it
+    "markdown_it": ("", "rich"),  # comes with it
     "mcap": ("", "mcap"),
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),

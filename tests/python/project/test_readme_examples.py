@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from page_blocks import blocks
 from synthetic_traces import deploy, run
 
 from mauve_examples.figures import page
@@ -23,6 +24,7 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 ROOT = Path(__file__).parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = tuple(blocks(README))
 INSTALLED = Path(_kernel.__file__).resolve().parents[4]
 ROBOT = ROOT / "mauve_examples" / "architecture" / "robot.yaml"
 COMPONENTS = "mauve: 1\ncomponents:\n  one: {shell: a/A, core: a/A, fsm: a/A}\n"
@@ -30,21 +32,18 @@ COMPONENTS = "mauve: 1\ncomponents:\n  one: {shell: a/A, core: a/A, fsm: a/A}\n"
 
 def _commands(first: str) -> list[list[str]]:
     """The command lines of README that begin with a word, as the shell would split them."""
-    joined = README.replace("\\\n", " ")
-    lines = (line.strip() for line in joined.splitlines() if line.startswith("    "))
+    indented = "".join(block.text for block in BLOCKS if not block.is_fenced)
+    lines = (line.strip() for line in indented.replace("\\\n", " ").splitlines())
     return [shlex.split(line, comments=True) for line in lines if line.split()[:1] == [first]]
 
 
 def _indented(begin: str) -> str:
     """The indented block that begins with a line, without its indent."""
-    lines = README[README.index(f"    {begin}") :].splitlines()
-    end = next(index for index, line in enumerate(lines) if line.strip() and not line.startswith("    "))
-    return "\n".join(line[4:] for line in lines[:end]) + "\n"
+    return next(block.text for block in BLOCKS if not block.is_fenced and block.text.startswith(begin))
 
 
 def _fenced(language: str, word: str) -> str:
-    blocks = re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
-    return next(str(block) for block in blocks if word in block)
+    return next(block.text for block in BLOCKS if block.language == language and word in block.text)
 
 
 @pytest.fixture
@@ -87,6 +86,9 @@ def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:
         file.write_text(text, encoding="utf-8")
         model = load_architecture(file)
     assert model.components["control"].diagnostics.wakeup_max_us is not None
+    states = _indented("control: {..., deadline_ns").replace("...", "shell: a/A, core: a/A, fsm: a/A")
+    file.write_text(f"mauve: 1\ncomponents:\n  {states}", encoding="utf-8")
+    assert load_architecture(file).components["control"].states["Control"].wcet_ns == 200_000
     sender = re.search(r"`(executor: {sender: .*?}})`", README, re.DOTALL)
     assert sender is not None
     file.write_text(f"{COMPONENTS}{' '.join(sender[1].split())}\n", encoding="utf-8")

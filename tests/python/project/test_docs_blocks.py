@@ -1,0 +1,162 @@
+"""Each block of commands or code in README.md and docs/ is run by a test, or its marker says why not.
+
+The table names the tests: they read the block from its page and try it, or run its commands with names of
+their own.
+"""
+
+from collections.abc import Collection
+from pathlib import Path
+
+import pytest
+from page_blocks import Block, blocks
+from proofs import is_there
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGES = {
+    str(file.relative_to(ROOT)): file.read_text(encoding="utf-8")
+    for file in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+}
+README = "python/project/test_readme_examples.py::test_"
+
+# Of each page: words that stand in one of its blocks only, and the tests that run that block.
+RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
+    "README.md": {
+        "scripts/demo          # sets everything up": (
+            "system/test_demo_mission.py::test_it_succeeds_and_says_so",
+            "python/project/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
+        ),
+        "mauve list /robot_1/executor": (
+            f"{README}every_command_is_one_that_mauve_takes",
+            "ros/cli/test_verbs.py::test_verbs_do_what_they_say",
+            "ros/cli/test_verbs.py::test_events_are_followed",
+        ),
+        "cat > steps.yaml <<END": (
+            f"{README}the_steps_fit_the_mission",
+            "ros/cli/test_verbs.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
+        ),
+        "mauve replace-core /robot_1/executor guidance": (
+            "ros/executor/test_faulted_component.py::test_by_the_command_line",
+        ),
+        "ros2 service call /robot_1/executor/replace_core": (
+            f"{README}service_calls_have_fields_of_their_services",
+            "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
+        ),
+        "ros2 launch mauve_rt executor.launch.py": (
+            f"{README}launch_arguments_are_declared",
+            "ros/test_launch.py::test_an_executor_with_its_supervisor",
+            "ros/test_launch.py::test_the_mission_loses_its_link_and_gets_it_back",
+        ),
+        "ros2 param set": (
+            "ros/executor/test_parameters.py::test_parameters_are_the_properties",
+            "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
+        ),
+        "executor: {diagnostics:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "printf 'force: true": ("ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",),
+        "mauve record start": (
+            f"{README}every_command_is_one_that_mauve_takes",
+            f"{README}service_calls_have_fields_of_their_services",
+            "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+        ),
+        "mauve trace info DIR": (
+            "python/cli/test_trace.py::test_info",
+            "python/cli/test_trace.py::test_check_and_repair",
+            "python/cli/test_trace.py::test_stats",
+            "python/cli/test_trace_export.py::test_perfetto_is_the_default",
+        ),
+        "import mauve_rt.trace": (f"{README}the_python_example_reads_a_bag",),
+        "# writes DIR/report.html": (
+            "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
+        ),
+        "mauve analyze robot.yaml --witness DIR": (
+            "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
+            "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+        ),
+        "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "scan:  {kind: shared_data": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "lamp:  {kind: client": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "struct MetronomeShell": (f"{README}listings_stand_in_the_sources",),
+        "class Metronome(mauve_rt.api.Core)": (f"{README}listings_stand_in_the_sources",),
+        "architecture/metronome.yaml": (
+            "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
+        ),
+        "find_package(mauve_rt REQUIRED)": (
+            "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
+        ),
+    },
+    "docs/rules.md": {
+        "name: link_lost": (
+            "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
+        ),
+        "silence: {resource: pose": (
+            "python/supervision/test_rules_page.py::test_there_is_an_example_of_each_kind",
+        ),
+        "one period of exploration": ("python/test_rules_check.py::test_the_bound_of_the_documentation",),
+        "lasts_s: 20": (
+            "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
+        ),
+        "link_lost: armed": (
+            "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
+        ),
+    },
+    "docs/several_machines.md": {
+        "ROS_DOMAIN_ID=42": ("ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",),
+        "ROS_STATIC_PEERS='10.0.0.7": (
+            "ros/links/test_peers.py::test_peers_that_name_each_other_need_no_multicast",
+        ),
+        "on this machine only: UDP": (
+            "ros/test_discovery.py::test_an_executor_is_bound_to_loopback_however_it_was_told_to_stay",
+        ),
+        "dds/local.xml": (
+            "ros/test_discovery.py::test_an_executor_is_bound_to_loopback_however_it_was_told_to_stay",
+        ),
+        "dds/local_udp.xml": (
+            "ros/cli/test_other_account.py::test_the_installed_profile_is_for_other_programs",
+        ),
+    },
+}
+
+
+def _entries(block: Block, table: Collection[str]) -> list[str]:
+    return [words for words in table if words in block.text]
+
+
+def _unexplained(text: str, table: Collection[str]) -> list[str]:
+    """The blocks that have neither an entry nor a marker, or more than one of these."""
+    return [
+        f"line {block.lines.start + 1}: {block.first_line}"
+        for block in blocks(text)
+        if len(_entries(block, table)) + bool(block.not_run) != 1
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_each_block_is_run_or_says_why_not(page: str) -> None:
+    assert _unexplained(PAGES[page], RUN_BY.get(page, {})) == [], (
+        "name the test that runs it in RUN_BY, or write <!-- not run: REASON --> in the line above"
+        " (a directive that is no code begins with :::)"
+    )
+
+
+@pytest.mark.parametrize(("page", "words"), [(page, words) for page in RUN_BY for words in RUN_BY[page]])
+def test_each_entry_has_its_block_and_its_tests(page: str, words: str) -> None:
+    found = [block for block in blocks(PAGES[page]) if words in block.text]
+    assert len(found) == 1, "expected one block with these words: correct them, or remove the entry"
+    assert RUN_BY[page][words]
+    assert [test for test in RUN_BY[page][words] if not is_there(test)] == []
+
+
+def test_a_block_with_neither_is_found() -> None:
+    page = "\n".join(
+        [
+            *("# Page", "", "```{toctree}", "other", "```", ""),
+            *("```python", "known()", "```", "", "text", "", "    unknown --word", ""),
+            *("<!-- not run: it takes a day -->", "```", "marked", "```", ""),
+            *("<!-- not run: not directly above -->", "", "```", "far", "```", ""),
+            *(":::{note}", "```", "inside", "```", ":::", "", "- item", "", "      in an item", ""),
+            *("<!-- not run: -->", "```", "no reason", "```", ""),
+            *("<!-- not run: both -->", "```", "known() again", "```", ""),
+        ]
+    )
+    assert [each.partition(": ")[2] for each in _unexplained(page, ["known()"])] == [
+        *("unknown --word", "far", "inside", "in an item", "no reason", "known() again")
+    ]
