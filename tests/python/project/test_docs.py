@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from headless_browser import find_browser
 
 ROOT = Path(__file__).resolve().parents[3]
 INSTALLED = ROOT / ".venv" / ".mauve-stamp-docs"
@@ -46,6 +47,19 @@ def test_a_broken_link_is_refused(link: str, tmp_path: Path) -> None:
     done = _build(tmp_path, f"[text]({link})")
     assert done.returncode != 0
     assert re.search(rf"index\.md:7: WARNING: .*{re.escape(link.rpartition('#')[2])}", done.stderr)
+
+
+@needs_sphinx
+def test_the_search_works_from_files(tmp_path: Path) -> None:
+    browser = find_browser()
+    if browser is None:
+        pytest.skip("no browser: no Chromium on PATH, and CHROME is not set")
+    assert _build(tmp_path, "text").returncode == 0
+    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}"]
+    address = f"{(tmp_path / 'html' / 'search.html').as_uri()}?q=heading"
+    command = [browser, *options, "--virtual-time-budget=10000", "--dump-dom", address]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.search(r'<a href="second\.html#a-heading"[^>]*>Second &gt; A heading</a>', shown)
 
 
 @needs_sphinx
