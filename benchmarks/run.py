@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import machine
+from analysis import analysis_rows
 from command import command_rows
 from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
@@ -75,6 +76,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording-killed": kill_rows,
     "recording-kept": kept_rows,
     "reading": reading_rows,
+    "analysis": analysis_rows,
     "mission": mission_rows,
     "links": links_rows,
 }

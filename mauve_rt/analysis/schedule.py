@@ -1,15 +1,19 @@
 """A run of the components of one CPU under SCHED_FIFO, in virtual time, until one misses its deadline.
 
-Each execution takes the time that is known of its state, to the end. What a model leaves open, `Choices`
-decide: which way a component takes, when an event comes, how late a thread begins. As the Linux kernel does
-it, threads are queued, not jobs: one that wakes up goes to the end of the queue of its priority, one that is
-preempted stays where it is, one that goes on with the next job without a sleep does, too.
+Each execution takes the time that is known of its state, to the end. `Choices` decide what a model leaves
+open: which way a component takes, when an event comes, how late a thread begins, when a job locks.
+
+As the Linux kernel does it, threads are queued, not jobs: one that wakes up goes to the end of the queue of
+its priority; one that is preempted stays where it is, and so does one that goes on with the next job without
+a sleep. A lock passes priorities on: its holder goes to the end of the queue of the higher priority, and
+afterwards to the head of its own.
 """
 
 import heapq
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from typing import NamedTuple, Protocol
 
 from mauve_rt.analysis.digraph import DigraphTask, Job
@@ -22,6 +26,8 @@ class Member:
 
     machine: Machine
     task: DigraphTask
+    sections: tuple[tuple[str, int], ...] = ()
+    """Resources that each job locks once, and how long. In the longest of its states, one after the other."""
 
 
 class Choices(Protocol):
@@ -36,6 +42,9 @@ class Choices(Protocol):
     def late_ns(self) -> int:
         """How long after its nominal instant a thread begins."""
 
+    def before_locks_ns(self, left_ns: int) -> int:
+        """How long a state executes before it locks, of its time outside of critical sections."""
+
 
 class Slice(NamedTuple):
     """A component had the processor."""
@@ -43,6 +52,8 @@ class Slice(NamedTuple):
     component: str
     begin_ns: int
     end_ns: int
+    resource: str = ""
+    """Which it held locked."""
 
 
 @dataclass
@@ -74,19 +85,45 @@ class Schedule(NamedTuple):
     slices: list[Slice]
     missed: Cycle | None
 
-    def shares_ns(self, cycle: Cycle) -> dict[str, int]:
-        """Who had the processor how long from a cycle's nominal instant to its finish, the longest first."""
-        found: Counter[str] = Counter()
-        for component, begin_ns, end_ns in self.slices:
-            found[component] += max(0, min(end_ns, cycle.finish_ns) - max(begin_ns, cycle.nominal_ns))
-        return {name: share_ns for name, share_ns in found.most_common() if share_ns}
+    def shares_ns(self, cycle: Cycle) -> dict[tuple[str, str], int]:
+        """Who had the processor how long from a cycle's nominal instant to its finish, the longest first.
+
+        By component and the resource that it held locked.
+        """
+        found: Counter[tuple[str, str]] = Counter()
+        for component, begin_ns, end_ns, resource in self.slices:
+            share_ns = min(end_ns, cycle.finish_ns) - max(begin_ns, cycle.nominal_ns)
+            found[component, resource] += max(0, share_ns)
+        return {who: share_ns for who, share_ns in found.most_common() if share_ns}
+
+
+class _Do(Enum):
+    EXECUTE = auto()
+    LOCK = auto()
+    UNLOCK = auto()
+
+
+@dataclass
+class _Step:
+    do: _Do
+    name: str
+    """Of the state, or of the resource."""
+    left_ns: int = 0
+    ends: bool = False
+    """Whether the state ends with it."""
 
 
 @dataclass(eq=False)
 class _Thread:
     member: Member
     cycle: Cycle
-    left: deque[list[str | int]] = field(default_factory=deque)  # state and time of what is to be executed
+    priority: int
+    """Its own, or what it inherits."""
+    place: int = 0
+    """In the queue of its priority; the least is the head."""
+    steps: deque[_Step] = field(default_factory=deque)
+    held: list[str] = field(default_factory=list)
+    wanted: str = ""
 
 
 def run(members: Sequence[Member], choices: Choices, *, most_jobs: int) -> Schedule:
@@ -101,22 +138,24 @@ class _Cpu:
     def __init__(self, members: Sequence[Member], choices: Choices) -> None:
         self._choices = choices
         self._now_ns = 0
-        self._ready: list[tuple[int, int, _Thread]] = []  # most urgent first, then who came first
+        self._ready: list[_Thread] = []
+        self._waiting: list[_Thread] = []  # for a resource
         self._asleep: list[tuple[int, int, _Thread]] = []  # by instant, then the order of members
-        self._came = 0
+        self._owners: dict[str, _Thread] = {}
+        self._head, self._tail = 0, 0  # places in a queue
         self._order = {member.task.name: number for number, member in enumerate(members)}
         self._cycles: list[Cycle] = []
         self._slices: list[Slice] = []
         for member in members:
             if member.task.jobs:
                 job, nominal_ns = choices.first(member)
-                self._sleep(_Thread(member, self._cycle(member, job, nominal_ns)))
+                self._sleep(_Thread(member, self._cycle(member, job, nominal_ns), member.machine.priority))
 
     def run(self, most_jobs: int) -> Schedule:
         while len(self._cycles) < most_jobs:
             self._wake()
             if self._ready:
-                missed = self._execute(self._ready[0][-1])
+                missed = self._execute(min(self._ready, key=lambda one: (-one.priority, one.place)))
                 if missed is not None:
                     return Schedule(self._cycles, self._slices, missed)
             elif self._asleep:
@@ -135,40 +174,112 @@ class _Cpu:
     def _wake(self) -> None:
         while self._asleep and self._asleep[0][0] <= self._now_ns:
             thread = heapq.heappop(self._asleep)[-1]
-            self._came += 1
-            heapq.heappush(self._ready, (-thread.member.machine.priority, self._came, thread))
+            self._to_tail(thread)
+            self._ready.append(thread)
             self._begin(thread)
+
+    def _to_tail(self, thread: _Thread) -> None:
+        self._tail += 1
+        thread.place = self._tail
+
+    def _to_head(self, thread: _Thread) -> None:
+        self._head -= 1
+        thread.place = self._head
 
     def _begin(self, thread: _Thread) -> None:
         thread.cycle.ready_ns = self._now_ns
         self._cycles.append(thread.cycle)
-        times_ns = {state.name: state.time.ns or 0 for state in thread.member.machine.states}
-        thread.left = deque([name, times_ns[name]] for name in thread.cycle.job.states)
+        thread.steps = deque(self._steps(thread.member, thread.cycle.job))
+
+    def _steps(self, member: Member, job: Job) -> Iterator[_Step]:
+        times_ns = {state.name: state.time.ns or 0 for state in member.machine.states}
+        longest = max(job.states, key=lambda name: times_ns[name], default="")
+        for name in job.states:
+            left_ns = times_ns[name]
+            for step in self._locking(member, name, left_ns) if name == longest else ():
+                yield step
+                left_ns -= step.left_ns
+            yield _Step(_Do.EXECUTE, name, left_ns, ends=True)
+
+    def _locking(self, member: Member, state: str, time_ns: int) -> Iterator[_Step]:
+        sections: list[tuple[str, int]] = []
+        for resource, length_ns in member.sections:
+            left_ns = time_ns - sum(length for _, length in sections)
+            sections += [(resource, min(length_ns, left_ns))] if left_ns else []
+        if sections:
+            left_ns = time_ns - sum(length_ns for _, length_ns in sections)
+            yield _Step(_Do.EXECUTE, state, self._choices.before_locks_ns(left_ns))
+        for resource, length_ns in sections:
+            yield _Step(_Do.LOCK, resource)
+            yield _Step(_Do.EXECUTE, state, length_ns)
+            yield _Step(_Do.UNLOCK, resource)
 
     def _execute(self, thread: _Thread) -> Cycle | None:
-        """Until its state ends or somebody wakes up; returns its cycle if that ended too late."""
-        cycle = thread.cycle
-        if not thread.left:
+        """Until its step ends or a thread wakes up; returns its cycle if that ended too late."""
+        if not thread.steps:
             return self._finish(thread)
-        name, left_ns = str(thread.left[0][0]), int(thread.left[0][1])
+        step, cycle = thread.steps[0], thread.cycle
+        if step.do == _Do.LOCK:
+            self._lock(thread, step.name)
+            return None
         if not cycle.states or cycle.states[-1][2] >= 0:
-            cycle.states.append((name, self._now_ns, -1))
-        end_ns = self._now_ns + left_ns
+            cycle.states.append((step.name, self._now_ns, -1))
+        end_ns = self._now_ns + step.left_ns
         until_ns = min(end_ns, self._asleep[0][0]) if self._asleep else end_ns
         if until_ns > self._now_ns:
-            self._slices.append(Slice(cycle.component, self._now_ns, until_ns))
-        self._now_ns = until_ns
-        thread.left[0][1] = end_ns - until_ns
-        if until_ns < end_ns:
+            resource = thread.held[0] if thread.held else ""
+            self._slices.append(Slice(cycle.component, self._now_ns, until_ns, resource))
+        self._now_ns, step.left_ns = until_ns, end_ns - until_ns
+        if step.left_ns:
             return None
-        thread.left.popleft()
-        cycle.states[-1] = (name, cycle.states[-1][1], until_ns)
-        return None if thread.left else self._finish(thread)
+        thread.steps.popleft()
+        if step.ends:
+            cycle.states[-1] = (step.name, cycle.states[-1][1], until_ns)
+        while thread.steps and thread.steps[0].do == _Do.UNLOCK:  # before anybody wakes up at this instant
+            self._unlock(thread, thread.steps.popleft().name)
+        return None if thread.steps else self._finish(thread)
+
+    def _lock(self, thread: _Thread, resource: str) -> None:
+        if resource in self._owners:
+            self._ready.remove(thread)
+            self._waiting.append(thread)
+            thread.wanted = resource
+        else:
+            thread.steps.popleft()
+            thread.held.append(resource)
+            self._owners[resource] = thread
+        self._inherit()
+
+    def _unlock(self, thread: _Thread, resource: str) -> None:
+        thread.held.remove(resource)
+        del self._owners[resource]
+        waiting = [other for other in self._waiting if other.wanted == resource]
+        if waiting:
+            first = max(waiting, key=lambda other: other.priority)
+            self._waiting.remove(first)
+            first.wanted = ""
+            self._to_tail(first)
+            self._ready.append(first)
+            self._lock(first, resource)
+        self._inherit()
+
+    def _inherit(self) -> None:
+        """A holder has the priority of the most urgent thread that waits for it."""
+        changed = True
+        while changed:
+            changed = False
+            for thread in (*self._ready, *self._waiting):
+                asking = [other.priority for other in self._waiting if other.wanted in thread.held]
+                priority = max([thread.member.machine.priority, *asking])
+                if priority != thread.priority:
+                    changed = True
+                    (self._to_tail if priority > thread.priority else self._to_head)(thread)
+                    thread.priority = priority
 
     def _finish(self, thread: _Thread) -> Cycle | None:
         cycle = thread.cycle
         cycle.finish_ns = self._now_ns
-        heapq.heappop(self._ready)
+        self._ready.remove(thread)
         following = self._choices.next(thread.member, cycle.job)
         if following is not None:
             job, later_ns = following
@@ -186,5 +297,5 @@ class _Cpu:
         if nominal_ns > self._now_ns:
             self._sleep(thread)
         else:  # it does not sleep, so it keeps its place: the first of its priority
-            heapq.heappush(self._ready, (-machine.priority, -1, thread))
+            self._ready.append(thread)
             self._begin(thread)

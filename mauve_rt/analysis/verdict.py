@@ -1,5 +1,6 @@
 """Does each component meet its deadline? Yes, no, or not proved, in one sentence."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -43,7 +44,8 @@ def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns
             members = [Member(subject.machine, subject.task) for subject in here]
             found = witness_of(members, wakeup_ns=wakeup_ns)
             if found is not None and found.missed is not None:
-                return Verdict(Outcome.NOT_SCHEDULABLE, _miss(found, found.missed), found)
+                priorities = {subject.name: subject.machine.priority for subject in here}
+                return Verdict(Outcome.NOT_SCHEDULABLE, _miss(found, found.missed, priorities), found)
     missing = [subject.name for subject in subjects if subject.obstacles]
     if missing:
         return Verdict(Outcome.NOT_PROVABLE, f"something is missing of {', '.join(missing)}")
@@ -53,11 +55,18 @@ def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns
     return Verdict(Outcome.SCHEDULABLE, "every component meets its deadline")
 
 
-def _miss(schedule: Schedule, missed: Cycle) -> str:
-    shares = schedule.shares_ns(missed)
-    parts = [f"{in_ms(share_ns)} of {name}" for name, share_ns in shares.items() if name != missed.component]
-    parts.append(f"{in_ms(shares.get(missed.component, 0))} of its own")
-    idle_ns = missed.finish_ns - missed.nominal_ns - sum(shares.values())
+def _miss(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> str:
+    own_ns, blocking, others = 0, Counter[str](), Counter[str]()
+    for (name, resource), share_ns in schedule.shares_ns(missed).items():
+        if name == missed.component:
+            own_ns += share_ns
+        elif resource and priorities[name] < priorities[missed.component]:
+            blocking[f"blocking by {resource}, which {name} holds"] += share_ns
+        else:
+            others[f"of {name}"] += share_ns
+    parts = [f"{in_ms(share_ns)} {what}" for what, share_ns in (others + blocking).most_common()]
+    parts.append(f"{in_ms(own_ns)} of its own")
+    idle_ns = missed.finish_ns - missed.nominal_ns - own_ns - sum((others + blocking).values())
     parts += [f"{in_ms(idle_ns)} until its thread begins"] if idle_ns else []
     return (
         f"{missed.component} misses its deadline at {in_ms(missed.deadline_ns)} after the start and ends "

@@ -36,6 +36,8 @@ def witness_of(members: Sequence[Member], *, wakeup_ns: int = 0) -> Schedule | N
 def _has_choices(members: Sequence[Member], wakeup_ns: int) -> bool:
     if wakeup_ns or len({member.machine.priority for member in members}) < len(members):
         return True
+    if any(member.sections for member in members):
+        return True
     events = any(state.is_event_wait for member in members for state in member.machine.states)
     return events or any(len(member.task.after(job)) > 1 for member in members for job in member.task.jobs)
 
@@ -83,6 +85,9 @@ class _Drawn:
 
     def late_ns(self) -> int:
         return self._random.choice((0, self._wakeup_ns)) if self._draws else self._wakeup_ns
+
+    def before_locks_ns(self, left_ns: int) -> int:
+        return self._random.choice((0, left_ns, self._random.randint(0, left_ns))) if self._draws else left_ns
 
     def _later_ns(self, member: Member, job: Job) -> int:
         wait = next(state for state in member.machine.states if state.name == job.until)

@@ -39,6 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="put the measured times into FILE as wcet_ns, which nothing enforces",
     )
     parser.add_argument(
+        "--suppose",
+        action="append",
+        default=[],
+        metavar="COMPONENT.STATE=TIME",
+        help="as if a state took this long, e.g. guidance.Planning=20ms; may be repeated",
+    )
+    parser.add_argument(
         "--wakeup-us",
         type=float,
         default=0.0,
@@ -59,6 +66,7 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.analysis.bounds import Subject, bounds_of  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.verdict import Outcome, judge  # noqa: PLC0415
+    from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
 
     if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
         print(f"mauve: --margin: expected 1 or more, found {args.margin:g}", file=sys.stderr)
@@ -75,6 +83,7 @@ def main(args: argparse.Namespace) -> int:
         declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
         if args.write:
             _write(Path(args.target), declared, machines)
+    machines = with_supposed(machines, args.suppose)
     wakeup_ns = round(args.wakeup_us * 1e3)
     subjects = [Subject.of(machine) for machine in machines]
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)

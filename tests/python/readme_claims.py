@@ -750,6 +750,16 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "mauve analyze robot.yaml --witness DIR": (
         "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
     ),
+    "mauve analyze robot.yaml --suppose guidance.Planning=120ms": (
+        "python/cli/test_analyze.py::test_what_would_be_if_a_state_took_longer",
+        "python/test_schedulability.py::test_a_slow_planner_takes_the_time_of_those_below",
+    ),
+    "[Is my robot schedulable?](docs/howto/is_my_robot_schedulable.md) shows the steps": (
+        "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows",
+    ),
+    "The mission's robot is schedulable by its declared times": (
+        "python/test_schedulability.py::test_the_robot_is_schedulable",
+    ),
     "`schedulable` (exit status 0) is a proof under the conditions that stand below it": (
         "python/cli/test_analyze.py::test_what_is_schedulable_is_so_under_conditions",
         "python/analysis/test_verdict.py::test_no_miss_is_found_where_the_bounds_are_met",

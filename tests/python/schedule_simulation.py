@@ -33,6 +33,7 @@ class Thread:
     steps: deque[Step] = field(default_factory=deque)
     held: list[str] = field(default_factory=list)
     wanted: str = ""
+    wants_since: int = 0
     priority: int = 0
     in_job: bool = False
 
@@ -126,7 +127,7 @@ class _Cpu:
             thread.held.append(resource)
         else:
             self.queues[thread.priority].remove(thread)
-            thread.wanted = resource
+            thread.wanted, thread.wants_since = resource, next(self.order)
             self._inherit()
 
     def _unlock(self, thread: Thread, resource: str) -> None:
@@ -135,7 +136,7 @@ class _Cpu:
         del self.owners[resource]
         waiting = [other for other in self.threads if other.wanted == resource]
         if waiting:
-            first = max(waiting, key=lambda other: other.priority)
+            first = max(waiting, key=lambda other: (other.priority, -other.wants_since))
             first.wanted = ""
             first.steps.popleft()
             first.held.append(resource)

@@ -8,7 +8,7 @@ import networkx as nx
 import pytest
 from analysis_machines import MS, event, execution, machine, wait
 from random_digraphs import random_digraph
-from schedule_simulation import RUN, Release, simulate
+from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step, simulate
 
 from mauve_rt.analysis import Task
 from mauve_rt.analysis.bounds import Subject, bounds_of
@@ -107,6 +107,7 @@ class Drawn:
 
     def __init__(self, random: Random) -> None:
         self.random = random
+        self.before: list[int] = []
 
     def first(self, member: Member) -> tuple[Job, int]:
         return self.random.choice(member.task.jobs), self.random.randint(0, 30)
@@ -119,8 +120,12 @@ class Drawn:
     def late_ns(self) -> int:
         return self.random.choice((0, 0, 2))
 
+    def before_locks_ns(self, left_ns: int) -> int:
+        self.before.append(self.random.randint(0, left_ns))
+        return self.before[-1]
 
-def member(task: DigraphTask, priority: int) -> Member:
+
+def member(task: DigraphTask, priority: int, sections: tuple[tuple[str, int], ...]) -> Member:
     """Each job of a state of its own."""
     states = [
         execution(f"{job.after}-{job.until}", job.until, bound_ms=(job.cost_ns or 0) / MS)
@@ -130,56 +135,75 @@ def member(task: DigraphTask, priority: int) -> Member:
         Job(job.after, (f"{job.after}-{job.until}",), job.cost_ns, job.until, job.separation_ns, 10**9)
         for job in task.jobs
     )
-    return Member(
-        machine(*states, name=task.name, priority=priority, overrun="catch_up"), DigraphTask(task.name, jobs)
-    )
+    one = machine(*states, name=task.name, priority=priority, overrun="catch_up")
+    return Member(one, DigraphTask(task.name, jobs), sections)
 
 
-def random_schedule(seed: int) -> tuple[list[Member], Schedule]:
+def random_schedule(seed: int, *, locks: bool = False) -> tuple[list[Member], Schedule, list[int]]:
+    """The members, what they did, and how long each job executed before its first lock."""
     random = Random(seed)  # noqa: S311 - not for secrets
-    members = [
-        member(random_digraph(random, f"T{number}", share=0.25), random.randint(1, 3)) for number in range(3)
-    ]
-    return members, run(members, Drawn(random), most_jobs=60)
+    members = []
+    for number in range(3):
+        resources = random.sample("AB", random.randint(1, 2)) if locks else []
+        sections = tuple((resource, random.randint(1, 4)) for resource in resources)
+        task = random_digraph(random, f"T{number}", share=0.25)
+        members.append(member(task, random.randint(1, 3), sections))
+    choices = Drawn(random)
+    return members, run(members, choices, most_jobs=60), choices.before
 
 
-def test_runs_are_those_of_the_other_simulation() -> None:
-    compared = 0
-    for seed in range(300):
-        members, schedule = random_schedule(seed)
+def program(cycle: Cycle, sections: tuple[tuple[str, int], ...], before_ns: int) -> list[Step]:
+    """What the other simulation executes."""
+    left_ns, steps = cycle.job.cost_ns or 0, [] if not sections else [(RUN, before_ns)]
+    for resource, most_ns in sections:
+        length_ns = min(most_ns, left_ns)
+        if length_ns:
+            steps += [(LOCK, resource), (RUN, length_ns), (UNLOCK, resource)]
+            left_ns -= length_ns
+    return [*steps, (RUN, left_ns - (before_ns if sections else 0))]
+
+
+@pytest.mark.parametrize("locks", [False, True])
+def test_runs_are_those_of_the_other_simulation(*, locks: bool) -> None:
+    compared = delayed = 0
+    for seed in range(400):
+        members, schedule, before = random_schedule(seed, locks=locks)
         urgency = {one.task.name: one.machine.priority for one in members}
         begins = [(urgency[cycle.component], cycle.ready_ns) for cycle in schedule.cycles]
         if len(set(begins)) < len(begins):
             continue  # who goes first is left open
-        order = {one.task.name: number for number, one in enumerate(members)}
         tasks = [
-            Task(name=name, cpu=0, priority=one.machine.priority, separation_ns=1, cost_ns=1, deadline_ns=1)
-            for name, one in zip(order, members, strict=True)
+            Task(name=name, cpu=0, priority=priority, separation_ns=1, cost_ns=1, deadline_ns=1)
+            for name, priority in urgency.items()
         ]
-        done: dict[str, list[Cycle]] = {name: [] for name in order}
-        for cycle in schedule.cycles:
+        sections = {one.task.name: one.sections for one in members}
+        releases: dict[str, list[Release]] = {name: [] for name in urgency}
+        done: dict[str, list[Cycle]] = {name: [] for name in urgency}
+        for number, cycle in enumerate(schedule.cycles):
+            steps = program(cycle, sections[cycle.component], before[number] if locks else 0)
             done[cycle.component].append(cycle)
-        releases = {
-            name: [
-                Release(one.nominal_ns, max(one.nominal_ns, one.ready_ns), [(RUN, one.job.cost_ns or 0)])
-                for one in cycles
-            ]
-            for name, cycles in done.items()
-        }
+            releases[cycle.component].append(Release(cycle.nominal_ns, cycle.ready_ns, steps))
         expected = simulate(tasks, releases)
         for name, cycles in done.items():
             if cycles and all(one.finish_ns >= 0 for one in cycles):
                 assert max(one.finish_ns - one.nominal_ns for one in cycles) == expected[name], (seed, name)
                 compared += 1
-    assert compared > 150
+        delayed += any(
+            resource and urgency[who] < urgency[cycle.component]
+            for cycle in schedule.cycles
+            if cycle.finish_ns >= 0
+            for who, resource in schedule.shares_ns(cycle)
+        )
+    assert compared > 200
+    assert bool(delayed) == locks, "by a holder of lower priority"
 
 
 def test_one_has_the_processor_and_it_is_one_of_the_most_urgent() -> None:
     for seed in range(200):
-        members, schedule = random_schedule(seed)
+        members, schedule, _ = random_schedule(seed)
         urgency = {one.task.name: one.machine.priority for one in members}
         assert all(one.end_ns <= other.begin_ns for one, other in pairwise(schedule.slices)), seed
-        for name, begin_ns, end_ns in schedule.slices:
+        for name, begin_ns, end_ns, _ in schedule.slices:
             pending = {
                 cycle.component
                 for cycle in schedule.cycles

@@ -148,6 +148,33 @@ def test_the_witness_goes_to_no_place_that_is_taken(analyze: Analyze, tmp_path: 
     assert "exists" in err
 
 
+def test_what_would_be_if_a_state_took_longer(analyze: Analyze) -> None:
+    status, out, _ = analyze(PAIR, "--suppose", "slow.Count=15ms", "--suppose", "quick.Count=3250.0us")
+    assert status == 1
+    assert "  Count: 15.000 ms, supposed\n" in out
+    assert "  Count: 3.250 ms, supposed\n" in out
+    assert "not schedulable: slow misses its deadline" in out
+    assert analyze(PAIR, "--suppose", "slow.Count=1ms")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("word", "problem"),
+    [
+        ("slow.Count", "expected COMPONENT.STATE=TIME as guidance.Plan=5ms, found slow.Count"),
+        ("slow.Count=0ms", "expected COMPONENT.STATE=TIME"),
+        ("slow.Count=-1ms", "expected COMPONENT.STATE=TIME"),
+        ("slow.Count=5", "expected COMPONENT.STATE=TIME"),
+        ("slow.Count=99999999999s", "expected COMPONENT.STATE=TIME"),
+        ("fast.Count=1ms", "no such component; expected one of quick, slow, found fast"),
+        ("slow.Pause=1ms", "no such execution state; expected one of Count, found Pause"),
+    ],
+)
+def test_what_cannot_be_supposed_is_refused(analyze: Analyze, word: str, problem: str) -> None:
+    status, out, err = analyze(PAIR, "--suppose", word)
+    assert (status, out) == (2, "")
+    assert problem in err
+
+
 def test_the_latency_decides(analyze: Analyze) -> None:
     assert analyze(PAIR, "--wakeup-us", "100")[0] == 1
     assert analyze(PAIR, "--wakeup-us", "10")[0] == 0
