@@ -5,11 +5,14 @@ import shlex
 from pathlib import Path
 
 import pytest
+from page_blocks import blocks
 
 from mauve_rt.cli.main import main
+from mauve_rt.model import load_architecture
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs/howto/is_my_robot_schedulable.md"
+BLOCKS = tuple(blocks(PAGE.read_text(encoding="utf-8")))
 
 
 def test_the_commands_of_the_how_to_print_what_it_shows(
@@ -17,13 +20,22 @@ def test_the_commands_of_the_how_to_print_what_it_shows(
 ) -> None:
     (tmp_path / "mauve_examples").symlink_to(ROOT / "mauve_examples")
     monkeypatch.chdir(tmp_path)
-    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE)
-    blocks = [block for language, block in fenced if not language]
-    commands = [shlex.split(block)[1:] for block in blocks if block.startswith("mauve ")]
+    texts = [block.text for block in BLOCKS if not block.language]
+    commands = [shlex.split(text)[1:] for text in texts if text.startswith("mauve ")]
     assert [words[0] for words in commands] == ["analyze", "analyze", "analyze", "report"]
-    shown = [block for block in blocks if not block.startswith("mauve ")]
+    shown = [text for text in texts if not text.startswith("mauve ")]
     for words, status, lines in zip(commands[1:3], (0, 1), shown, strict=True):
         assert main(words) == status
         assert lines.rstrip("\n") in re.sub(r"(?<=ms:) ", "\n", capsys.readouterr().out)
     assert main(commands[3]) == 0
     assert (tmp_path / "slow/report.html").stat().st_size > 0
+
+
+def test_the_pieces_of_files_are_accepted(tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    pieces = [block.text for block in BLOCKS if block.language == "yaml"]
+    for piece in pieces:
+        parts = piece.replace("...", "shell: a/A, core: a/A, fsm: a/A")
+        file.write_text(f"mauve: 1\ncomponents:\n  {parts}", encoding="utf-8")
+        assert [*load_architecture(file).components] == ["control"]
+    assert len(pieces) == 2

@@ -17,6 +17,7 @@ PAGES = {
     for file in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 }
 README = "python/project/test_readme_examples.py::test_"
+HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
 
 # Of each page: words that stand in one of its blocks only, and the tests that run that block.
 RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
@@ -82,6 +83,16 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "find_package(mauve_rt REQUIRED)": (
             "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
         ),
+    },
+    "docs/howto/is_my_robot_schedulable.md": {
+        "cpus: [1]": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
+        "deadline_ns: 5000000": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
+        "--budget-from BAG": ("ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",),
+        "--wakeup-us 1000": (HOWTO_ANALYZE,),
+        "schedulable: every component": (HOWTO_ANALYZE,),
+        "--suppose guidance.Planning=120ms": (HOWTO_ANALYZE,),
+        "not schedulable: mapping": (HOWTO_ANALYZE,),
+        "mauve report slow": (HOWTO_ANALYZE,),
     },
     "docs/rules.md": {
         "name: link_lost": (
