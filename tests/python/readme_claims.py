@@ -1,19 +1,49 @@
-"""What README claims, and what fails when a claim is false.
+"""What README and the pages of docs/ claim, and what fails when a claim is false.
 
-A claim is quoted in README's own words. Its proofs are tests, programs and rows of scripts/bench: proofs.py.
-test_readme_claims.py holds this table to README and to what there is, and README to this table.
+A claim is quoted in the page's own words. Its proofs are tests, `stage/room/test_file.py::test_name` below
+tests/ or mauve_examples/tests/, or `Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows
+of scripts/bench, `bench: WORDS`.
+test_readme_claims.py holds this table to the pages and to what there is, and these pages to this table.
 """
+
+PAGES_OF_CLAIMS = (
+    "README.md",
+    *(
+        f"docs/concepts/{name}.md"
+        for name in (
+            "components",
+            "deployment",
+            "faults",
+            "performance",
+            "replacing",
+            "resources",
+            "rules_overview",
+            "source_tree",
+            "traces",
+        )
+    ),
+    *(
+        f"docs/howto/{name}.md"
+        for name in ("install", "operate", "realtime_rights", "record_and_report", "write_a_core")
+    ),
+)
+"""Each sentence of these is in the table. Of other pages only what is quoted."""
+
 
 _REPORT = "python/trace/report/test"
 _KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
 
 CLAIMS: dict[str, tuple[str, ...]] = {
     # ---- the beginning
-    "the control loops keep their rhythm": (
+    "Rewire and re-implement a robot's software while it runs": (
+        "ctest: sensor_breaks",
+        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
+    ),
+    "The control loops keep their rhythm": (
         "Rule7Simulated.ThousandsOfCommitsAtRandomInstantsChangeNothingOfTheRhythm",
         "bench: , nominal phase error",
     ),
-    "a replaced core keeps its component waiting for some microseconds, and no component misses a release": (
+    "A replaced core keeps its component waiting for some microseconds, and no component misses a release": (
         "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
         "bench: replace core of a running 1 kHz component with 100 us of work",
         "bench: , releases missed",
@@ -25,9 +55,18 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "replaces a component's algorithm in flight": (
         "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
-    "supervisor that degrades gracefully": (
-        "ros/supervisor/test_executor.py::test_a_core_is_replaced_in_flight_and_back",
+    "at the pending instant, with the old one's state, and without a missed release": (
+        "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
+        "python/project/test_readme_examples.py::test_the_smallest_component_is_replaced_live",
     ),
+    "MAUVE RT connects to theirs by topics and services": (
+        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
+    ),
+    "In C++ it is the same three parts": (
+        "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
+    ),
+    "with a search that needs no network": ("python/project/test_docs.py::test_the_search_works_from_files",),
+    "degrades by rules": ("ros/supervisor/test_executor.py::test_a_core_is_replaced_in_flight_and_back",),
     "rosbags from which timing is proved": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
@@ -754,7 +793,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/cli/test_analyze.py::test_what_would_be_if_a_state_took_longer",
         "python/test_schedulability.py::test_a_slow_planner_takes_the_time_of_those_below",
     ),
-    "[Is my robot schedulable?](docs/howto/is_my_robot_schedulable.md) shows the steps": (
+    "[Is my robot schedulable?](../howto/is_my_robot_schedulable.md) shows the steps": (
         "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows",
     ),
     "The mission's robot is schedulable by its declared times": (
@@ -1026,6 +1065,30 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "*From the trace of a demo on 2026-11-26",
+    "Each tick is a release",
+    "The replaced component was held for 14 us",
+    "All else:",
+    "[install](docs/howto/install.md)",
+    "The demo ends with:",
+    "**Yes**, if your robot must change its software while it moves",
+    "**No**, or not alone, where:",
+    "you need a hard guarantee on a virtual machine",
+    "Use PREEMPT_RT on real hardware",
+    "SIGSEGV and abort do",
+    "Put such code into an executor of its own",
+    "[write a core, and replace it live](docs/howto/write_a_core.md)",
+    "| | replaces an algorithm that runs",
+    "| ros2_control | switches controllers",
+    "| Nav2 lifecycle manager |",
+    "| Orocos RTT |",
+    "| copper-rs |",
+    "Each row is meant to be one that its authors would sign",
+    "If a row is wrong, please open an issue",
+    "| | |",
+    "| do | [install]",
+    "| understand | [components]",
+    "| look up | [rules]",
     "On the disk the demo takes",  # figures of one day
     "`scripts/lint` takes 0.3 GB more",
     "The demo's verdict is about its supervisors' swaps",

@@ -9,13 +9,10 @@ from pathlib import Path
 
 import pytest
 from page_blocks import Block, blocks
+from pages import PAGES
 from proofs import is_there
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = {
-    str(file.relative_to(ROOT)): file.read_text(encoding="utf-8")
-    for file in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-}
 README = "python/project/test_readme_examples.py::test_"
 HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
 
@@ -26,6 +23,30 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
             "system/test_demo_mission.py::test_it_succeeds_and_says_so",
             "python/project/test_readme_scripts.py::test_every_folder_of_tests_is_a_stage",
         ),
+        "import time": (f"{README}the_smallest_component_is_replaced_live",),
+    },
+    "docs/concepts/resources.md": {
+        "scan:  {kind: shared_data": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "lamp:  {kind: client": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+    },
+    "docs/concepts/timing_proof.md": {
+        "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+    },
+    "docs/howto/is_my_robot_schedulable.md": {
+        "mauve analyze robot.yaml --witness DIR": (
+            "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
+            "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
+        ),
+        "cpus: [1]": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
+        "deadline_ns: 5000000": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
+        "--budget-from BAG": ("ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",),
+        "--wakeup-us 1000": (HOWTO_ANALYZE,),
+        "schedulable: every component": (HOWTO_ANALYZE,),
+        "--suppose guidance.Planning=120ms --witness slow": (HOWTO_ANALYZE,),
+        "not schedulable: mapping": (HOWTO_ANALYZE,),
+        "mauve report slow": (HOWTO_ANALYZE,),
+    },
+    "docs/howto/operate.md": {
         "mauve list /robot_1/executor": (
             f"{README}every_command_is_one_that_mauve_takes",
             "ros/cli/test_verbs.py::test_verbs_do_what_they_say",
@@ -53,6 +74,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         ),
         "executor: {diagnostics:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
         "printf 'force: true": ("ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",),
+    },
+    "docs/howto/record_and_report.md": {
         "mauve record start": (
             f"{README}every_command_is_one_that_mauve_takes",
             f"{README}service_calls_have_fields_of_their_services",
@@ -68,13 +91,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "# writes DIR/report.html": (
             "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
         ),
-        "mauve analyze robot.yaml --witness DIR": (
-            "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
-            "ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",
-        ),
-        "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
-        "scan:  {kind: shared_data": (f"{README}the_pieces_of_architecture_files_are_accepted",),
-        "lamp:  {kind: client": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+    },
+    "docs/howto/write_a_core.md": {
         "struct MetronomeShell": (f"{README}listings_stand_in_the_sources",),
         "class Metronome(mauve_rt.api.Core)": (f"{README}listings_stand_in_the_sources",),
         "architecture/metronome.yaml": (
@@ -83,16 +101,6 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "find_package(mauve_rt REQUIRED)": (
             "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
         ),
-    },
-    "docs/howto/is_my_robot_schedulable.md": {
-        "cpus: [1]": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
-        "deadline_ns: 5000000": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
-        "--budget-from BAG": ("ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",),
-        "--wakeup-us 1000": (HOWTO_ANALYZE,),
-        "schedulable: every component": (HOWTO_ANALYZE,),
-        "--suppose guidance.Planning=120ms": (HOWTO_ANALYZE,),
-        "not schedulable: mapping": (HOWTO_ANALYZE,),
-        "mauve report slow": (HOWTO_ANALYZE,),
     },
     "docs/rules.md": {
         "name: link_lost": (

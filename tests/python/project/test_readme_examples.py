@@ -1,4 +1,4 @@
-"""README's examples do what it says: its commands, files and programs are taken from it and tried."""
+"""Examples of README and docs/ do what they say: commands, files and programs are taken from there."""
 
 import ast
 import importlib
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from page_blocks import blocks
+from pages import ALL, PAGES
 from synthetic_traces import deploy, run
 
 from mauve_examples.figures import page
@@ -23,8 +24,8 @@ from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 ROOT = Path(__file__).parents[3]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = tuple(blocks(README))
+README = ALL  # and what it links to
+BLOCKS = tuple(block for page in PAGES.values() for block in blocks(page))
 INSTALLED = Path(_kernel.__file__).resolve().parents[4]
 ROBOT = ROOT / "mauve_examples" / "architecture" / "robot.yaml"
 COMPONENTS = "mauve: 1\ncomponents:\n  one: {shell: a/A, core: a/A, fsm: a/A}\n"
@@ -136,6 +137,15 @@ def test_the_report_is_written_from_python(
     assert (tmp_path / "report.html").stat().st_size > 10_000
 
 
+def test_the_smallest_component_is_replaced_live(capsys: pytest.CaptureFixture[str]) -> None:
+    program = _fenced("python", "class Up(Core[Shell])")
+    assert len(program.splitlines()) <= 25 + 4, "with its imports"
+    exec(compile(program, "README.md", "exec"), {"__name__": "example"})  # noqa: S102
+    missed, _, _, _, count = capsys.readouterr().out.split()
+    assert int(missed) >= 0
+    assert 0 < int(count) < 500, "it went on from the old core's count, downwards"
+
+
 def _lines_not_in(listing: str, source: Path, *, but: Sequence[str]) -> list[str]:
     present = {line.strip() for line in source.read_text(encoding="utf-8").splitlines()}
     lines = [line.strip() for line in listing.splitlines() if not any(word in line for word in but)]
@@ -200,7 +210,7 @@ def test_the_folders_of_the_house_are_there() -> None:
 
 def test_files_that_readme_names_are_there() -> None:
     folders = "mauve_\\w+|tests|docs|benchmarks|scripts"
-    named = re.findall(rf"[`(]((?:{folders})/[\w./]*(?:\.\w+|/))[`)]", README)
+    named = re.findall(rf"[`(]((?:{folders})/[\w./]*(?:\.\w+|/))[`)]", PAGES["README.md"])
     assert len(named) > 15
     assert [name for name in named if not (ROOT / name).exists()] == []
 

@@ -13,7 +13,7 @@ from mauve_msgs.msg import ReconfigurationStep
 from mauve_msgs.srv import ListComponents, Reconfigure
 
 NODE = "/robot_1/executor"
-README = Path(__file__).parents[3] / "README.md"
+OPERATE = Path(__file__).parents[3] / "docs/howto/operate.md"
 LAMP = """\
   lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp}}
   spare: {kind: shared_data, type: std_msgs/msg/Float64}
@@ -92,7 +92,7 @@ def test_mauve_list_shows_what_is_connected(executor: Any, domain: int) -> None:
 
 
 def test_the_interface_is_the_one_that_readme_lists(executor: Any, graph: Any) -> None:
-    told = re.search(r"Its interface is in `mauve_msgs`\s+\((.*?)\)", README.read_text("utf-8"), re.DOTALL)
+    told = re.search(r"Its interface is in `mauve_msgs`\s+\((.*?)\)", OPERATE.read_text("utf-8"), re.DOTALL)
     assert told is not None
     names = {name.replace("~", NODE) for name in re.findall(r"`(\S+)`", told[1])}
     assert len(names) >= 10
