@@ -149,8 +149,8 @@ class Machine:
 
     def with_holds(self, times: Mapping[str, ExecutionTime]) -> Self:
         """The same, with these times by resource for locks of which no time is declared."""
-        known = {name: times[name] for name in self.undeclared_locks if name in times}
-        added = (Hold(name, time.ns, time.origin) for name, time in known.items() if time.ns)
+        known = {name: times[name] for name in self.undeclared_locks if name in times and times[name].ns}
+        added = (Hold(name, time.ns or 0, time.origin) for name, time in known.items())
         holds = sorted((*self.holds, *added), key=lambda hold: hold.resource)
         rest = tuple(name for name in self.undeclared_locks if name not in known)
         return replace(self, holds=tuple(holds), undeclared_locks=rest)

@@ -168,7 +168,8 @@ def _is_python(part: Any, index: Any) -> bool | None:
 def _budgets(path: Path, margin: float) -> "tuple[Mapping[str, Budgets], Budgets]":
     """What was measured: by component and state, and by resource the longest call of one of its services.
 
-    Preemption is in both, in a call the wait for the lock too: too much rather than too little.
+    Preemption is in both, in a call the wait for the lock too: too much rather than too little. A trace has
+    the calls of call ports only: a resource that is only read and written has no measured time.
     """
     import mauve_rt.trace  # noqa: PLC0415
     from mauve_rt.analysis.machines import ExecutionTime  # noqa: PLC0415

@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from synthetic_traces import deploy, record, run
 
 from mauve_rt.cli.main import main
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 Analyze = Callable[..., tuple[int, str, str]]
 
@@ -174,6 +177,25 @@ def test_a_resource_that_two_share_without_a_lock_is_not_named(analyze: Analyze)
     text = SHARED.replace("other: {kind: shared_data", "other: {kind: latest_value")
     _, out, _ = analyze(text)
     assert "for no time" not in out
+
+
+def test_a_lock_that_nobody_declares_takes_the_longest_measured_call(
+    analyze: Analyze, tmp_path: Path
+) -> None:
+    source = SyntheticSource(["quick", "slow"])
+    for component, held_ns in (("quick", 700), ("slow", 900_000)):
+        deploy(source, component)
+        begin_ns = run(source, component, 3)
+        source.add(component, Kind.SERVICE_BEGIN, begin_ns, name="number.read")
+        source.add(component, Kind.SERVICE_END, begin_ns + held_ns, name="number.read")
+    bag = record(source, tmp_path / "bag")
+    text = SHARED.replace(", longest_hold_ns: 1100000", "")
+    _, out, _ = analyze(text, "--budget-from", str(bag), "--margin", "2")
+    assert "  holds the lock of number up to 1.800 ms, measured in bag (n = 2) x 2\n" in out
+    assert "is met, blocked up to 1.800 ms\n" in out
+    assert "  components hold the locks of other for no time: no longest_hold_ns is declared\n" in out
+    _, out, _ = analyze(SHARED, "--budget-from", str(bag), "--margin", "2")
+    assert "  holds the lock of number up to 1.100 ms, declared\n" in out, "what is declared stays"
 
 
 def test_what_is_not_says_who_misses_when_and_why_and_shows_it(analyze: Analyze, tmp_path: Path) -> None:
