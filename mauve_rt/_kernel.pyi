@@ -104,6 +104,7 @@ class PortDescription:
     service: Final[str]
     required: Final[bool]  # told of a shell's ports, not of a component's
     messages: Final[list[MessageShape]]  # likewise
+    longest_hold_ns: Final[int]  # for how long a user holds its resource's lock; 0: not declared
 
 @final
 class PropertyDescription:
@@ -138,6 +139,7 @@ class ResourceDescription:
     kind: Final[str]  # a given kind, or the plug-in's name
     type: Final[str]
     services: Final[list[ServiceDescription]]
+    longest_hold_ns: Final[int]  # for how long a user holds its lock; 0: not declared
 
 @final
 class ExecutionTimeDescription:
@@ -492,7 +494,9 @@ class Transaction:
         """It arrives STOPPED; a start step starts it."""
     def remove_component(self, name: str) -> Transaction: ...
     @overload
-    def add_resource(self, name: str, resource: AnyResource, *, topic: str = "") -> Transaction: ...
+    def add_resource(
+        self, name: str, resource: AnyResource, *, topic: str = "", longest_hold_ns: int = 0
+    ) -> Transaction: ...
     @overload
     def add_resource(
         self,
@@ -501,6 +505,7 @@ class Transaction:
         kind: str,
         type: str = "",
         topic: str = "",
+        longest_hold_ns: int = 0,
         **parameters: PropertyValue,
     ) -> Transaction:
         """As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''."""
@@ -556,7 +561,7 @@ class Architecture:
         """`fallback`: the core that takes over after a fault."""
     def component(self, name: str) -> Component: ...
     @overload
-    def add_resource(self, name: str, resource: AnyResource) -> None: ...
+    def add_resource(self, name: str, resource: AnyResource, *, longest_hold_ns: int = 0) -> None: ...
     @overload
     def add_resource(
         self,
@@ -564,9 +569,14 @@ class Architecture:
         *,
         kind: str,
         type: str = "",
+        longest_hold_ns: int = 0,
         **parameters: PropertyValue,
     ) -> None:
-        """Adds a resource of a kind; PluginRegistry.resource_kind tells its parameters."""
+        """Adds a resource of a kind; PluginRegistry.resource_kind tells its parameters.
+
+        `longest_hold_ns`: the longest execution for which one user holds its lock, for the timing analysis:
+        nothing enforces it. 0: what the resource's own code declares.
+        """
     def connect(self, component: str, port: str, resource: str, service: str) -> None: ...
     def commit(self, transaction: Transaction) -> TransactionReport:
         """Carries out a transaction, by the host if there is one; as Host.commit."""

@@ -10,14 +10,38 @@ priority and resources, which is never above the smaller one of the two sums of 
 
 from collections.abc import Iterable, Sequence
 from graphlib import CycleError, TopologicalSorter
+from typing import Protocol
 
 import networkx as nx
 
 from mauve_rt.analysis.errors import AnalysisError
-from mauve_rt.analysis.task import Task
+from mauve_rt.analysis.task import CriticalSection
 
 
-def ceilings(tasks: Iterable[Task]) -> dict[str, int]:
+class LockUser(Protocol):
+    """A task that locks resources: a sporadic `Task`, or a component of `digraph_times`."""
+
+    @property
+    def name(self) -> str:
+        """Unique on its CPU."""
+
+    @property
+    def priority(self) -> int:
+        """As for SCHED_FIFO."""
+
+    @property
+    def sections(self) -> tuple[CriticalSection, ...]:
+        """The critical sections of a job."""
+
+
+def shares_a_resource(task: LockUser, tasks: Iterable[LockUser]) -> bool:
+    """Whether another task locks a resource that the task locks: its thread can then leave the queue."""
+    own = {section.resource for section in task.sections}
+    others = (section.resource for other in tasks if other is not task for section in other.sections)
+    return any(resource in own for resource in others)
+
+
+def ceilings(tasks: Iterable[LockUser]) -> dict[str, int]:
     """The highest priority that a holder of each resource can inherit.
 
     That is the highest priority of the tasks that lock the resource. A resource that is locked inside
@@ -53,7 +77,7 @@ def ceilings(tasks: Iterable[Task]) -> dict[str, int]:
     return found
 
 
-def blocking_ns(task: Task, tasks: Sequence[Task]) -> int:
+def blocking_ns(task: LockUser, tasks: Sequence[LockUser]) -> int:
     """The longest time (ns) for which tasks of lower priority run in one busy window of a task.
 
     A section blocks if its task has a lower priority and its resource a ceiling of at least the task's

@@ -5,6 +5,10 @@ paths of all tasks that delay a job are few, each combination of them is tried: 
 the most that it can ask for counts, which may be of one path at one instant and of another at the next:
 sound, and more than one run can show.
 
+Components share resources, whose mutexes inherit priorities: `blocking` bounds how long components of lower
+priority run in a busy window. A thread that waits for a lock leaves the kernel's queue, so for a component
+that shares a resource all others of its priority count as higher, as in `fixed_priority`.
+
 Source: Stigge, Yi, "Combinatorial Abstraction Refinement for Feasibility Analysis of Static Priorities",
 Real-Time Systems 51, 2015: its abstract test and its exact one, without the refinement between the two.
 """
@@ -14,8 +18,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product, takewhile
 
+from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
 from mauve_rt.analysis.demand import Demand, Path, Staircase, cost_of, paths, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.task import CriticalSection
 from mauve_rt.analysis.window import UnboundedError, least_time_ns
 
 _MOST_COMBINATIONS = 64
@@ -27,6 +33,13 @@ class Component:
 
     task: DigraphTask
     priority: int
+    sections: tuple[CriticalSection, ...] = ()
+    """Of any of its jobs."""
+
+    @property
+    def name(self) -> str:
+        """The task's."""
+        return self.task.name
 
 
 @dataclass(frozen=True)
@@ -44,6 +57,8 @@ class DigraphTimes:
     jobs: tuple[JobTime, ...] = ()
     reason: str = ""
     """Why there are none."""
+    blocking_ns: int = 0
+    """For how long components of lower priority run in a busy window, as far as they hold locks."""
 
     @property
     def response_ns(self) -> int | None:
@@ -52,10 +67,15 @@ class DigraphTimes:
 
 
 def digraph_times(components: Sequence[Component], *, jitter_ns: int = 0) -> dict[str, DigraphTimes]:
-    """The bounds of all components of one CPU, by name; each release is delayed by up to `jitter_ns`."""
-    demands = {one.task.name: Demand(one.task, jitter_ns=jitter_ns) for one in components}
-    loads = {one.task.name: utilization_of(one.task) for one in components}
-    return {one.task.name: _times(one, components, demands, loads, jitter_ns) for one in components}
+    """The bounds of all components of one CPU, by name; each release is delayed by up to `jitter_ns`.
+
+    Raises:
+        AnalysisError: as for `ceilings`.
+
+    """
+    demands = {one.name: Demand(one.task, jitter_ns=jitter_ns) for one in components}
+    loads = {one.name: utilization_of(one.task) for one in components}
+    return {one.name: _times(one, components, demands, loads, jitter_ns) for one in components}
 
 
 def _times(
@@ -65,14 +85,21 @@ def _times(
     loads: Mapping[str, Fraction],
     jitter_ns: int,
 ) -> DigraphTimes:
-    higher = [other.task.name for other in components if other.priority > one.priority]
-    equal = [other.task.name for other in components if other.priority == one.priority and other is not one]
-    load = sum((loads[name] for name in (*higher, *equal, one.task.name)), start=Fraction(0))
+    higher = [other.name for other in components if other.priority > one.priority]
+    equal = [other.name for other in components if other.priority == one.priority and other is not one]
+    if shares_a_resource(one, components):
+        higher, equal = [*higher, *equal], []
+    load = sum((loads[name] for name in (*higher, *equal, one.name)), start=Fraction(0))
+    blocked_ns = blocking_ns(one, components)
     if load >= 1:
-        return DigraphTimes(reason=f"the utilization at this priority is {float(load):.4g}: nothing is left")
+        reason = f"the utilization at this priority is {float(load):.4g}: nothing is left"
+        return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
     try:
         level = _Level(
-            demands[one.task.name], [demands[name] for name in higher], [demands[name] for name in equal]
+            demands[one.name],
+            [demands[name] for name in higher],
+            [demands[name] for name in equal],
+            blocking_ns=blocked_ns,
         )
         end_ns = level.window_ns
         longest: dict[Job, int] = {}
@@ -81,8 +108,8 @@ def _times(
             response_ns = level.finish_ns(path) - arrival_ns
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
     except UnboundedError as reason:
-        return DigraphTimes(reason=str(reason))
-    return DigraphTimes(tuple(JobTime(job, longest[job]) for job in one.task.jobs))
+        return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
+    return DigraphTimes(tuple(JobTime(job, longest[job]) for job in one.task.jobs), blocking_ns=blocked_ns)
 
 
 def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
@@ -93,12 +120,16 @@ def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
 class _Level:
     """What can delay the jobs of a task."""
 
-    def __init__(self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand]) -> None:
+    def __init__(
+        self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand], *, blocking_ns: int
+    ) -> None:
         everything = (own, *higher, *equal)
-        self.window_ns = least_time_ns(lambda length_ns: sum(one.in_ns(length_ns) for one in everything), 1)
-        """The longest busy window: the least L > 0 with the demand of all in [0, L) <= L."""
+        self.window_ns = least_time_ns(
+            lambda length_ns: blocking_ns + sum(one.in_ns(length_ns) for one in everything), 1
+        )
+        """The longest busy window: the least L > 0 with blocking + the demand of all in [0, L) <= L."""
         each = _of_each_path((*higher, *equal), self.window_ns)
-        self._delays = [_Delay(one[: len(higher)], one[len(higher) :]) for one in each]
+        self._delays = [_Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
 
     def finish_ns(self, path: Path) -> int:
         """When the last job of a path is done at the latest, from the window's start on."""
@@ -120,22 +151,23 @@ def _of_each_path(demands: Sequence[Demand], until_ns: int) -> list[tuple[Stairc
 
 @dataclass(frozen=True)
 class _Delay:
-    """The jobs of other tasks, by one combination of their paths."""
+    """The jobs of other tasks, by one combination of their paths, and those of lower priority that block."""
 
     higher: tuple[Staircase, ...]
     equal: tuple[Staircase, ...]
+    blocking_ns: int
 
     def finish_ns(self, path: Path) -> int:
         """As _Level's."""
         equal_ns = 0
         if self.equal:
-            before_ns = path.work_ns - cost_of(path.job)
+            before_ns = self.blocking_ns + path.work_ns - cost_of(path.job)
             others = (*self.higher, *self.equal)
             start_ns = least_time_ns(
                 lambda time_ns: before_ns + sum(one.until_ns(time_ns) for one in others), before_ns
             )
             equal_ns = sum(one.until_ns(start_ns) for one in self.equal)
-        fixed_ns = path.work_ns + equal_ns
+        fixed_ns = self.blocking_ns + path.work_ns + equal_ns
         return least_time_ns(
             lambda end_ns: fixed_ns + sum(one.in_ns(end_ns) for one in self.higher), fixed_ns
         )

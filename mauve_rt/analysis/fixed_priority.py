@@ -20,7 +20,7 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from mauve_rt.analysis.blocking import blocking_ns
+from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
 from mauve_rt.analysis.errors import AnalysisError
 from mauve_rt.analysis.task import Task
 from mauve_rt.analysis.window import Arrivals, Level, UnboundedError, job_bounds, window_ns
@@ -154,8 +154,7 @@ def _bound(task: Task, level: Level) -> ResponseTime:
 
 def _stays_in_queue(task: Task, tasks: list[Task]) -> bool:
     """Whether the thread of a task is in the queue from release to finish."""
-    shared = {name for other in tasks if other is not task for name in other.resources}
-    return not task.waits_ns and not task.resources & shared
+    return not task.waits_ns and not shares_a_resource(task, tasks)
 
 
 def _without_broken_assumptions(bounds: list[ResponseTime]) -> list[ResponseTime]:

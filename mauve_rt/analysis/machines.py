@@ -61,6 +61,24 @@ def _declared_time(told: Any) -> ExecutionTime:
 
 
 @dataclass(frozen=True)
+class Hold:
+    """A resource whose lock the component holds for a time, and who says so."""
+
+    resource: str
+    longest_ns: int
+    """Execution of one user, from lock to unlock."""
+    origin: str = "declared"
+
+    def __str__(self) -> str:
+        """As `map up to 2.000 ms, declared`."""
+        return f"{self.resource} up to {in_ms(self.longest_ns)}, {self.origin}"
+
+
+_WITHOUT_LOCK = ("latest_value",)
+"""Kinds of resources: users do not wait for each other."""
+
+
+@dataclass(frozen=True)
 class Machine:
     """One component. Times in ns."""
 
@@ -80,10 +98,26 @@ class Machine:
     states: tuple[State, ...]
     is_python: bool | None = None
     """Whether it runs under the interpreter's lock; None: nobody knows."""
+    holds: tuple[Hold, ...] = ()
+    """Of the resources that its ports are connected to, those that declare for how long a lock is held."""
+    undeclared_locks: tuple[str, ...] = ()
+    """The others of these resources, as far as they have a lock."""
 
     @classmethod
-    def of(cls, told: Any, *, states: Sequence[Any] | None = None, is_python: bool | None = None) -> Self:
-        """Of a mauve_msgs/msg/ComponentInfo, or what has the same fields."""
+    def of(
+        cls,
+        told: Any,
+        *,
+        states: Sequence[Any] | None = None,
+        is_python: bool | None = None,
+        kinds: Mapping[str, str] | None = None,
+    ) -> Self:
+        """Of a mauve_msgs/msg/ComponentInfo, or what has the same fields.
+
+        `kinds`: of resources, by name; each resource of an unknown kind has a lock.
+        """
+        ports = (port for port in getattr(told, "ports", ()) if port.resource)
+        times = {port.resource: int(getattr(port, "longest_hold_ns", 0)) for port in ports}
         return cls(
             name=told.name,
             cpus=tuple(int(cpu) for cpu in told.cpus),
@@ -95,6 +129,12 @@ class Machine:
             overrun=told.overrun,
             states=tuple(State.of(state) for state in (told.states if states is None else states)),
             is_python=is_python,
+            holds=tuple(Hold(resource, time_ns) for resource, time_ns in sorted(times.items()) if time_ns),
+            undeclared_locks=tuple(
+                resource
+                for resource, time_ns in sorted(times.items())
+                if not time_ns and (kinds or {}).get(resource) not in _WITHOUT_LOCK
+            ),
         )
 
     def with_budgets(self, budgets: Mapping[str, ExecutionTime]) -> Self:
@@ -106,6 +146,19 @@ class Machine:
             for state in self.states
         )
         return replace(self, states=tuple(states))
+
+    def with_holds(self, times: Mapping[str, ExecutionTime]) -> Self:
+        """The same, with these times by resource for locks of which no time is declared."""
+        known = {name: times[name] for name in self.undeclared_locks if name in times and times[name].ns}
+        added = (Hold(name, time.ns or 0, time.origin) for name, time in known.items())
+        holds = sorted((*self.holds, *added), key=lambda hold: hold.resource)
+        rest = tuple(name for name in self.undeclared_locks if name not in known)
+        return replace(self, holds=tuple(holds), undeclared_locks=rest)
+
+    @property
+    def resources(self) -> set[str]:
+        """Those whose locks it holds for a time."""
+        return {hold.resource for hold in self.holds}
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -1,16 +1,20 @@
 """What keeps a component's timing from being proved: said, never guessed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.locks import named_twice
+from mauve_rt.analysis.machines import Machine, in_ms
 
 _RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
 _CPU = Path("/proc/cpuinfo")
 
 
-def obstacles(machine: Machine) -> Iterator[str]:
-    """Why nothing can be proved of a component, each with what would help."""
+def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]:
+    """Why nothing can be proved of a component, each with what would help.
+
+    `others`: components of the same architecture; the component may be among them.
+    """
     if machine.is_python:
         yield "it has parts in Python, which run under the interpreter's lock: write them in C++"
     elif machine.is_python is None:
@@ -25,12 +29,25 @@ def obstacles(machine: Machine) -> Iterator[str]:
     if machine.missing:
         names = ", ".join(machine.missing)
         yield f"no time is known of {names}: declare wcet_ns, or measure (--budget-from BAG)"
+    yield from _shared_with_other_cpus(machine, others)
 
 
-def assumptions_about(*, wakeup_us: float = 0.0, sender_priority: int = 1) -> Iterator[str]:
-    """What a proof for this machine takes for granted, each as what stands behind an `if`."""
+def _shared_with_other_cpus(machine: Machine, others: Sequence[Machine]) -> Iterator[str]:
+    """The bound on blocking is for one CPU. Of a component that may run on any CPU this is said already."""
+    elsewhere = [other for other in others if machine.cpus and other.cpus and other.cpus != machine.cpus]
+    for hold in machine.holds:
+        names = [other.name for other in elsewhere if hold.resource in other.resources]
+        if names:
+            held = f"{hold.resource} (held up to {in_ms(hold.longest_ns)})"
+            yield f"it shares {held} with {', '.join(names)} on another CPU: one CPU for both, or no lock"
+
+
+def assumptions_about(
+    machines: Sequence[Machine], *, wakeup_us: float = 0.0, sender_priority: int = 1
+) -> Iterator[str]:
+    """What a proof for these components takes for granted, each as what stands behind an `if`."""
     yield f"threads begin {wakeup_us:g} us after their instants at the latest (--wakeup-us)"
-    yield "components hold the locks of resources for no time"
+    yield from _about_locks(machines)
     runtime = _RUNTIME.read_text("ascii").strip() if _RUNTIME.exists() else "-1"
     if runtime != "-1":
         yield (
@@ -45,3 +62,12 @@ def assumptions_about(*, wakeup_us: float = 0.0, sender_priority: int = 1) -> It
     yield "- rules (97), when an executor's rule looks or acts"
     yield f"- sender ({sender_priority}), which sends the messages of bound topics"
     yield "- trace (1), which collects records"
+
+
+def _about_locks(machines: Sequence[Machine]) -> Iterator[str]:
+    undeclared = named_twice(resource for machine in machines for resource in machine.undeclared_locks)
+    if undeclared:
+        names = ", ".join(undeclared)
+        yield f"components hold the locks of {names} for no time: no longest_hold_ns is declared"
+    if named_twice(resource for machine in machines for resource in machine.resources):
+        yield "no component holds a lock for longer than longest_hold_ns, or two locks at once"

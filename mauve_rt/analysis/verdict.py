@@ -41,7 +41,7 @@ def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns
     late = [subject for subject in subjects if not bounds[subject.name].meets_deadline]
     for here in by_cpu(subjects):
         if any(subject in late for subject in here):
-            members = [Member(subject.machine, subject.task) for subject in here]
+            members = [_member(subject) for subject in here]
             found = witness_of(members, wakeup_ns=wakeup_ns)
             if found is not None and found.missed is not None:
                 priorities = {subject.name: subject.machine.priority for subject in here}
@@ -53,6 +53,11 @@ def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns
         reasons = "; ".join(_too_long(subject.name, bounds[subject.name]) for subject in late)
         return Verdict(Outcome.NOT_PROVED, f"{reasons}; none of {RUNS} runs misses a deadline")
     return Verdict(Outcome.SCHEDULABLE, "every component meets its deadline")
+
+
+def _member(subject: Subject) -> Member:
+    sections = tuple((section.resource, section.length_ns) for section in subject.sections)
+    return Member(subject.machine, subject.task, sections)
 
 
 def _miss(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> str:

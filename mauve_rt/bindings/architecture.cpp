@@ -84,21 +84,25 @@ void bind_architecture(py::module_& module) {
           py::arg("name"))
       .def(
           "add_resource",
-          [](PyArchitecture& self, const std::string& name, const py::object& resource) {
+          [](PyArchitecture& self, const std::string& name, const py::object& resource,
+             time_ns_t longest_hold_ns) {
             Transaction transaction;
-            transaction.add_resource(name, make_resource(resource, self.registry));
+            transaction.add_resource(name, make_resource(resource, self.registry), TopicBinding::none,
+                                     longest_hold_ns);
             commit_one(self, std::move(transaction));
           },
-          py::arg("name"), py::arg("resource"))
+          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("longest_hold_ns") = 0)
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const std::string& kind, const std::string& type,
-             const py::kwargs& keywords) {
+             time_ns_t longest_hold_ns, const py::kwargs& keywords) {
             Transaction transaction;
-            transaction.add_resource(name, self.registry.make_resource(kind, type, parameters_of(keywords)));
+            transaction.add_resource(name, self.registry.make_resource(kind, type, parameters_of(keywords)),
+                                     TopicBinding::none, longest_hold_ns);
             commit_one(self, std::move(transaction));
           },
-          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "")
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "",
+          py::arg("longest_hold_ns") = 0)
       .def(
           "connect",
           [](PyArchitecture& self, const std::string& component, const std::string& port,

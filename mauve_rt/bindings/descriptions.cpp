@@ -24,9 +24,9 @@ ResourceParameters parameters_of(const py::dict& keywords) {
 std::vector<PortDescription> describe_ports(const Shell& shell) {
   std::vector<PortDescription> ports;
   for (const auto& port : shell.ports()) {
-    auto [resource, service] = port->connected_to();
+    auto [resource, service, longest_hold_ns] = port->connected_to();
     ports.push_back({port->name(), std::string(to_string(port->kind())), port->type(), std::move(resource),
-                     std::move(service), port->is_required(), port->messages()});
+                     std::move(service), port->is_required(), port->messages(), longest_hold_ns});
   }
   return ports;
 }
@@ -47,7 +47,8 @@ PropertyDescription describe_property(const ShownProperty& property) {
 }
 
 ResourceDescription describe_resource(const Resource& resource) {
-  ResourceDescription description{resource.name(), resource.kind(), resource.type(), {}};
+  ResourceDescription description{
+      resource.name(), resource.kind(), resource.type(), {}, resource.longest_hold_ns()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
                                     service->is_call_serializable(), service->messages()});
@@ -71,7 +72,12 @@ ComponentDescription describe_component(Component& component) {
   std::vector<PortDescription> ports;
   ports.reserve(shown.ports.size());
   for (const ShownPort& port : shown.ports)
-    ports.push_back({port.name, std::string(to_string(port.kind)), port.type, port.resource, port.service});
+    ports.push_back({.name = port.name,
+                     .kind = std::string(to_string(port.kind)),
+                     .type = port.type,
+                     .resource = port.resource,
+                     .service = port.service,
+                     .longest_hold_ns = port.longest_hold_ns});
   std::vector<PropertyDescription> properties;
   properties.reserve(shown.properties.size());
   for (const ShownProperty& property : shown.properties) properties.push_back(describe_property(property));
@@ -149,7 +155,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("resource", &PortDescription::resource)
       .def_readonly("service", &PortDescription::service)
       .def_readonly("required", &PortDescription::required)
-      .def_readonly("messages", &PortDescription::messages);
+      .def_readonly("messages", &PortDescription::messages)
+      .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns);
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type)
@@ -181,7 +188,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("name", &ResourceDescription::name)
       .def_readonly("kind", &ResourceDescription::kind)
       .def_readonly("type", &ResourceDescription::type)
-      .def_readonly("services", &ResourceDescription::services);
+      .def_readonly("services", &ResourceDescription::services)
+      .def_readonly("longest_hold_ns", &ResourceDescription::longest_hold_ns);
   using E = ExecutionTimeDescription;
   py::class_<E>(module, "ExecutionTimeDescription")
       .def_readonly("state", &E::state)

@@ -103,24 +103,27 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
       .def("remove_component", collected(&Transaction::remove_component), py::arg("name"))
       .def(
           "add_resource",
-          [](Self self, const std::string& name, const py::object& resource,
-             const std::string& topic) -> Self {
+          [](Self self, const std::string& name, const py::object& resource, const std::string& topic,
+             time_ns_t longest_hold_ns) -> Self {
             const TopicBinding binding = topic_binding(topic);
             return self.add([=](Steps steps, Registry registry) {
-              steps.add_resource(name, make_resource(resource, registry), binding);
+              steps.add_resource(name, make_resource(resource, registry), binding, longest_hold_ns);
             });
           },
-          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("topic") = "")
+          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("topic") = "",
+          py::arg("longest_hold_ns") = 0)
       .def(
           "add_resource",
           [](Self self, const std::string& name, const std::string& kind, const std::string& type,
-             const std::string& topic, const py::kwargs& keywords) -> Self {
+             const std::string& topic, time_ns_t longest_hold_ns, const py::kwargs& keywords) -> Self {
             const TopicBinding binding = topic_binding(topic);
             const ResourceParameters parameters = parameters_of(keywords);
-            return self.add(
-                [=](Steps steps, Registry) { steps.add_resource(name, kind, type, parameters, binding); });
+            return self.add([=](Steps steps, Registry) {
+              steps.add_resource(name, kind, type, parameters, binding, longest_hold_ns);
+            });
           },
-          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "")
+          py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "",
+          py::arg("longest_hold_ns") = 0)
       .def("remove_resource", collected(&Transaction::remove_resource), py::arg("name"))
       .def("start", collected(&Transaction::start), py::arg("component"), py::arg("clock_ns") = std::nullopt)
       .def("stop", collected(&Transaction::stop), py::arg("component"))

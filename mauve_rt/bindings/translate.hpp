@@ -85,6 +85,7 @@ struct PortDescription {
   std::string service;
   bool required{true};
   std::vector<MessageShape> messages{};  // of a shell's; a component's tells none
+  time_ns_t longest_hold_ns{0};
 };
 std::vector<PortDescription> describe_ports(const Shell& shell);
 
@@ -113,6 +114,7 @@ struct ResourceDescription {
   std::string kind;
   std::string type;
   std::vector<ServiceDescription> services;
+  time_ns_t longest_hold_ns;
 };
 ResourceDescription describe_resource(const Resource& resource);
 

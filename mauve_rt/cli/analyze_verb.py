@@ -15,6 +15,9 @@ from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Subject
     from mauve_rt.analysis.machines import ExecutionTime, Machine
+    from mauve_rt.trace.reading.statistics import Distribution
+
+    Budgets = Mapping[str, ExecutionTime]
 
 _LEAST_MARGIN = 1.0
 
@@ -28,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--budget-from",
         type=Path,
         metavar="BAG",
-        help="take times that nobody declares from this bag: the longest that was measured",
+        help="take times that nobody declares from this bag, of states and of locks: the longest measured",
     )
     parser.add_argument(
         "--margin", type=float, default=1.2, metavar="X", help="times this (default 1.2), with --budget-from"
@@ -64,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Print the model and the verdict; returns the exit status: 0 schedulable, 1 not, 3 not proved."""
     from mauve_rt.analysis.bounds import Subject, bounds_of  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.verdict import Outcome, judge  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
@@ -79,16 +83,17 @@ def main(args: argparse.Namespace) -> int:
         return BAD_USAGE
     machines, sender_priority = _machines(args.target)
     if args.budget_from is not None:
-        budgets = _budgets(args.budget_from, args.margin)
+        budgets, holds = _budgets(args.budget_from, args.margin)
         declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
+        machines = with_measured_holds(machines, holds)
         if args.write:
             _write(Path(args.target), declared, machines)
     machines = with_supposed(machines, args.suppose)
     wakeup_ns = round(args.wakeup_us * 1e3)
-    subjects = [Subject.of(machine) for machine in machines]
+    subjects = [Subject.of(machine, machines) for machine in machines]
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
     verdict = judge(subjects, bounds, wakeup_ns=wakeup_ns)
-    assumptions = [*assumptions_about(wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
+    assumptions = [*assumptions_about(machines, wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
     if args.json:
         parts = [{**_as_json(subject), "response": asdict(bounds[subject.name])} for subject in subjects]
         judged = {"outcome": verdict.outcome, "sentence": verdict.sentence}
@@ -126,8 +131,9 @@ def _of_file(path: Path) -> "tuple[list[Machine], int]":
     index = PluginIndex.installed()
     architecture = build(model, PluginRegistry(), index=index)
     states = previewed_states(model, architecture)
+    kinds = {resource.name: resource.kind for resource in architecture.resources()}
     machines = [
-        Machine.of(part, states=states[part.name], is_python=_is_python(part, index))
+        Machine.of(part, states=states[part.name], is_python=_is_python(part, index), kinds=kinds)
         for part in architecture.components()
     ]
     return machines, model.sender.priority
@@ -139,7 +145,7 @@ def _of_node(node: str) -> "list[Machine]":
 
     with connected(first=True) as client:
         reply = client.call(ListComponents, f"{node}/list_components", ListComponents.Request())
-    return _of_told(reply.components)
+    return _of_told(reply.components, {resource.name: resource.kind for resource in reply.resources})
 
 
 def _of_bag(path: Path) -> "list[Machine]":
@@ -149,15 +155,15 @@ def _of_bag(path: Path) -> "list[Machine]":
     trace = mauve_rt.trace.open(path)
     if not trace.architecture:
         raise TraceError(f"bag {path}: it does not tell the architecture; record it again with this version")
-    return _of_told(trace.architecture)
+    return _of_told(trace.architecture, {})
 
 
-def _of_told(components: Iterable[Any]) -> "list[Machine]":
+def _of_told(components: Iterable[Any], kinds: Mapping[str, str]) -> "list[Machine]":
     from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
     from mauve_rt.model import PluginIndex  # noqa: PLC0415
 
     index = PluginIndex.installed()
-    return [Machine.of(part, is_python=_is_python(part, index)) for part in components]
+    return [Machine.of(part, is_python=_is_python(part, index), kinds=kinds) for part in components]
 
 
 def _is_python(part: Any, index: Any) -> bool | None:
@@ -168,24 +174,32 @@ def _is_python(part: Any, index: Any) -> bool | None:
     return None if None in plugins else False
 
 
-def _budgets(path: Path, margin: float) -> "Mapping[str, Mapping[str, ExecutionTime]]":
-    """What was measured, by component and state. Preemption is in it: too much rather than too little."""
+def _budgets(path: Path, margin: float) -> "tuple[Mapping[str, Budgets], Budgets]":
+    """What was measured: by component and state, and by resource the longest call of one of its services.
+
+    Preemption is in both, in a call the wait for the lock too: too much rather than too little. A trace has
+    the calls of call ports only: a resource that is only read and written has no measured time.
+    """
     import mauve_rt.trace  # noqa: PLC0415
     from mauve_rt.analysis.machines import ExecutionTime  # noqa: PLC0415
     from mauve_rt.trace.reading.statistics import all_statistics  # noqa: PLC0415
 
+    def budget(*measured: "Distribution") -> ExecutionTime:
+        count, longest_ns = sum(one.count for one in measured), max(one.max_ns for one in measured)
+        origin = f"measured in {path.name} (n = {count:,}) x {margin:g}"
+        return ExecutionTime(math.ceil(longest_ns * margin), origin)
+
     statistics = all_statistics(mauve_rt.trace.open(path))
-    return {
-        component: {
-            state: ExecutionTime(
-                math.ceil(measured.max_ns * margin),
-                f"measured in {path.name} (n = {measured.count:,}) x {margin:g}",
-            )
-            for state, measured in one.execution.items()
-            if measured.count
-        }
+    states = {
+        component: {state: budget(measured) for state, measured in one.execution.items() if measured.count}
         for component, one in statistics.items()
     }
+    calls: dict[str, list[Distribution]] = {}
+    for one in statistics.values():
+        for service, measured in one.services.items():
+            if measured.count:
+                calls.setdefault(service.partition(".")[0], []).append(measured)
+    return states, {resource: budget(*measured) for resource, measured in calls.items()}
 
 
 def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]") -> None:

@@ -15,6 +15,8 @@ def print_model(subjects: Sequence[Subject], bounds: Mapping[str, Bound]) -> Non
         for state in subject.machine.states:
             if not state.is_wait:
                 print(f"  {state.name}: {state.time}")
+        for hold in subject.machine.holds:
+            print(f"  holds the lock of {hold}")
         for job in subject.task.jobs:
             print(f"  job {_job(job)}")
         if not subject.obstacles:
@@ -57,7 +59,9 @@ def _response(bound: Bound) -> str:
     if bound.response_ns is None:
         return f"without a bound: {bound.reason}"
     met = "met" if bound.meets_deadline else "not proved to be met"
-    return f"at most {in_ms(bound.response_ns)}, its deadline of {in_ms(bound.deadline_ns)} is {met}"
+    blocked = f", blocked up to {in_ms(bound.blocking_ns)}" if bound.blocking_ns else ""
+    deadline = f"its deadline of {in_ms(bound.deadline_ns)} is {met}"
+    return f"at most {in_ms(bound.response_ns)}, {deadline}{blocked}"
 
 
 def _job(job: Job) -> str:

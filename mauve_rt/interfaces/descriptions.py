@@ -164,6 +164,7 @@ def _port_info(port: PortDescription) -> Any:
         type=port.type,
         resource=port.resource,
         service=port.service,
+        longest_hold_ns=port.longest_hold_ns,
     )
 
 

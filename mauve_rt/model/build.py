@@ -111,7 +111,12 @@ def add_resource_step(
     """Let a transaction add a resource that `model` describes."""
     resource = model.resources[name]
     direction = resource.topic.direction if resource.topic is not None else ""
-    transaction.add_resource(name, **resource_part(resource, registry), topic=direction)
+    transaction.add_resource(
+        name,
+        **resource_part(resource, registry),
+        topic=direction,
+        longest_hold_ns=resource.longest_hold_ns or 0,
+    )
 
 
 def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]:

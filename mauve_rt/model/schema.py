@@ -25,6 +25,11 @@ a state without `wcet_ns`. `simulated_execution_ns` is what it takes in virtual 
 
     control: {..., deadline_ns: 5000000, states: {Control: {wcet_ns: 200000, max_execution_ns: 1000000}}}
 
+`longest_hold_ns` of a resource is the longest time for which one component holds its lock: the analysis
+takes it, and nothing enforces it. It takes precedence over the time that the resource's code declares:
+
+    map: {kind: mauve_examples/Map, longest_hold_ns: 2000000}
+
 `trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
 does not fit is counted as lost. A state that lasts longer than `hung_after_ms` is told as hung: an error in
 /diagnostics, in ~/state and in the log; without the key after 10 periods, but no sooner than after 1 s.
@@ -223,6 +228,8 @@ class ResourceModel(Section):
     type: str = setting(Text(), default="")
     topic: TopicModel | None = setting(Part(TopicModel), default=None)
     service: ServiceModel | None = setting(Part(ServiceModel), default=None)
+    # For how long one user holds its lock; for the analysis; None: as its code declares.
+    longest_hold_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)
 
     @property
     def parameters(self) -> Mapping[str, Any]:

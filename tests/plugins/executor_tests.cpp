@@ -487,6 +487,7 @@ class Window final : public mauve::Resource {
   explicit Window(const mauve::ResourceParameters& given)
       : Resource("executor_tests/Window", ""), length_s_(mauve::get<double>(given, "length_s")) {
     offer(read);
+    set_longest_hold_ns(3'000'000);
   }
 
  private:

@@ -1,5 +1,6 @@
 """Machines for tests of the analysis, in few words."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,8 +36,21 @@ def _state(name: str, successors: tuple[str, ...], **told: Any) -> SimpleNamespa
     )
 
 
-def machine(*states: SimpleNamespace, is_python: bool | None = False, **told: Any) -> Machine:
+def connected(**longest_hold_ms: float) -> list[SimpleNamespace]:
+    """Ports that are connected to resources, each with the longest time for which a user holds its lock."""
+    return [
+        SimpleNamespace(resource=resource, longest_hold_ns=round(hold_ms * MS))
+        for resource, hold_ms in longest_hold_ms.items()
+    ]
+
+
+def machine(
+    *states: SimpleNamespace,
+    is_python: bool | None = False,
+    kinds: Mapping[str, str] | None = None,
+    **told: Any,
+) -> Machine:
     """One that runs on CPU 0 with priority 50."""
     usual = {"name": "c", "cpus": [0], "priority": 50, "policy": "SCHED_FIFO", "period_ns": 0, "offset_ns": 0}
     component = SimpleNamespace(**{**usual, "deadline_ns": 0, "overrun": "skip", "states": states, **told})
-    return Machine.of(component, is_python=is_python)
+    return Machine.of(component, is_python=is_python, kinds=kinds)

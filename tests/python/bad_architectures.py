@@ -443,6 +443,24 @@ BAD = {
         "$(share nowhere), a package that is not installed",
     ),
     "unknown place": ("lists/a.txt", "$(shore it)/a.txt", "$(shore it)", "known: $(share PACKAGE)"),
+    "hold of zero": (
+        "capacity: 4",
+        "capacity: 4, longest_hold_ns: 0",
+        "0}",
+        "bad longest_hold_ns of resource 'queue': expected at least 1",
+    ),
+    "hold too long": (
+        "capacity: 4",
+        "capacity: 4, longest_hold_ns: 2305843009213693952",
+        "2305843009213693952",
+        "bad longest_hold_ns of resource 'queue': expected at most 2305843009213693951",
+    ),
+    "hold in ms": (
+        "capacity: 4",
+        "capacity: 4, longest_hold_ns: 2.5",
+        "2.5",
+        "bad longest_hold_ns of resource 'queue': expected a whole number, found 2.5",
+    ),
     "syntax": ("resources:", "resources: [}", "}", "not YAML"),
     "tab": ("    core: executor", "\tcore: executor", "\tcore", "not YAML: found character '\\t'"),
 }

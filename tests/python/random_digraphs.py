@@ -1,10 +1,12 @@
 """Random digraph tasks, and runs of them: paths that a component could take."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from random import Random
 
-from schedule_simulation import RUN, Release
+from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step
 
+from mauve_rt.analysis import CriticalSection
 from mauve_rt.analysis.digraph import DigraphTask, Job
 
 
@@ -19,7 +21,22 @@ def random_digraph(random: Random, name: str, *, share: float, most_waits: int =
     return DigraphTask(name, tuple(jobs))
 
 
-def random_run(random: Random, task: DigraphTask, *, until: int, jitter: int, dense: bool) -> list[Release]:
+def random_sections(random: Random, task: DigraphTask) -> tuple[CriticalSection, ...]:
+    """Sections of some of three resources, one after another in a job."""
+    resources = [name for name in ("a", "b", "c") if random.random() < 0.5]
+    longest = max(job.cost_ns or 1 for job in task.jobs)
+    return tuple(CriticalSection(resource=name, length_ns=random.randint(1, longest)) for name in resources)
+
+
+def random_run(
+    random: Random,
+    task: DigraphTask,
+    *,
+    until: int,
+    jitter: int,
+    dense: bool,
+    sections: Sequence[CriticalSection] = (),
+) -> list[Release]:
     """Jobs along one path; `dense`: each as early as it may be, from the first instant on."""
     job = random.choice(task.jobs)
     arrival = 0 if dense else random.randint(0, 30)
@@ -35,4 +52,20 @@ def random_run(random: Random, task: DigraphTask, *, until: int, jitter: int, de
         job = random.choice(following)
     starts = [start for _, start, _ in releases]
     assert all(one <= other for one, other in pairwise(starts)), "jitter is below the separations"
-    return [Release(arrival, start, [(RUN, job.cost_ns or 0)]) for arrival, start, job in releases]
+    return [
+        Release(arrival, start, _program(random, job.cost_ns or 0, sections))
+        for arrival, start, job in releases
+    ]
+
+
+def _program(random: Random, cost: int, sections: Sequence[CriticalSection]) -> list[Step]:
+    """An execution of this cost; sections as long as they may be, as far as they are in it."""
+    program: list[Step] = []
+    for section in random.sample(sections, len(sections)):
+        before = random.randint(0, cost // 3)
+        held = min(section.length_ns, cost - before)
+        if held > 0:
+            program += [(RUN, before)] if before else []
+            program += [(LOCK, section.resource), (RUN, held), (UNLOCK, section.resource)]
+            cost -= before + held
+    return [*program, (RUN, cost)] if cost else program

@@ -853,6 +853,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/analysis/test_machines.py::test_the_worst_case_comes_before_the_bound",
         "DeclaredStates.BoundFaultsWhatLastsLonger",
     ),
+    "the component then blocks those of higher priority on its CPU, and nothing enforces this time": (
+        "python/analysis/test_bounds.py::test_one_below_that_holds_a_lock_blocks_those_up_to_the_highest_user",
+        "python/analysis/test_digraph_times.py::test_no_run_is_above_its_bound",
+        "python/cli/test_analyze.py::test_a_lock_that_is_held_blocks_and_is_shown",
+        "Deployed.NothingEnforcesTheLongestHold",
+    ),
     "What cannot be proved of a component is said, with the remedy": (
         "python/cli/test_analyze.py::test_what_cannot_be_proved_is_said_of_each_component",
     ),

@@ -24,8 +24,11 @@ ComponentFacts facts_of(Component& component, time_ns_t epoch_ns) {
 }
 
 ResourceFacts facts_of(const Resource& resource) {
-  ResourceFacts facts{
-      .name = resource.name(), .kind = resource.kind(), .type = resource.type(), .services = {}};
+  ResourceFacts facts{.name = resource.name(),
+                      .kind = resource.kind(),
+                      .type = resource.type(),
+                      .services = {},
+                      .longest_hold_ns = resource.longest_hold_ns()};
   for (const ServiceBase* service : resource.services())
     facts.services.push_back({.name = service->name(), .kind = service->kind(), .type = service->type()});
   return facts;
@@ -67,6 +70,7 @@ std::string text_of(const ComponentFacts& facts) {
 
 std::string text_of(const ResourceFacts& facts) {
   std::string text = "resource " + facts.name + " " + facts.kind + " " + facts.type + "\n";
+  if (facts.longest_hold_ns != 0) text += "  longest_hold_ns " + std::to_string(facts.longest_hold_ns) + "\n";
   for (const ServiceFacts& service : facts.services)
     text +=
         "  service " + service.name + " " + std::string(to_string(service.kind)) + " " + service.type + "\n";

@@ -131,7 +131,8 @@ void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_n
 }
 void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
   const std::string name = kind.name;
-  const std::set<std::string> taken{"kind", "name", "resource", "service", "topic", "type"};
+  const std::set<std::string> taken{"kind",    "longest_hold_ns", "name", "resource",
+                                    "service", "topic",           "type"};
   for (const std::string& parameter : names_of(kind.parameters)) {
     check_name("parameter", parameter);
     if (!taken.contains(parameter)) continue;

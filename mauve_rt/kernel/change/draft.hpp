@@ -124,7 +124,8 @@ class Draft {
   /// Throws Error: duplicate_name, out_of_range (settings).
   DraftComponent& add_component(const std::string& name, const TaskSettings& settings);
   void remove_component(const std::string& name);
-  void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic);
+  void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic,
+                    time_ns_t longest_hold_ns);
   /// Throws Error (invalid_argument) while it is connected or bound to a topic.
   void remove_resource(const std::string& name);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);

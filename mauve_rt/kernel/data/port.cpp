@@ -24,6 +24,10 @@ std::string_view to_string(PortKind kind) noexcept {
   return "unknown";
 }
 
+time_ns_t ServiceBase::longest_hold_ns() const noexcept {
+  return resource_ == nullptr ? 0 : resource_->longest_hold_ns();
+}
+
 CallOutcome ServiceBase::call_serialized(std::span<const std::byte> /*request*/,
                                          std::vector<std::byte>& /*reply*/) {
   return CallOutcome::malformed;
@@ -138,6 +142,7 @@ ConnectedTo PortBase::connected_to() const {
   if (connection_.service == nullptr) return shown;
   shown.resource = connection_.resource;
   shown.service = connection_.service->name();
+  shown.longest_hold_ns = connection_.service->longest_hold_ns();
   return shown;
 }
 

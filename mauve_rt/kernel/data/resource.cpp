@@ -65,6 +65,16 @@ void EventListeners::call_all(Call what, time_ns_t time_ns) noexcept {
   for (EventListener* const listener : listeners_) (listener->*what)(time_ns);
 }
 
+void Resource::set_longest_hold_ns(time_ns_t longest_hold_ns) {
+  if (longest_hold_ns < 0 || longest_hold_ns > kLongest) {
+    throw Error(ErrorCode::out_of_range, "the time for which a lock is held is out of range",
+                {.element = name_.empty() ? "longest_hold_ns" : description() + ", longest_hold_ns",
+                 .expected = "1 to " + std::to_string(kLongest) + " ns, or 0: not declared",
+                 .found = std::to_string(longest_hold_ns)});
+  }
+  longest_hold_ns_ = longest_hold_ns;
+}
+
 void Resource::bind_input() {
   for (const ServiceBase* service : services_) {
     if (service->kind() == PortKind::write) service->check_ports(service->ports() + 1);

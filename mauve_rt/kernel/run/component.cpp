@@ -141,7 +141,8 @@ void Component::show() {
   for (const auto& port : parts_.shell->ports()) {
     const ServiceBase* service = port->service();
     now.ports.push_back({port->name(), port->kind(), port->type(), port->resource_name(),
-                         service == nullptr ? "" : service->name()});
+                         service == nullptr ? "" : service->name(),
+                         service == nullptr ? 0 : service->longest_hold_ns()});
   }
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});

@@ -19,6 +19,8 @@ class PortInfo:
     resource: str
     """What it is connected to; empty when it is not."""
     service: str
+    longest_hold_ns: int = 0
+    """For how long one user holds the resource's lock; 0: not declared, or an earlier version's bag."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,12 @@ class ComponentInfo:
         """Take it from a mauve_msgs/msg/ComponentInfo, of whichever library."""
         ports = tuple(
             PortInfo(
-                port.name, _PORT_KINDS.get(int(port.kind), "unknown"), port.type, port.resource, port.service
+                port.name,
+                _PORT_KINDS.get(int(port.kind), "unknown"),
+                port.type,
+                port.resource,
+                port.service,
+                int(getattr(port, "longest_hold_ns", 0)),
             )
             for port in message.ports
         )

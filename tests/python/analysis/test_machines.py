@@ -1,9 +1,9 @@
 """The time of a state as the analysis takes it: the worst case, else the bound that the watchdog enforces."""
 
 import pytest
-from analysis_machines import execution
+from analysis_machines import connected, execution, machine
 
-from mauve_rt.analysis.machines import ExecutionTime, State
+from mauve_rt.analysis.machines import ExecutionTime, Hold, State
 
 
 @pytest.mark.parametrize(
@@ -23,3 +23,16 @@ def test_a_state_of_a_bag_of_an_earlier_version_has_a_bound_only() -> None:
     told = execution("Act", "Pause", bound_ms=5)
     del told.wcet_ns
     assert State.of(told).time == ExecutionTime(5_000_000, "declared (its bound)")
+
+
+def test_the_locks_of_a_component_are_those_of_connected_resources() -> None:
+    ports = [*connected(map=2, scan=0), *connected(map=2), *connected(**{"": 0})]
+    found = machine(ports=ports)
+    assert (found.holds, found.undeclared_locks) == ((Hold("map", 2_000_000),), ("scan",))
+
+
+def test_a_port_of_a_bag_of_an_earlier_version_declares_nothing() -> None:
+    (port,) = connected(map=2)
+    del port.longest_hold_ns
+    found = machine(ports=[port])
+    assert (found.holds, found.undeclared_locks) == ((), ("map",))

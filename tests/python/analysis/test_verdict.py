@@ -1,12 +1,13 @@
 """Verdicts: schedulable, not (with a run that shows it), not proved, not provable; and the runs."""
 
+import re
 from itertools import pairwise
 from math import gcd
 from random import Random
 
 import networkx as nx
 import pytest
-from analysis_machines import MS, event, execution, machine, wait
+from analysis_machines import MS, connected, event, execution, machine, wait
 from random_digraphs import random_digraph
 from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step, simulate
 
@@ -97,6 +98,19 @@ def test_an_event_can_come_at_the_worst_time() -> None:
     found = verdict(sporadic, loop("low", 5, 10, 50, offset_ns=3 * MS, deadline_ns=8 * MS))
     assert found.outcome == Outcome.NOT_SCHEDULABLE
     assert "4.000 ms of sporadic + 5.000 ms of its own" in found.why
+
+
+def test_a_lock_that_one_below_holds_is_named() -> None:
+    user = loop("user", 1, 10, 60, deadline_ns=3 * MS, ports=connected(map=3))
+    holder = loop("holder", 5, 27, 40, ports=connected(map=3))
+    found = verdict(user, loop("between", 1, 10, 50), holder)
+    assert found.outcome == Outcome.NOT_SCHEDULABLE
+    assert found.witness is not None
+    assert re.search(
+        r"^user misses its deadline at .*: 2\.\d+ ms blocking by map, which holder holds \+ 1\.000 ms",
+        found.why,
+    )
+    assert verdict(user, loop("between", 1, 10, 50)).outcome == Outcome.SCHEDULABLE
 
 
 # ---- the run

@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from synthetic_traces import deploy, record, run
 
 from mauve_rt.cli.main import main
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 Analyze = Callable[..., tuple[int, str, str]]
 
@@ -124,6 +127,75 @@ def test_what_is_schedulable_is_so_under_conditions(analyze: Analyze) -> None:
     assert "\nschedulable: every component meets its deadline, if\n" in out
     assert "  threads begin 0 us after their instants at the latest (--wakeup-us)\n" in out
     assert "  - sender (1), which sends the messages of bound topics\n" in out
+
+
+SHARED = (
+    PAIR
+    + """\
+resources:
+  number: {kind: shared_data, type: std_msgs/msg/Float64, longest_hold_ns: 1100000}
+  other: {kind: shared_data, type: std_msgs/msg/Float64}
+connections:
+  - [quick.set, number.read]
+  - [quick.count, other.write]
+  - [slow.count, number.write]
+  - [slow.set, other.read]
+"""
+)
+
+
+def test_a_lock_that_is_held_blocks_and_is_shown(analyze: Analyze) -> None:
+    status, out, err = analyze(SHARED)
+    assert (status, err) == (0, "")
+    assert "  holds the lock of number up to 1.100 ms, declared\n" in out
+    met = "its deadline of 10.000 ms is met, blocked up to 1.100 ms\n"
+    assert f"  response at most 4.100 ms, {met}" in out
+    assert "  response at most 19.950 ms, its deadline of 20.000 ms is met\n" in out, "nobody is below"
+    assert "  components hold the locks of other for no time: no longest_hold_ns is declared\n" in out
+    status, out, err = analyze(SHARED, "--json")
+    quick = json.loads(out)["components"][0]
+    assert quick["holds"] == [{"resource": "number", "longest_ns": 1_100_000, "origin": "declared"}]
+    assert quick["undeclared_locks"] == ["other"]
+    assert quick["response"]["blocking_ns"] == 1_100_000
+
+
+def test_what_blocks_too_long_is_not_proved(analyze: Analyze) -> None:
+    status, out, err = analyze(SHARED.replace("1100000", "7100000"))
+    assert (status, err) == (3, "")
+    assert "not proved: quick has a bound of 10.100 ms and a deadline of 10.000 ms" in out
+
+
+def test_a_lock_of_two_cpus_is_not_provable(analyze: Analyze) -> None:
+    text = SHARED.replace("priority: 30, cpus: [0]", "priority: 30, cpus: [1]")
+    status, out, err = analyze(text)
+    assert (status, err) == (3, "")
+    why = "it shares number (held up to 1.100 ms) with {} on another CPU: one CPU for both, or no lock"
+    assert f"  quick: {why.format('slow')}\n  slow: {why.format('quick')}\n" in out
+
+
+def test_a_resource_that_two_share_without_a_lock_is_not_named(analyze: Analyze) -> None:
+    text = SHARED.replace("other: {kind: shared_data", "other: {kind: latest_value")
+    _, out, _ = analyze(text)
+    assert "for no time" not in out
+
+
+def test_a_lock_that_nobody_declares_takes_the_longest_measured_call(
+    analyze: Analyze, tmp_path: Path
+) -> None:
+    source = SyntheticSource(["quick", "slow"])
+    for component, held_ns in (("quick", 700), ("slow", 900_000)):
+        deploy(source, component)
+        begin_ns = run(source, component, 3)
+        source.add(component, Kind.SERVICE_BEGIN, begin_ns, name="number.read")
+        source.add(component, Kind.SERVICE_END, begin_ns + held_ns, name="number.read")
+    bag = record(source, tmp_path / "bag")
+    text = SHARED.replace(", longest_hold_ns: 1100000", "")
+    _, out, _ = analyze(text, "--budget-from", str(bag), "--margin", "2")
+    assert "  holds the lock of number up to 1.800 ms, measured in bag (n = 2) x 2\n" in out
+    assert "is met, blocked up to 1.800 ms\n" in out
+    assert "  components hold the locks of other for no time: no longest_hold_ns is declared\n" in out
+    _, out, _ = analyze(SHARED, "--budget-from", str(bag), "--margin", "2")
+    assert "  holds the lock of number up to 1.100 ms, declared\n" in out, "what is declared stays"
 
 
 def test_what_is_not_says_who_misses_when_and_why_and_shows_it(analyze: Analyze, tmp_path: Path) -> None:
@@ -244,7 +316,12 @@ def test_bad_times_are_refused_where_they_stand(
 
 def test_the_latency_of_the_machine_is_in_the_bound(told: Callable[..., dict[str, Any]]) -> None:
     response = told(ROBOT, "--wakeup-us", "50")["one"]["response"]
-    assert response == {"response_ns": 250_000, "deadline_ns": 5_000_000, "reason": ""}
+    assert response == {
+        "response_ns": 250_000,
+        "deadline_ns": 5_000_000,
+        "reason": "",
+        "blocking_ns": 0,
+    }
 
 
 @pytest.mark.parametrize("latency", ["-1", "inf"])

@@ -48,7 +48,7 @@ COUNTER = (
 POISON = b"\0\1\0\0" + struct.pack("<d", -1e7)  # in CDR; what the core calls unheard of
 NUMBER = "{kind: shared_data, type: std_msgs/msg/Float64}"
 ADD = (
-    Step("add_resource", "sum", "", NUMBER),
+    Step("add_resource", "sum", "", NUMBER[:-1] + ", longest_hold_ns: 4000}"),
     Step("add_component", "second", "", COUNTER),
     Step("connect", "second", "count", "sum.write"),
     Step("connect", "second", "set", "count.read"),
@@ -188,6 +188,7 @@ def test_a_transaction_adds_wires_and_starts_and_another_one_removes(
     second = _part(runtime, "second")
     assert second.state == "RUNNING"
     assert {port.name: port.resource for port in second.ports} == {"set": "count", "count": "sum"}
+    assert {port.name: port.longest_hold_ns for port in second.ports} == {"set": 0, "count": 4000}
     values = {item.name: item.value for item in second.properties}
     assert (values["step"], values["list_file"]) == (3.0, str(tmp_path / "a.txt"))
     assert runtime.cores_of(second) == ["executor_tests/Backwards"]

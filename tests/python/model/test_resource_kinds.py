@@ -7,8 +7,8 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64
 
-from mauve_rt._kernel import Architecture, MauveError, PluginRegistry, Simulation
-from mauve_rt.api import Resource, parameter, service
+from mauve_rt._kernel import Architecture, MauveError, PluginRegistry, Simulation, Transaction
+from mauve_rt.api import Resource, SharedData, parameter, service
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import build, configure, load_architecture
 from mauve_rt.model.resource_kinds import given_kinds
@@ -91,6 +91,35 @@ def test_a_parameter_of_a_plugin_is_set_by_the_file(
     assert first_count(built(tmp_path, by_default, registry)) == 0.5
 
 
+def holds(architecture: Architecture) -> dict[str, int]:
+    """The declared times of resources; the counter's ports tell the same."""
+    found = {resource.name: resource.longest_hold_ns for resource in architecture.resources()}
+    (counter,) = architecture.components()
+    assert {port.resource: port.longest_hold_ns for port in counter.ports} == found
+    return found
+
+
+def test_the_hold_of_a_lock_in_the_file_takes_precedence_over_the_code(
+    tmp_path: Path, plugin_prefix: Path, registry: PluginRegistry
+) -> None:
+    assert holds(built(tmp_path, GOOD, registry)) == {"window": 3_000_000, "count": 0}
+    declared = GOOD.replace("length_s: 2", "length_s: 2, longest_hold_ns: 2000000")
+    declared = declared.replace("msg/Float64}", "msg/Float64, longest_hold_ns: 5}")
+    assert holds(built(tmp_path, declared, registry)) == {"window": 2_000_000, "count": 5}
+
+
+def test_a_program_declares_the_hold_of_a_lock(registry: PluginRegistry) -> None:
+    architecture = Architecture(registry)
+    architecture.add_resource("count", SharedData(Float64), longest_hold_ns=5)
+    architecture.add_resource("events", kind="event", longest_hold_ns=6)
+    more = Transaction().add_resource("more", SharedData(Float64), longest_hold_ns=7)
+    architecture.commit(more.add_resource("last", kind="event", topic="publish", longest_hold_ns=8))
+    found = {resource.name: resource.longest_hold_ns for resource in architecture.resources()}
+    assert found == {"count": 5, "events": 6, "more": 7, "last": 8}
+    with pytest.raises(MauveError, match=r"resource bad, longest_hold_ns.*found -1"):
+        architecture.add_resource("bad", kind="event", longest_hold_ns=-1)
+
+
 BAD = {
     "too long": (
         "length_s: 2",
@@ -111,7 +140,7 @@ BAD = {
         "length_s: 2",
         "xxxx: 2",
         "xxxx",
-        "unknown key 'xxxx' of resource 'window'; known: kind, label, length_s, service, topic, type",
+        "unknown key 'xxxx' of resource 'window'; known: kind, label, length_s, longest_hold_ns, service",
     ),
     "of another kind": (
         "length_s: 2",

@@ -173,7 +173,7 @@ def change(architecture: Architecture, host: Host) -> TransactionReport:
     assert_type(before, ArchitectureDescription)
     transaction = (
         Transaction()
-        .add_resource("extra", SharedData(Pose))
+        .add_resource("extra", SharedData(Pose), longest_hold_ns=2_000)
         .add_resource("named", kind="event")
         .add_component("new", HoverShell, HoverCore, "package/Fsm", priority=3, properties={"height": 2.0})
         .connect("new", "pose", "extra", "read")
@@ -222,7 +222,9 @@ def run(registry: PluginRegistry) -> StepReport:
     }
     for name, resource in resources.items():
         architecture.add_resource(name, resource)
-    architecture.add_resource("named", kind="ring_buffer", type="std_msgs/msg/Bool", capacity=3)
+    architecture.add_resource(
+        "named", kind="ring_buffer", type="std_msgs/msg/Bool", capacity=3, longest_hold_ns=9
+    )
     hover = architecture.add_component("hover", HoverShell, HoverCore, HoverFsm, priority=40, cpus=[0])
     architecture.add_component("mixed", "package/Shell", NativeCore, "package/Fsm", overrun="catch_up")
     architecture.add_component("bad", HoverCore, HoverCore, HoverFsm)  # type: ignore[arg-type]

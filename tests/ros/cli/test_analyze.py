@@ -15,6 +15,17 @@ from std_msgs.msg import Float64
 NODE = "/robot_1/executor"
 MARGIN = 1.5
 NOT_PROVED = 3
+SAME = (
+    "states",
+    "jobs",
+    "priority",
+    "period_ns",
+    "offset_ns",
+    "deadline_ns",
+    "overrun",
+    "holds",
+    "undeclared_locks",
+)
 
 
 def test_a_file_a_node_and_a_bag_tell_one_model(
@@ -22,7 +33,10 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
 ) -> None:
     text = architecture.read_text(encoding="utf-8")
     declared = "counter: {deadline_ns: 7000000, states: {Count: {wcet_ns: 900000000}}, "
-    architecture.write_text(text.replace("counter: {", declared, 1), encoding="utf-8")
+    text = text.replace("counter: {", declared, 1)
+    text = text.replace("[counter.set, set.read]", "[counter.set, set.read]\n  - [guard.set, set.read]")
+    text = text.replace("set: {kind: shared_data, ", "set: {kind: shared_data, longest_hold_ns: 30000, ")
+    architecture.write_text(text, encoding="utf-8")
     bag = tmp_path / "bag"
     executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
     counts = graph.hear(Float64, "/robot_1/count")
@@ -43,11 +57,14 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     assert [*of_file] == [*of_node] == [*of_bag] == ["counter", "guard", "sleepy"]
     for name, told in of_file.items():
         for other in (of_node[name], of_bag[name]):
-            for key in ("states", "jobs", "priority", "period_ns", "offset_ns", "deadline_ns", "overrun"):
+            for key in SAME:
                 assert other[key] == told[key], (name, key)
         assert told["period_ns"] > 0
     assert of_file["counter"]["deadline_ns"] == 7_000_000
     assert of_file["counter"]["states"][0]["origin"] == "declared"
+    held = [{"resource": "set", "longest_ns": 30_000, "origin": "declared"}]
+    assert of_file["counter"]["holds"] == of_file["guard"]["holds"] == held
+    assert of_file["counter"]["undeclared_locks"] == ["count"]
 
     measured = analyzed(str(architecture), "--budget-from", str(bag), "--margin", str(MARGIN))
     assert measured["counter"]["states"] == of_file["counter"]["states"], "what is declared stays"

@@ -34,6 +34,7 @@ struct ResourceFacts {
   std::string kind;
   std::string type;
   std::vector<ServiceFacts> services;
+  time_ns_t longest_hold_ns{0};  // of its lock; 0: not declared
   bool operator==(const ResourceFacts&) const = default;
 };
 

@@ -47,6 +47,7 @@ struct NewResource {
   bool by_kind{true};
   std::unique_ptr<Resource> resource{};
   TopicBinding topic{TopicBinding::none};
+  time_ns_t longest_hold_ns{0};
 };
 
 /// What a step puts in, as its kind takes it.
@@ -125,11 +126,13 @@ class Transaction {
   }
   /// It is parked, its outputs written as on a stop, its ports disconnected.
   Transaction& remove_component(const std::string& name);
-  /// `topic`: as Architecture::publish() or Resource::bind_input().
+  /// `topic`: as Architecture::publish() or Resource::bind_input(). `longest_hold_ns`: as
+  /// Resource::set_longest_hold_ns(); 0: what the resource's own code declares.
   Transaction& add_resource(const std::string& name, const std::string& kind, const std::string& type,
-                            ResourceParameters parameters = {}, TopicBinding topic = TopicBinding::none);
+                            ResourceParameters parameters = {}, TopicBinding topic = TopicBinding::none,
+                            time_ns_t longest_hold_ns = 0);
   Transaction& add_resource(const std::string& name, std::unique_ptr<Resource> resource,
-                            TopicBinding topic = TopicBinding::none);
+                            TopicBinding topic = TopicBinding::none, time_ns_t longest_hold_ns = 0);
   /// Refused while a port is connected to it.
   Transaction& remove_resource(const std::string& name);
   /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.

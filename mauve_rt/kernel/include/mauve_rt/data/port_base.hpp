@@ -40,6 +40,7 @@ struct PortConnection {
 struct ConnectedTo {
   std::string resource;
   std::string service;
+  time_ns_t longest_hold_ns{0};  // of the resource's lock; 0: not declared
 };
 
 /// A port seen without its type. Its connection changes only while the component is parked or held.

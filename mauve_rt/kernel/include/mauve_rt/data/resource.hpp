@@ -120,6 +120,11 @@ class Resource : public Configurable {
   /// Given by the architecture, once. [setup]
   virtual void set_name(const std::string& name) { name_ = name; }
   std::string description() const override { return "resource " + name_; }
+  /// The longest execution for which one user holds its lock; 0: not declared. [rt]
+  time_ns_t longest_hold_ns() const MAUVE_RT { return longest_hold_ns_; }
+  /// For the timing analysis: nothing enforces it. Before ports are connected. [setup]
+  /// Throws Error (out_of_range): below 0, or above kLongest.
+  void set_longest_hold_ns(time_ns_t longest_hold_ns);
 
   /// Whom to tell of writes and calls, for those who carry them outside. [setup]
   void set_notifier(Notifier* notifier) noexcept { notifier_ = notifier; }
@@ -192,6 +197,7 @@ class Resource : public Configurable {
   std::string kind_;
   std::string type_;
   std::string name_;
+  time_ns_t longest_hold_ns_{0};
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};
   std::uint64_t handed_out_{0};  // as `seen`, of next_published()

@@ -109,6 +109,8 @@ class ServiceBase {
   virtual std::vector<MessageShape> messages() const { return {}; }
   /// The resource that offers it, or nullptr. [rt]
   Resource* resource() const MAUVE_RT { return resource_; }
+  /// As that resource's. [rt]
+  time_ns_t longest_hold_ns() const MAUVE_RT;
 
   /// Whether the next does anything: a call whose type is a ROS service's. [rt]
   virtual bool is_call_serializable() const MAUVE_RT { return false; }
