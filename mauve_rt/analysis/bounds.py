@@ -93,6 +93,9 @@ def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, Di
     if unknown:
         return Bound(None, deadline_ns, f"{', '.join(unknown)} may delay it, and nothing is proved of that")
     found = times[subject.name]
+    if subject.machine.clients and found.blocking_ns:
+        names = ", ".join(subject.machine.clients)
+        return Bound(None, deadline_ns, f"after each wait for a service ({names}) a lock may block it anew")
     if found.reason:
         return Bound(None, deadline_ns, found.reason, found.blocking_ns)
     closest = min(found.jobs, key=lambda one: one.job.deadline_ns - one.response_ns, default=None)

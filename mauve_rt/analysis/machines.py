@@ -74,7 +74,9 @@ class Hold:
         return f"{self.resource} up to {in_ms(self.longest_ns)}, {self.origin}"
 
 
-_WITHOUT_LOCK = ("latest_value",)
+_CLIENT = "client"
+"""Kind of a resource whose calls a ROS service answers: the caller waits for it, for no other component."""
+_WITHOUT_LOCK = ("latest_value", _CLIENT)
 """Kinds of resources: users do not wait for each other."""
 
 
@@ -102,6 +104,8 @@ class Machine:
     """Of the resources that its ports are connected to, those that declare for how long a lock is held."""
     undeclared_locks: tuple[str, ...] = ()
     """The others of these resources, as far as they have a lock."""
+    clients: tuple[str, ...] = ()
+    """Resources through which it calls ROS services and waits for their answers, as far as is known."""
 
     @classmethod
     def of(
@@ -135,6 +139,7 @@ class Machine:
                 for resource, time_ns in sorted(times.items())
                 if not time_ns and (kinds or {}).get(resource) not in _WITHOUT_LOCK
             ),
+            clients=tuple(resource for resource in sorted(times) if (kinds or {}).get(resource) == _CLIENT),
         )
 
     def with_budgets(self, budgets: Mapping[str, ExecutionTime]) -> Self:

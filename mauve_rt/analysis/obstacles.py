@@ -48,6 +48,9 @@ def assumptions_about(
     """What a proof for these components takes for granted, each as what stands behind an `if`."""
     yield f"threads begin {wakeup_us:g} us after their instants at the latest (--wakeup-us)"
     yield from _about_locks(machines)
+    for machine in machines:
+        if machine.clients:
+            yield f"wcet_ns of {machine.name} has its waits for services in it ({', '.join(machine.clients)})"
     runtime = _RUNTIME.read_text("ascii").strip() if _RUNTIME.exists() else "-1"
     if runtime != "-1":
         yield (

@@ -115,6 +115,18 @@ def test_each_holder_and_each_resource_blocks_once() -> None:
     assert found["high"].blocking_ns == 7 * MS
 
 
+def test_a_wait_for_a_service_counts_as_execution_and_with_locks_nothing_is_proved() -> None:
+    kinds = {"lamp": "client"}
+    caller = loop("caller", 3, 20, priority=60, ports=connected(lamp=0), kinds=kinds)
+    assert bounds(caller, loop("low", 1, 20))["low"].response_ns == 4 * MS
+    line = "wcet_ns of caller has its waits for services in it (lamp)"
+    assert line in [*assumptions_about([caller])]
+    user = loop("user", 3, 20, priority=60, ports=connected(lamp=0, map=1), kinds=kinds)
+    found = bounds(user, loop("holder", 2, 50, priority=40, ports=connected(map=1)))
+    assert found["user"].response_ns is None
+    assert found["user"].reason == "after each wait for a service (lamp) a lock may block it anew"
+
+
 def test_a_lock_that_nobody_declares_is_held_for_no_time() -> None:
     found = bounds(
         loop("user", 1, 20, priority=60, ports=connected(map=0)),
