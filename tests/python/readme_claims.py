@@ -62,6 +62,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "MAUVE RT connects to theirs by topics and services": (
         "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
+    "It was made from the bag next to it (`docs/sample/metronome`)": (
+        "python/project/test_sample.py::test_the_report_is_of_the_bag",
+    ),
+    "a component at 200 Hz whose core is replaced twice": (
+        "python/project/test_sample.py::test_the_bag_has_what_readme_says",
+    ),
     "In C++ it is the same three parts": (
         "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
     ),
@@ -1071,6 +1077,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "Before you build anything, download",
     "*From the trace of a demo on 2026-11-26",
     "Each tick is a release",
     "The replaced component was held for 14 us",
