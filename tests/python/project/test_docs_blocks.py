@@ -15,6 +15,15 @@ from proofs import is_there
 ROOT = Path(__file__).resolve().parents[3]
 README = "python/project/test_readme_examples.py::test_"
 HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
+HOWTO = "python/project/test_howto_pages.py::test_"
+OVERRUN = f"{HOWTO}the_commands_that_find_an_overrun_print_what_it_shows"
+HOWTO_ROS = "ros/executor/test_howto_pages.py::test_"
+REPAIRED = f"{HOWTO_ROS}a_faulted_component_is_repaired_as_the_page_says"
+ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
+GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
+UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
+WAKEUP = f"{HOWTO}the_wakeup_latency_is_measured_and_used_as_the_page_says"
+PINNED = f"{HOWTO}the_settings_of_pinned_components_are_accepted"
 
 # Of each page: words that stand in one of its blocks only, and the tests that run that block.
 RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
@@ -31,6 +40,16 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "docs/concepts/timing_proof.md": {
         "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+    },
+    "docs/howto/find_an_overrun.md": {
+        "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
+        "--suppose mapping.Integrate=120ms --witness too_long": (OVERRUN,),
+        "mauve report preempted": (OVERRUN,),
+        "No: 1 missed deadline": (OVERRUN,),
+        "mauve report too_long": (OVERRUN,),
+        "its state Integrate took longest": (OVERRUN,),
+        "mauve trace stats preempted": (OVERRUN,),
+        "component  what             count": (OVERRUN,),
     },
     "docs/howto/is_my_robot_schedulable.md": {
         "mauve analyze robot.yaml --witness DIR": (
@@ -75,6 +94,15 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "executor: {diagnostics:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
         "printf 'force: true": ("ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",),
     },
+    "docs/howto/pin_and_isolate_cpus.md": {
+        "priority: 70, cpus: [2]": (PINNED,),
+        "asks for a CPU": (f"{HOWTO}a_cpu_that_is_not_there_is_refused_as_the_page_says",),
+        "mauve trace stats docs/sample/metronome": (WAKEUP,),
+        "metronome  wake-up latency": (WAKEUP,),
+        "--wakeup-us 300": (WAKEUP,),
+        "threads begin 300 us": (WAKEUP,),
+        "wakeup_max_us: {warn: 300": (PINNED,),
+    },
     "docs/howto/record_and_report.md": {
         "mauve record start": (
             f"{README}every_command_is_one_that_mauve_takes",
@@ -91,6 +119,25 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "# writes DIR/report.html": (
             "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
         ),
+    },
+    "docs/howto/repair_a_faulted_component.md": {
+        "# before the repair": (REPAIRED,),
+        "refused, FAULTED (6)": (REPAIRED,),
+        "printf -- '- {kind: configure": (REPAIRED,),
+        "2 steps are in force": (REPAIRED,),
+        "mauve replace-core /robot_1/executor guidance": (REPAIRED,),
+        "kind: remove_component": (ADDED,),
+        "anew.yaml --dry-run": (ADDED,),
+        "guidance --force": (GIVEN_UP,),
+        "is stopped by force": (GIVEN_UP,),
+    },
+    "docs/howto/systemd.md": {
+        "Description=MAUVE RT executor": (
+            UNIT_FILES,
+            f"{HOWTO_ROS}the_command_of_the_unit_file_starts_an_executor",
+        ),
+        "systemd-analyze verify": (UNIT_FILES,),
+        "Description=MAUVE RT supervisor": (UNIT_FILES,),
     },
     "docs/howto/write_a_core.md": {
         "struct MetronomeShell": (f"{README}listings_stand_in_the_sources",),
