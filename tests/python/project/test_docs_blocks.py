@@ -41,6 +41,12 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     "docs/concepts/timing_proof.md": {
         "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
     },
+    "docs/howto/ci_for_your_package.md": {
+        "def test_ten_beats_in_a_second": (f"{HOWTO}the_test_in_virtual_time_passes",),
+        "mauve check install/share/mauve_examples": (f"{HOWTO}the_checks_of_ci_end_with_status_0",),
+        "runs-on: ubuntu-24.04": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
+        "image: ros:jazzy": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
+    },
     "docs/howto/find_an_overrun.md": {
         "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
         "--suppose mapping.Integrate=120ms --witness too_long": (OVERRUN,),
@@ -138,6 +144,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         ),
         "systemd-analyze verify": (UNIT_FILES,),
         "Description=MAUVE RT supervisor": (UNIT_FILES,),
+    },
+    "docs/howto/uninstall.md": {
+        "rm -rf .venv build install": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),
+        "# bags and reports of scripts/demo": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),
     },
     "docs/howto/write_a_core.md": {
         "struct MetronomeShell": (f"{README}listings_stand_in_the_sources",),

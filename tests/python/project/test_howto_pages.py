@@ -5,16 +5,21 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 from page_blocks import Block, blocks
 from pages import PAGES
 
-from mauve_rt.cli.main import main
+from mauve_rt import _kernel
+from mauve_rt.cli.main import build_parser, main
 from mauve_rt.model import load_architecture
 
 ROOT = Path(__file__).parents[3]
+INSTALLED = Path(_kernel.__file__).resolve().parents[4]
 
 
 def _blocks(name: str) -> list[Block]:
@@ -106,3 +111,62 @@ def test_a_cpu_that_is_not_there_is_refused_as_the_page_says(
     assert main(["check", str(file)]) != 0
     said = re.sub(r"of [\d, ]+, found \d+", "of 0, 1, found 2", capsys.readouterr().err)
     assert _plain(shown) in _plain(said)
+
+
+def test_the_test_in_virtual_time_passes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    [program] = [block.text for block in _blocks("ci_for_your_package") if block.language == "python"]
+    (tmp_path / "install").symlink_to(INSTALLED)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(program, "test_metronome.py", "exec"), names)  # noqa: S102 - a reader would run it too
+    names["test_ten_beats_in_a_second"]()
+
+
+def test_the_checks_of_ci_end_with_status_0(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    [commands] = [block.text for block in _blocks("ci_for_your_package") if not block.language]
+    (tmp_path / "install").symlink_to(INSTALLED)
+    monkeypatch.chdir(tmp_path)
+    for line in commands.splitlines():
+        command = [sys.executable, "-m", "mauve_rt.cli", *shlex.split(line)[1:]]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_jobs_of_ci_have_one_set_of_commands() -> None:
+    texts = [block.text for block in _blocks("ci_for_your_package") if block.language == "yaml"]
+    github, gitlab = (yaml.safe_load(text) for text in texts)
+    job = github["jobs"]["test"]
+    runs = [step["run"] for step in job["steps"] if "run" in step]
+    script = gitlab["test"]["script"][1:]
+    assert [line.replace('"', "") for line in script] == [line.replace('"', "") for line in runs]
+    assert job["container"] == gitlab["test"]["image"]
+    assert job["env"]["MAUVE_RT_URL"] == gitlab["test"]["variables"]["MAUVE_RT_URL"]
+    for line in runs:
+        if words := re.findall(r"&& (mauve .*)", line):
+            assert build_parser().parse_args(shlex.split(words[0])[1:]).verb is not None
+
+
+def test_uninstalling_leaves_nothing_but_the_sources(tmp_path: Path) -> None:
+    """What git ignores is what scripts and tests make."""
+    ignored = (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
+    names = [line.strip("/") for line in ignored if line and not line.startswith("#") and "*." not in line]
+    assert {".venv", "build", "install", "out", "mauve_rt/_*.so"} <= {*names, "mauve_rt/_*.so"}
+    made = [name for name in names if name not in {"__pycache__", "dist", "compile_commands.json"}]
+    assert [name for name in made if f"`{name}/`" not in PAGES["docs/howto/uninstall.md"]] == []
+    for folder in (*made, "mauve_rt", "mauve_examples"):
+        (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    links = {"mauve_rt/_kernel.so", "mauve_rt/_bridge.so", "mauve_examples/_mission.so"}
+    for link in links:
+        (tmp_path / link).symlink_to(tmp_path / "install" / "lib")
+    (tmp_path / "mauve_rt" / "api.py").touch()
+    for block in _blocks("uninstall"):
+        subprocess.run(["bash", "-ec", block.text], cwd=tmp_path, check=True)
+    left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")}
+    assert left == {"mauve_rt", "mauve_rt/api.py", "mauve_examples"}
+
+
+def test_the_links_that_the_page_about_uninstalling_names_are_all() -> None:
+    modules = {
+        path.name.partition(".")[0] for path in INSTALLED.glob("lib/python3*/site-packages/mauve_*/_*.so")
+    }
+    assert modules == set(re.findall(r"`mauve_\w+/(_\w+)\*\.so`", PAGES["docs/howto/uninstall.md"]))
