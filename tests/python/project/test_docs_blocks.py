@@ -71,6 +71,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "not schedulable: mapping": (HOWTO_ANALYZE,),
         "mauve report slow": (HOWTO_ANALYZE,),
     },
+    "docs/howto/launch_files.md": {
+        "def generate_launch_description": (f"{HOWTO}the_launch_file_of_the_page_gives_arguments_there_are",),
+    },
     "docs/howto/operate.md": {
         "mauve list /robot_1/executor": (
             f"{README}every_command_is_one_that_mauve_takes",

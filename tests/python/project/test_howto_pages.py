@@ -1,5 +1,6 @@
 """The how-to pages whose commands need no executor: they print what the page shows."""
 
+import ast
 import html
 import re
 import shlex
@@ -170,3 +171,27 @@ def test_the_links_that_the_page_about_uninstalling_names_are_all() -> None:
         path.name.partition(".")[0] for path in INSTALLED.glob("lib/python3*/site-packages/mauve_*/_*.so")
     }
     assert modules == set(re.findall(r"`mauve_\w+/(_\w+)\*\.so`", PAGES["docs/howto/uninstall.md"]))
+
+
+def test_the_launch_file_of_the_page_gives_arguments_there_are() -> None:
+    page = PAGES["docs/howto/launch_files.md"]
+    source = (INSTALLED / "share/mauve_rt/launch/executor.launch.py").read_text(encoding="utf-8")
+    declared = re.findall(r'(?:DeclareLaunchArgument|_optional)\(\s*"(\w+)"', source)
+    assert set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)) == set(declared)
+    [program] = [block.text for block in _blocks("launch_files") if block.language == "python"]
+    tree = ast.parse(program)
+    given = [node for node in ast.walk(tree) if isinstance(node, ast.Dict)]
+    assert {ast.literal_eval(key) for node in given for key in node.keys if key is not None} < set(declared)
+    for line in re.findall(r"ros2 launch (.*)", page):
+        package, file, *arguments = shlex.split(line)
+        text = (INSTALLED / "share" / package / "launch" / file).read_text(encoding="utf-8")
+        assert all(f'"{argument.partition(":=")[0]}"' in text for argument in arguments)
+    files = re.findall(r'share, "architecture", "(\S+)"', program)
+    assert all((INSTALLED / "share/mauve_examples/architecture" / name).is_file() for name in files)
+    assert len(files) == 2
+
+
+def test_the_services_that_the_page_about_security_names_are_there() -> None:
+    names = set(re.findall(r"`~/(\w+)`", PAGES["docs/howto/dds_security.md"]))
+    assert names <= set(re.findall(r"`~/(\w+)`", PAGES["docs/howto/operate.md"]))
+    assert len(names) > 5

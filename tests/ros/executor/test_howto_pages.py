@@ -189,3 +189,24 @@ def test_the_command_of_the_unit_file_starts_an_executor(
         assert process.wait() == 0
     assert manager.hear("STOPPING=1") == 1
     assert len([*tmp_path.glob("bag_*/*.mcap")]) == 1
+
+
+@pytest.mark.parametrize("program", ["executor", "mauve"])
+def test_enforced_security_refuses_a_program_without_keys(program: str, tmp_path: Path) -> None:
+    """Of the page about DDS Security: as far as it goes without security plug-ins."""
+    variables = dict(re.findall(r"export (ROS_SECURITY_\w+)=(\S+)", PAGES["docs/howto/dds_security.md"]))
+    assert set(variables) == {"ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENABLE", "ROS_SECURITY_STRATEGY"}
+    (tmp_path / "keys" / "enclaves").mkdir(parents=True)
+    environment = {**os.environ, **variables, "ROS_SECURITY_KEYSTORE": str(tmp_path / "keys")}
+    if program == "executor":
+        module, enclave = "mauve_rt.node.executor.main", "/robot_1"
+        words = ["--ros-args", "--enclave", enclave, "-p", f"architecture:={ROBOT}"]
+    else:
+        module, enclave, words = "mauve_rt.cli", "/operator", ["nodes"]
+        environment["ROS_SECURITY_ENCLAVE_OVERRIDE"] = enclave
+    command = [sys.executable, "-m", module, *words]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode != 0
+    assert (
+        f"SECURITY ERROR: directory '{tmp_path}/keys/enclaves{enclave}' does not exist" in done.stdout + done.stderr
+    )
