@@ -47,6 +47,12 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "runs-on: ubuntu-24.04": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
         "image: ros:jazzy": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
     },
+    "docs/howto/coming_from.md": {
+        "class Doubler(Node)": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
+        "class Doubler(Core)": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
+        "core; my_robot/Doubler;": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
+        "doubler: {shell: mauve_rt/Float64FilterShell": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
+    },
     "docs/howto/find_an_overrun.md": {
         "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
         "--suppose mapping.Integrate=120ms --witness too_long": (OVERRUN,),

@@ -207,6 +207,37 @@ def test_enforced_security_refuses_a_program_without_keys(program: str, tmp_path
     command = [sys.executable, "-m", module, *words]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode != 0
-    assert (
-        f"SECURITY ERROR: directory '{tmp_path}/keys/enclaves{enclave}' does not exist" in done.stdout + done.stderr
-    )
+    missing = f"SECURITY ERROR: directory '{tmp_path}/keys/enclaves{enclave}' does not exist"
+    assert missing in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("peer", ["rclpy", "component"])
+def test_a_node_of_rclpy_and_its_component_do_the_same(peer: str, graph: Any, tmp_path: Path) -> None:
+    node, component, plugins, file = _texts("coming_from")
+    index = tmp_path / "share" / "ament_index" / "resource_index"
+    files = {
+        tmp_path / "node.py": node,
+        tmp_path / "my_robot" / "__init__.py": "",
+        tmp_path / "my_robot" / "doubler.py": component,
+        index / "packages" / "my_robot": "",
+        index / "mauve_rt_plugins" / "my_robot": plugins,
+        tmp_path / "robot.yaml": file,
+    }
+    for path, text in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(graph.node.context.get_domain_id())}
+    for name in ("AMENT_PREFIX_PATH", "PYTHONPATH"):
+        environment[name] = os.pathsep.join([str(tmp_path), environment.get(name, "")])
+    words = ["-m", "mauve_rt.node.executor.main", "--ros-args", "-p", "architecture:=robot.yaml"]
+    command = [sys.executable, *(["node.py"] if peer == "rclpy" else words)]
+    # in the page's folder: the sources of the project are not on the path of `-m`
+    with subprocess.Popen(command, env=environment, cwd=tmp_path) as process:
+        try:
+            voice = graph.voice(Float64, "/given")
+            passed = graph.hear(Float64, "/passed")
+            voice.publish(Float64(data=21.0))
+            graph.spin_until(lambda: any(message.data == 42.0 for message in passed), "the double")
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
