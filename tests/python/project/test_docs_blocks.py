@@ -21,6 +21,7 @@ HOWTO_ROS = "ros/executor/test_howto_pages.py::test_"
 REPAIRED = f"{HOWTO_ROS}a_faulted_component_is_repaired_as_the_page_says"
 ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
 GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
+PEERS = f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same"
 UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
 WAKEUP = f"{HOWTO}the_wakeup_latency_is_measured_and_used_as_the_page_says"
 PINNED = f"{HOWTO}the_settings_of_pinned_components_are_accepted"
@@ -48,10 +49,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "image: ros:jazzy": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
     },
     "docs/howto/coming_from.md": {
-        "class Doubler(Node)": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
-        "class Doubler(Core)": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
-        "core; my_robot/Doubler;": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
-        "doubler: {shell: mauve_rt/Float64FilterShell": (f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same",),
+        "class Doubler(Node)": (PEERS,),
+        "class Doubler(Core)": (PEERS,),
+        "core; my_robot/Doubler;": (PEERS,),
+        "doubler: {shell: mauve_rt/Float64FilterShell": (PEERS,),
     },
     "docs/howto/find_an_overrun.md": {
         "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
