@@ -93,6 +93,22 @@ def test_each_page_is_in_the_contents_and_each_part_on_one_page() -> None:
     assert sorted(marks) == sorted(_parts())
 
 
+def test_no_package_is_needed_but_those_of_docs_txt() -> None:
+    """And neither the native library nor ROS 2, even where they are installed."""
+    wanted = re.compile(r"^([\w-]+)==", re.MULTILINE)
+    run, docs = (
+        set(wanted.findall((ROOT / "requirements" / name).read_text(encoding="utf-8")))
+        for name in ("run.txt", "docs.txt")
+    )
+    others = [*(run - docs), "numpy", "rclpy", "rcl_interfaces", "std_msgs"]
+    assert "rich" in others
+    absent = f"sys.modules.update(dict.fromkeys({others!r}))"
+    is_stub = "assert sys.modules['mauve_rt._kernel'].is_stub"
+    done = _python(f"{absent}; {_GENERATE}; {is_stub}")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == _parts()
+
+
 def test_the_stub_has_the_tables_of_the_kernel() -> None:
     module = runpy.run_path(str(ROOT / "docs" / "_reference" / "kernel_tables.py"))
     present = json.loads(json.dumps(module["tables"]()))
