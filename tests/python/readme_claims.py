@@ -1101,7 +1101,7 @@ PROMISE_NOTHING = (
     "| | |",
     "| do | [install]",
     "| understand | [components]",
-    "| look up | [rules]",
+    "| look up | [reference]",
     "On the disk the demo takes",  # figures of one day
     "`scripts/lint` takes 0.3 GB more",
     "The demo's verdict is about its supervisors' swaps",
