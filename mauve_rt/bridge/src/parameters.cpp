@@ -46,19 +46,24 @@ NodeParameters node_parameters(const rcl_params_t& all, std::size_t node) {
 
 std::vector<NodeParameters> parameters_of(const std::vector<std::string>& words) {
   std::vector<const char*> argv;
+  argv.reserve(words.size());
   for (const std::string& word : words) argv.push_back(word.c_str());
   rcl_arguments_t arguments = rcl_get_zero_initialized_arguments();
-  check(rcl_parse_arguments(static_cast<int>(argv.size()), argv.data(), rcl_get_default_allocator(), &arguments),
+  check(rcl_parse_arguments(static_cast<int>(argv.size()), argv.data(), rcl_get_default_allocator(),
+                            &arguments),
         "the ROS arguments cannot be read", "--ros-args");
   const auto end_arguments = [](rcl_arguments_t* one) { (void)went_well(rcl_arguments_fini(one)); };
   const std::unique_ptr<rcl_arguments_t, decltype(end_arguments)> ends(&arguments);
   rcl_params_t* params = nullptr;
-  check(rcl_arguments_get_param_overrides(&arguments, &params), "the parameters cannot be read", "--ros-args");
+  check(rcl_arguments_get_param_overrides(&arguments, &params), "the parameters cannot be read",
+        "--ros-args");
   if (params == nullptr) return {};
   const std::unique_ptr<rcl_params_t, decltype(&rcl_yaml_node_struct_fini)> freed(params,
-                                                                                 &rcl_yaml_node_struct_fini);
+                                                                                  &rcl_yaml_node_struct_fini);
   std::vector<NodeParameters> found;
-  for (std::size_t node = 0; node < params->num_nodes; ++node) found.push_back(node_parameters(*params, node));
+  found.reserve(params->num_nodes);
+  for (std::size_t node = 0; node < params->num_nodes; ++node)
+    found.push_back(node_parameters(*params, node));
   return found;
 }
 
