@@ -21,12 +21,13 @@ def test_the_page_does_what_it_says(page: str, reader: Reader) -> None:
 
 
 def test_a_tutorial_is_done_after_those_that_it_needs() -> None:
-    page = "# 3\n\n## What you need\n\n- [one](01_one.md), [two](02_two.md)\n\n## 1.\n\nNext: [4](04_four.md)\n"
+    page = "## What you need\n\n- [one](01_one.md), [two](02_two.md)\n\n## 1.\n\nNext: [4](04_four.md)\n"
     assert needed(page) == ["01_one.md", "02_two.md"]
 
 
 def test_commands_are_told_from_their_output() -> None:
-    assert list(commands("$ one \\\n    two\nout\n\n$ three &\n")) == [("one two", "out\n\n"), ("three &", "")]
+    text = "$ one \\\n    two\nout\n\n$ three &\n"
+    assert list(commands(text)) == [("one two", "out\n\n"), ("three &", "")]
 
 
 @pytest.mark.parametrize(

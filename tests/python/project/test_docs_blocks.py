@@ -159,7 +159,7 @@ def test_each_block_of_a_tutorial_is_a_file_or_commands_or_says_why_not(page: st
     text = PAGES[page]
     wrong = [block for block in blocks(text) if is_run(block, text) == bool(block.not_run)]
     assert [f"line {block.lines.start + 1}: {block.first_line}" for block in wrong] == [], (
-        "end the paragraph above with `path/of/file`: or make it a console block, see tests/tutorial_pages.py;"
+        "end the paragraph above with `path/of/file`: or make it a console block (tests/tutorial_pages.py),"
         " or write <!-- not run: REASON --> in the line above"
     )
     assert is_there(TUTORIALS_RUN_BY)
