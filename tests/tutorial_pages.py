@@ -16,7 +16,7 @@ from typing import Self
 
 from page_blocks import Block, blocks
 
-PATIENCE_S = 200.0
+PATIENCE_S = 100.0
 PAGES = Path(__file__).parents[1] / "docs" / "tutorials"
 FILE = re.compile(r"`([\w./-]+)`:$")
 
@@ -70,12 +70,14 @@ class Reader:
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
         self._folder = folder
         self._environment = dict(environment)
-        self._done: set[str] = set()
+        self._done: dict[str, bool] = {}  # by page: whether all of it was as shown
 
     def do(self, name: str) -> None:
         """Do the page, unless it is done."""
         if name in self._done:
+            assert self._done[name], f"{name} has failed"
             return
+        self._done[name] = False
         page = (PAGES / name).read_text(encoding="utf-8")
         for other in needed(page):
             self.do(other)
@@ -89,7 +91,7 @@ class Reader:
                 else:
                     for command, shown in commands(block.text):
                         terminal.type(command, shown, where)
-        self._done.add(name)
+        self._done[name] = True
 
 
 class Terminal:
@@ -98,7 +100,7 @@ class Terminal:
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
         self._logs = folder / ".logs"
         self._logs.mkdir(exist_ok=True)
-        self._count = len(list(self._logs.iterdir()))  # the logs of earlier pages stay
+        self._count = len(list(self._logs.iterdir()))
         self._shell = subprocess.Popen(
             ["bash", "--norc"],
             cwd=folder,
@@ -139,8 +141,7 @@ class Terminal:
                 break
             assert time.monotonic() < deadline, f"{where}: {command}:\n{output}\nexpected:\n{shown}"
             time.sleep(0.02)
-        is_output_shown = shown.strip() not in ("", "...")
-        fits = expected.fullmatch(output) if is_output_shown else status == "0"
+        fits = expected.fullmatch(output) if shown.strip() not in ("", "...") else status == "0"
         assert runs_on or fits, f"{where}: {command}: status {status}\n{output}\nexpected:\n{shown}"
 
     def _send(self, line: str) -> None:
