@@ -858,6 +858,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         _KERNEL_ALONE,
     ),
     "has the paper's Listings 1 to 3 as a program": ("ctest: listings",),
+    "go from a first component to a robot of your own": (
+        "ros/test_tutorials.py::test_the_page_does_what_it_says",
+    ),
     "Whole components can be written in Python": (
         "python/parts/test_components.py::test_python_and_cpp_exchange_data_both_ways",
     ),

@@ -188,3 +188,14 @@ def test_a_block_with_neither_is_found() -> None:
     assert [each.partition(": ")[2] for each in _unexplained(page, ["known()"])] == [
         *("unknown --word", "far", "inside", "in an item", "no reason", "known() again")
     ]
+
+
+def test_a_block_of_a_tutorial_that_is_neither_a_file_nor_commands_is_found() -> None:
+    page = "\n".join(
+        [
+            *("Write `a/file.yaml`:", "", "```yaml", "mauve: 1", "```", ""),
+            *("```console", "$ mauve list", "```", "", "Look:", "", "```yaml", "mauve: 2", "```", ""),
+            *("<!-- not run: it takes a day -->", "```console", "$ mauve list", "```", ""),
+        ]
+    )
+    assert [is_run(block, page) for block in blocks(page)] == [True, True, False, False]
