@@ -16,7 +16,7 @@ from typing import Self
 
 from page_blocks import Block, blocks
 
-PATIENCE_S = 100.0
+PATIENCE_S = 300.0  # a busy computer compiles for a minute
 PAGES = Path(__file__).parents[1] / "docs" / "tutorials"
 FILE = re.compile(r"`([\w./-]+)`:$")
 
