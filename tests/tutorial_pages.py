@@ -127,8 +127,7 @@ class Terminal:
         """Type a command, and hold its output against what is shown; of one that runs on, until that came."""
         self._count += 1
         log, status_file = self._logs / f"{self._count}.log", self._logs / f"{self._count}.status"
-        runs_on = command.endswith("&")
-        if runs_on:
+        if runs_on := command.endswith("&"):
             self._send(f"{{ {command[:-1]}; }} >{log} 2>&1 &")
         else:
             self._send(f"{{ {command}\n}} >{log} 2>&1; echo $? >{status_file}")
