@@ -1,11 +1,16 @@
 """How scripts/docs makes a site of these pages: Sphinx reads MyST Markdown, furo draws the pages."""
 
 import logging
+import sys
+from pathlib import Path
 
 project = "MAUVE RT"
 html_title = "MAUVE RT"
 
 extensions = ["myst_parser"]
+if (Path(__file__).parent / "_reference").is_dir():  # not in the small sets of pages that tests build
+    sys.path.insert(0, str(Path(__file__).parent))
+    extensions.append("_reference")  # the parts of docs/reference/ that come from the sources
 myst_heading_anchors = 4  # `page.md#a-heading` is a link that the build checks
 myst_enable_extensions = ["colon_fence"]  # ::: around what is no code
 # A kind of page may have no page yet. Sphinx gives that warning no type, so suppress_warnings cannot name it.

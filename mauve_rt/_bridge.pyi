@@ -1,7 +1,7 @@
 """Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge."""
 
 from collections.abc import Mapping, Sequence
-from typing import overload
+from typing import Any, overload
 
 def start_console() -> None:
     """From here on a thread of its own writes the process's log lines to the console.
@@ -11,6 +11,13 @@ def start_console() -> None:
 
 def flush_console(timeout_ns: int) -> bool:
     """Wait until all lines are written; False: the console is not read."""
+
+def parameters_of(words: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
+    """What `--ros-args` says to nodes, in rcl's order: their name or pattern, and values by parameter.
+
+    Raises:
+        MauveError: rcl refuses the words, or a parameter file.
+    """
 
 class NodeWatch:
     """Reports, without Python, that Python is silent: an ERROR in the log, no WATCHDOG=1 for systemd."""

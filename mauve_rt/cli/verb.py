@@ -2,14 +2,22 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from mauve_rt.cli.pipe import piped
+from mauve_rt.cli.pipe import PIPE_CLOSED, piped
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.trace.errors import TraceError
 
 OK, REFUSED, BAD_USAGE, NOT_PROVED, INTERRUPTED = 0, 1, 2, 3, 130
+EXIT_STATUSES: Mapping[int, str] = {
+    OK: "done",
+    REFUSED: "the executor refused the request; or a check found an error; or `analyze`: not schedulable",
+    BAD_USAGE: "bad usage, a file that cannot be read, or no such executor",
+    NOT_PROVED: "`analyze` proves neither that the architecture is schedulable nor that it is not",
+    INTERRUPTED: "interrupted from the keyboard",
+    PIPE_CLOSED: "the reader of the output closed the pipe",
+}
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ a process import anything else.
 """
 
 import importlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -24,7 +24,14 @@ from mauve_rt.model.words import did_you_mean
 from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "mauve_rt_plugins"
-KINDS = ("shell", "core", "fsm", "resource", "type", "call_type")
+KINDS: Mapping[str, str] = {
+    "shell": "the ports and properties of a component",
+    "core": "the data and algorithms of a component; in C++ or in Python",
+    "fsm": "the states of a component",
+    "resource": "a kind of resource",
+    "type": "a type of values of resources, such as a ROS message",
+    "call_type": "a type of calls, such as a ROS service",
+}
 _FIELDS = 4
 
 

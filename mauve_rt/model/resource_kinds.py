@@ -50,9 +50,15 @@ def read_parameters(
     return read
 
 
+def parameter_setting(parameter: ResourceParameter) -> Setting:
+    """What a parameter may be in a file."""
+    kind, hint = _kind_of(parameter), _hint(parameter)
+    return Setting(kind, parameter.description, default=parameter.initial, hint=hint)
+
+
 def _read(parameter: ResourceParameter, value: Any, place: Location, faults: Faults) -> Any:
     before = len(faults)
-    read = Setting(_kind_of(parameter), parameter.initial, _hint(parameter)).read(value, place, faults)
+    read = parameter_setting(parameter).read(value, place, faults)
     for fault in faults[before:]:
         if fault.what in ("least", "most") and parameter.unit:
             fault.limit = f"{fault.limit:.15g} {parameter.unit}"

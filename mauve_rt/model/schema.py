@@ -16,39 +16,15 @@
     connections:
       - [exploration.goal, goal.write]
 
-`alternatives` are the cores, fsms and shells that a component takes beside those it starts with; the word
-`installed` stands for all there are. `fallback` is the core that takes over by itself after a fault.
-`deadline_ns` and `states` are what the timing analysis asks for: how long after a release its work is to be
-done, and how long a state executes. `wcet_ns` is its worst-case execution time; only the analysis takes it,
-and nothing enforces it. `max_execution_ns` is a bound, which the watchdog enforces; the analysis takes it of
-a state without `wcet_ns`. `simulated_execution_ns` is what it takes in virtual time, and no bound:
+Each setting has its description, for docs/reference/architecture_file.md. The `diagnostics` of a component
+take the place of those of the executor; the figures are those since the last status:
 
-    control: {..., deadline_ns: 5000000, states: {Control: {wcet_ns: 200000, max_execution_ns: 1000000}}}
-
-`longest_hold_ns` of a resource is the longest time for which one component holds its lock: the analysis
-takes it, and nothing enforces it. It takes precedence over the time that the resource's code declares:
-
-    map: {kind: mauve_examples/Map, longest_hold_ns: 2000000}
-
-`trace_records` is the room for its trace until it is drained, 2,048 or more where the period is short; what
-does not fit is counted as lost. A state that lasts longer than `hung_after_ms` is told as hung: an error in
-/diagnostics, in ~/state and in the log; without the key after 10 periods, but no sooner than after 1 s.
-
-From which figures on /diagnostics warns, for all components and for each one:
-
-    executor: {diagnostics: {overruns: {warn: 1, error: 10}}}
+    executor: {diagnostics: {overruns: {warn: 1, error: 10}}, sender: {priority: 70, cpus: [0]}}
     components:
-      control: {..., diagnostics: {wakeup_max_us: {warn: 500, error: 2000}, execution_max_us: {error: 900}}}
+      control: {..., deadline_ns: 5000000, states: {Control: {wcet_ns: 200000, max_execution_ns: 1000000}},
+                diagnostics: {wakeup_max_us: {warn: 500, error: 2000}, overruns: null}}
 
-Figures are those since the last status, a second before. A key of a component takes the place of the
-executor's, `null` switches it off.
-
-Messages are sent by a thread of the executor, after the components have done their work. Where a message must
-not wait for other components, or for another CPU to wake up, say where it runs and how urgently:
-
-    executor: {sender: {priority: 70, cpus: [0]}}
-
-Nothing here looks at plug-ins, so a file can be read where none is installed.
+No plug-in is needed to read a file.
 """
 
 from collections.abc import Mapping
@@ -119,8 +95,8 @@ class _Alternatives(ListOf):
 class ThresholdModel(Section):
     """From which figure on a status is a warning, and from which an error."""
 
-    warn: float | None = setting(Real(above=0), default=None)
-    error: float | None = setting(Real(above=0), default=None)
+    warn: float | None = setting(Real(above=0), "the status is a warning from this figure on", default=None)
+    error: float | None = setting(Real(above=0), "the status is an error from this figure on", default=None)
 
     def misfit(self) -> Fault | None:
         """One of them at least, and in order."""
@@ -137,12 +113,22 @@ _THRESHOLD = Part(ThresholdModel)
 class DiagnosticsModel(Section):
     """Thresholds of what /diagnostics tells of a component; figures since the last status."""
 
-    wakeup_max_us: ThresholdModel | None = setting(_THRESHOLD, default=None)  # the largest wake-up latency
-    execution_max_us: ThresholdModel | None = setting(_THRESHOLD, default=None)  # the longest of a state
-    overruns: ThresholdModel | None = setting(_THRESHOLD, default=None)
-    skipped: ThresholdModel | None = setting(_THRESHOLD, default=None)  # instants
-    allocations: ThresholdModel | None = setting(_THRESHOLD, default=None)  # of its thread
-    page_faults: ThresholdModel | None = setting(_THRESHOLD, default=None)
+    wakeup_max_us: ThresholdModel | None = setting(
+        _THRESHOLD, "largest wake-up latency of the component", default=None
+    )
+    execution_max_us: ThresholdModel | None = setting(
+        _THRESHOLD, "longest execution of a state", default=None
+    )
+    overruns: ThresholdModel | None = setting(_THRESHOLD, "number of overruns", default=None)
+    skipped: ThresholdModel | None = setting(
+        _THRESHOLD, "number of instants that overruns skipped", default=None
+    )
+    allocations: ThresholdModel | None = setting(
+        _THRESHOLD, "number of allocations on the thread of the component", default=None
+    )
+    page_faults: ThresholdModel | None = setting(
+        _THRESHOLD, "number of page faults of the thread of the component", default=None
+    )
 
     def overridden_by(self, other: Self) -> Self:
         """These thresholds, but those that `other` sets, or switches off, in their place."""
@@ -152,41 +138,63 @@ class DiagnosticsModel(Section):
 class SenderModel(Section):
     """The thread that sends the messages of bound topics."""
 
-    priority: int = kernel_setting("priority", default=1)
-    cpus: list[int] | None = kernel_setting("cpus")  # absent: any
+    priority: int = kernel_setting("priority", "priority of the thread", default=1)
+    cpus: list[int] | None = kernel_setting(
+        "cpus", "CPUs on which the thread may run; without the key any CPU"
+    )
 
 
 class ExecutorModel(Section):
     """The process as a whole."""
 
-    namespace: str = setting(_NAMESPACE, default="/")
-    peers: list[str] = setting(ListOf(IDENTIFIER), default=[])
-    require_realtime: bool = setting(Flag(), default=False)
+    namespace: str = setting(
+        _NAMESPACE,
+        "ROS namespace of the executor; relative names of topics and services are resolved against it",
+        default="/",
+    )
+    peers: list[str] = setting(ListOf(IDENTIFIER), "names of the other robots", default=[])
+    require_realtime: bool = setting(
+        Flag(), "refuse to start without the rights for real-time priorities and locked memory", default=False
+    )
     diagnostics: DiagnosticsModel = setting(
-        Part(DiagnosticsModel), default=DiagnosticsModel()
-    )  # of every component
-    sender: SenderModel = setting(Part(SenderModel), default=SenderModel())
+        Part(DiagnosticsModel), "thresholds of /diagnostics for every component", default=DiagnosticsModel()
+    )
+    sender: SenderModel = setting(
+        Part(SenderModel), "the thread that sends the messages of bound topics", default=SenderModel()
+    )
 
 
 class QosModel(Section):
     """Quality of service: a profile by name, and fields that say otherwise. Durations in ms, 0: none."""
 
     profile: Literal["reliable", "best_effort", "transient_local", "sensor_data"] = setting(
-        Choice(*QOS_NAMES), default="reliable"
+        Choice(*QOS_NAMES), "the profile that gives the value of each key that is absent", default="reliable"
     )
     reliability: Literal["reliable", "best_effort"] | None = setting(
-        Choice("reliable", "best_effort"), default=None
+        Choice("reliable", "best_effort"), "repair lost messages, or not", default=None
     )
     durability: Literal["volatile", "transient_local"] | None = setting(
-        Choice("volatile", "transient_local"), default=None
+        Choice("volatile", "transient_local"),
+        "keep the last messages for subscribers that come later, or not",
+        default=None,
     )
-    depth: int | None = setting(Whole(1, MAX_DEPTH), default=None)
-    deadline_ms: float = setting(_DURATION_MS, default=0.0)
-    lifespan_ms: float = setting(_DURATION_MS, default=0.0)
+    depth: int | None = setting(
+        Whole(1, MAX_DEPTH),
+        "length of the queue of messages; without the key as the profile says",
+        default=None,
+    )
+    deadline_ms: float = setting(
+        _DURATION_MS, "longest expected time between two messages; 0: none", default=0.0
+    )
+    lifespan_ms: float = setting(
+        _DURATION_MS, "a message that is older is not delivered; 0: no limit", default=0.0
+    )
     liveliness: Literal["automatic", "manual_by_topic"] = setting(
-        Choice("automatic", "manual_by_topic"), default="automatic"
+        Choice("automatic", "manual_by_topic"), "how a publisher shows that it is alive", default="automatic"
     )
-    lease_ms: float = setting(_DURATION_MS, default=0.0)  # a publisher silent for longer counts as gone
+    lease_ms: float = setting(
+        _DURATION_MS, "a publisher that is silent for longer counts as gone; 0: never", default=0.0
+    )
 
 
 class _Qos(Part):
@@ -205,31 +213,51 @@ class _Qos(Part):
 class TopicModel(Section):
     """The ROS topic that a resource is bound to; the name is relative to the executor's namespace."""
 
-    name: str = setting(ROS_NAME)
-    direction: Literal["publish", "subscribe"] = setting(Choice("publish", "subscribe"))
-    qos: QosModel = setting(_Qos(QosModel), default=QosModel())
+    name: str = setting(ROS_NAME, "name of the topic, relative to the namespace of the executor")
+    direction: Literal["publish", "subscribe"] = setting(
+        Choice("publish", "subscribe"),
+        "publish each write to the resource, or write each received message to the resource",
+    )
+    qos: QosModel = setting(
+        _Qos(QosModel),
+        "quality of service: the name of a profile, or a mapping with the keys below",
+        default=QosModel(),
+    )
 
 
 class ServiceModel(Section):
     """The ROS service that a client calls, or that a resource offers; names as TopicModel."""
 
-    name: str = setting(ROS_NAME)
+    name: str = setting(ROS_NAME, "name of the service, relative to the namespace of the executor")
     offers: str | None = setting(
-        IDENTIFIER, default=None
-    )  # the resource's call; absent: the resource is a client
-    # Of a client: no call blocks longer.
-    timeout_ms: float | None = setting(Real(above=0, most=_LONGEST_MS), default=None)
+        IDENTIFIER,
+        "call of the resource that the service runs; without the key the resource is a client of the service",
+        default=None,
+    )
+    timeout_ms: float | None = setting(
+        Real(above=0, most=_LONGEST_MS), "of a client: a call blocks no longer than this", default=None
+    )
 
 
 class ResourceModel(Section):
     """Data that components share. What else it is told is of its kind, which says what that may be."""
 
-    kind: str = setting(_RESOURCE_KIND)
-    type: str = setting(Text(), default="")
-    topic: TopicModel | None = setting(Part(TopicModel), default=None)
-    service: ServiceModel | None = setting(Part(ServiceModel), default=None)
-    # For how long one user holds its lock; for the analysis; None: as its code declares.
-    longest_hold_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)
+    kind: str = setting(_RESOURCE_KIND, "kind of the resource: a given kind, or a plug-in")
+    type: str = setting(
+        Text(), "type of the values: a ROS message, a ROS service, or a type of a plug-in", default=""
+    )
+    topic: TopicModel | None = setting(
+        Part(TopicModel), "the ROS topic that carries the values", default=None
+    )
+    service: ServiceModel | None = setting(
+        Part(ServiceModel), "the ROS service that the resource calls or offers", default=None
+    )
+    longest_hold_ns: int | None = setting(
+        Whole(1, _LONGEST_NS),
+        "the longest time for which one component holds its lock: the timing analysis takes it, nothing "
+        "enforces it; without it, what the resource's code declares",
+        default=None,
+    )
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -261,9 +289,19 @@ class ResourceModel(Section):
 class StateModel(Section):
     """Times of an execution state, in the place of what the fsm's own code says."""
 
-    max_execution_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)  # the watchdog enforces it
-    simulated_execution_ns: int | None = setting(Whole(0, _LONGEST_NS), default=None)  # in virtual time
-    wcet_ns: int | None = setting(Whole(1, _LONGEST_NS), default=None)  # for the analysis; not enforced
+    max_execution_ns: int | None = setting(
+        Whole(1, _LONGEST_NS),
+        "bound of one execution; the watchdog faults a component that exceeds it",
+        default=None,
+    )
+    simulated_execution_ns: int | None = setting(
+        Whole(0, _LONGEST_NS), "execution time in virtual time", default=None
+    )
+    wcet_ns: int | None = setting(
+        Whole(1, _LONGEST_NS),
+        "worst-case execution time for the timing analysis; nothing enforces it",
+        default=None,
+    )
 
     def misfit(self) -> Fault | None:
         """One of them at least, and no worst case above the bound."""
@@ -280,26 +318,56 @@ class StateModel(Section):
 class ComponentModel(Section):
     """A component and the thread it runs on."""
 
-    shell: str = setting(PLUGIN_NAME)
-    core: str = setting(PLUGIN_NAME)
-    fsm: str = setting(PLUGIN_NAME)
-    alternatives: list[str] | Literal["installed"] = setting(_Alternatives(PLUGIN_NAME), default=[])
-    fallback: str | None = setting(PLUGIN_NAME, default=None)
-    priority: int = kernel_setting("priority")
-    cpus: list[int] | None = kernel_setting("cpus")  # absent: any
-    offset_ms: float = kernel_setting("offset_ns", in_ms=True)
-    period_ns: int = kernel_setting("period_ns")  # 0: as the FSM says
-    overrun: Literal["skip", "catch_up", "fault"] = kernel_setting("overrun")
-    max_backlog: int = kernel_setting("max_backlog")
-    stack_bytes: int = kernel_setting("stack_bytes")
-    trace_records: int | None = kernel_setting("trace_records")  # None: by the period
-    # A state that lasts longer is told as hung; None: 10 periods, 1 s at least.
-    hung_after_ms: float | None = kernel_setting("hung_after_ns", in_ms=True)
-    deadline_ns: int | None = kernel_setting("deadline_ns")  # None: the next instant
-    states: dict[str, StateModel] = setting(TableOf(Part(StateModel), names=IDENTIFIER), default={})
-    reconfigurable: bool = setting(Flag(), default=True)
-    properties: dict[str, PropertyValue] = setting(TableOf(Scalar()), default={})
-    diagnostics: DiagnosticsModel = setting(Part(DiagnosticsModel), default=DiagnosticsModel())
+    shell: str = setting(PLUGIN_NAME, "plug-in of the shell: ports and properties")
+    core: str = setting(PLUGIN_NAME, "plug-in of the core: data and algorithms")
+    fsm: str = setting(PLUGIN_NAME, "plug-in of the fsm: the states")
+    alternatives: list[str] | Literal["installed"] = setting(
+        _Alternatives(PLUGIN_NAME),
+        "cores, fsms and shells that may replace the present ones; installed: every plug-in that fits",
+        default=[],
+    )
+    fallback: str | None = setting(PLUGIN_NAME, "core that takes over after a fault", default=None)
+    priority: int = kernel_setting("priority", "SCHED_FIFO priority of the thread of the component")
+    cpus: list[int] | None = kernel_setting(
+        "cpus", "CPUs on which the thread may run; without the key any CPU"
+    )
+    offset_ms: float = kernel_setting("offset_ns", "time from the epoch to the first instant", in_ms=True)
+    period_ns: int = kernel_setting("period_ns", "period of the grid; 0: as the fsm says")
+    overrun: Literal["skip", "catch_up", "fault"] = kernel_setting(
+        "overrun", "policy after an overrun: skip the missed instants, catch up, or fault"
+    )
+    max_backlog: int = kernel_setting(
+        "max_backlog", "most instants that a component may owe with the policy catch_up"
+    )
+    stack_bytes: int = kernel_setting("stack_bytes", "size of the stack; the whole stack is held in memory")
+    trace_records: int | None = kernel_setting(
+        "trace_records", "room for trace records until they are drained; without the key by the period"
+    )
+    hung_after_ms: float | None = kernel_setting(
+        "hung_after_ns",
+        "a state that executes for longer is reported as hung; without the key 10 periods, at least 1 s",
+        in_ms=True,
+    )
+    deadline_ns: int | None = kernel_setting(
+        "deadline_ns",
+        "deadline of a job after its release, for the timing analysis; without the key the next instant",
+    )
+    states: dict[str, StateModel] = setting(
+        TableOf(Part(StateModel), names=IDENTIFIER),
+        "times of execution states by name; each replaces the time in the code of the fsm",
+        default={},
+    )
+    reconfigurable: bool = setting(Flag(), "whether requests may change the component", default=True)
+    properties: dict[str, PropertyValue] = setting(
+        TableOf(Scalar()),
+        "values of properties by name; without a name the default of its shell, core or fsm",
+        default={},
+    )
+    diagnostics: DiagnosticsModel = setting(
+        Part(DiagnosticsModel),
+        "thresholds of /diagnostics in the place of those of the executor; null removes one",
+        default=DiagnosticsModel(),
+    )
 
     def task_settings(self) -> dict[str, Any]:
         """How the kernel is to run it; what the file does not say is the kernel's choice."""
@@ -317,16 +385,24 @@ class ComponentModel(Section):
 class FileModel(Section):
     """A whole architecture file."""
 
-    mauve: Literal[1] = setting(Choice(1), hint="this program reads version 1 of the schema")
-    executor: ExecutorModel = setting(Part(ExecutorModel), default=ExecutorModel())
-    components: dict[str, ComponentModel] = setting(TableOf(Part(ComponentModel), names=IDENTIFIER, few=1))
-    resources: dict[str, ResourceModel] = setting(TableOf(Part(ResourceModel), names=IDENTIFIER), default={})
-    connections: list[list[str]] = setting(ListOf(ListOf(_ENDPOINT, few=2, many=2)), default=[])
+    mauve: Literal[1] = setting(
+        Choice(1), "version of the schema", hint="this program reads version 1 of the schema"
+    )
+    executor: ExecutorModel = setting(Part(ExecutorModel), "settings of the process", default=ExecutorModel())
+    components: dict[str, ComponentModel] = setting(
+        TableOf(Part(ComponentModel), names=IDENTIFIER, few=1), "components by name"
+    )
+    resources: dict[str, ResourceModel] = setting(
+        TableOf(Part(ResourceModel), names=IDENTIFIER), "resources by name", default={}
+    )
+    connections: list[list[str]] = setting(
+        ListOf(ListOf(_ENDPOINT, few=2, many=2)), "pairs [component.port, resource.service]", default=[]
+    )
 
 
 class FragmentModel(FileModel):
     """A part of an architecture file: what one step of a transaction adds."""
 
     components: dict[str, ComponentModel] = setting(
-        TableOf(Part(ComponentModel), names=IDENTIFIER), default={}
+        TableOf(Part(ComponentModel), names=IDENTIFIER), "components by name", default={}
     )

@@ -1,8 +1,10 @@
 """Sections of a file as classes: a table of settings, each one value with its bounds.
 
     class SenderModel(Section):
-        priority: int = setting(Whole(1, 98), default=1, hint="1 is the lowest")
-        cpus: list[int] | None = setting(ListOf(Whole(0, 65535), few=1), default=None)
+        priority: int = setting(Whole(1, 98), "priority of the thread", default=1, hint="1 is the lowest")
+        cpus: list[int] | None = setting(ListOf(Whole(0, 65535), few=1), "allowed CPUs", default=None)
+
+The text after the kind is the description of the key in the reference documentation.
 
 Objects are immutable and compare by value. A setting whose default is None takes `null` in a file as well.
 """
@@ -17,10 +19,10 @@ _REQUIRED = object()
 
 
 class Setting:
-    """What a key may be set to, what it is otherwise, and a hint for who sets it wrongly."""
+    """The allowed values of a key, its description, its default, and a hint for a wrong value."""
 
-    def __init__(self, kind: Kind, default: Any, hint: str, key: str = "") -> None:
-        self.kind, self.default, self.hint = kind, default, hint
+    def __init__(self, kind: Kind, what: str, *, default: Any, hint: str, key: str = "") -> None:
+        self.kind, self.what, self.default, self.hint = kind, what, default, hint
         self.key = key  # in a file, where that is no name in Python; empty: as the attribute
         self.attribute = ""  # set by the section
 
@@ -45,9 +47,9 @@ class Setting:
         return read
 
 
-def setting(kind: Kind, *, default: Any = _REQUIRED, hint: str = "", key: str = "") -> Any:
-    """A setting of a Section; `key` is its key in a file, where that is no name in Python."""
-    return Setting(kind, default, hint, key)
+def setting(kind: Kind, what: str, *, default: Any = _REQUIRED, hint: str = "", key: str = "") -> Any:
+    """A setting that `what` describes; `key` is its key in a file, where that is no name in Python."""
+    return Setting(kind, what, default=default, hint=hint, key=key)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(setting,))

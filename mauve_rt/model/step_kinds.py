@@ -17,6 +17,7 @@ Value = Literal["", "scalar", "resource.service", "section"]
 class StepKind:
     """What a step of this kind is about."""
 
+    what: str  # the effect in words, for the reference documentation
     target: Target = "component"
     name: Name = ""  # what of the target; empty: none
     value: Value = ""  # what its YAML text is; section: what stands below a name in the architecture file
@@ -43,20 +44,48 @@ class StepKind:
 
 
 STEP_KINDS: Mapping[str, StepKind] = {
-    "replace_core": StepKind(name="core", needs_running=True),
-    "replace_fsm": StepKind(name="fsm", needs_running=True),
-    "replace_shell": StepKind(name="shell", needs_running=True, changes_parameters=True),
-    "set_property": StepKind(name="property", value="scalar", needs_running=True, changes_parameters=True),
-    "connect": StepKind(name="port", value="resource.service"),
-    "disconnect": StepKind(name="port"),
-    "add_component": StepKind(
-        target="new component", value="section", changes_parameters=True, is_prepared=False
+    "replace_core": StepKind(
+        what="replace the core; the component keeps its pending instant", name="core", needs_running=True
     ),
-    "remove_component": StepKind(removes=True, changes_parameters=True),
-    "add_resource": StepKind(target="new resource", value="section", is_prepared=False),
-    "remove_resource": StepKind(target="resource", removes=True),
-    "start": StepKind(leaves=("RUNNING",)),
-    "stop": StepKind(leaves=("STOPPED",)),
-    "configure": StepKind(leaves=("STOPPED", "RUNNING"), is_prepared=False),
-    "resynchronise": StepKind(target="all", is_prepared=False),
+    "replace_fsm": StepKind(what="replace the fsm", name="fsm", needs_running=True),
+    "replace_shell": StepKind(
+        what="replace the shell, with a new instance of the fsm",
+        name="shell",
+        needs_running=True,
+        changes_parameters=True,
+    ),
+    "set_property": StepKind(
+        what="set a property of the component",
+        name="property",
+        value="scalar",
+        needs_running=True,
+        changes_parameters=True,
+    ),
+    "connect": StepKind(
+        what="connect a port to a service of a resource", name="port", value="resource.service"
+    ),
+    "disconnect": StepKind(what="disconnect a port", name="port"),
+    "add_component": StepKind(
+        what="add a component; value: its section of an architecture file",
+        target="new component",
+        value="section",
+        changes_parameters=True,
+        is_prepared=False,
+    ),
+    "remove_component": StepKind(what="stop and remove the component", removes=True, changes_parameters=True),
+    "add_resource": StepKind(
+        what="add a resource; value: its section of an architecture file",
+        target="new resource",
+        value="section",
+        is_prepared=False,
+    ),
+    "remove_resource": StepKind(what="remove the resource", target="resource", removes=True),
+    "start": StepKind(what="start the component at its next instant", leaves=("RUNNING",)),
+    "stop": StepKind(what="stop the component", leaves=("STOPPED",)),
+    "configure": StepKind(
+        what="configure the component anew, for example after a fault",
+        leaves=("STOPPED", "RUNNING"),
+        is_prepared=False,
+    ),
+    "resynchronise": StepKind(what="give all components a new common epoch", target="all", is_prepared=False),
 }

@@ -49,13 +49,15 @@ class _YamlText(Text):
         return super().read(json.dumps(value) if is_value else value, place, faults)
 
 
-class _StepForm(Section):
+class StepForm(Section):
     """A step as files have it."""
 
-    kind: str = setting(Choice(*STEP_KINDS))
-    target: str = setting(IDENTIFIER_OR_NONE, default="")
-    name: str = setting(Text(), default="")
-    value: str = setting(_YamlText(), default="")
+    kind: str = setting(Choice(*STEP_KINDS), "kind of the step")
+    target: str = setting(IDENTIFIER_OR_NONE, "component or resource that the step changes", default="")
+    name: str = setting(
+        Text(), "part, property or port of the target, as the kind of the step says", default=""
+    )
+    value: str = setting(_YamlText(), "YAML value, as the kind of the step says", default="")
 
     def misfit(self) -> Fault | None:
         """Most kinds need a target, some a name, some a value."""
@@ -78,7 +80,7 @@ class _StepPart(Kind):
         if isinstance(value, Step):
             return value
         before = len(faults)
-        form = _StepForm.read(value, place, faults)
+        form = StepForm.read(value, place, faults)
         return Step(form.kind, form.target, form.name, form.value) if len(faults) == before else form
 
 
@@ -88,8 +90,8 @@ STEPS = ListOf(_StepPart(), few=1)
 class Change(Section):
     """A transaction: its steps, and whether it gives up components whose state does not end."""
 
-    force: bool = setting(Flag(), default=False)
-    steps: list[Step] = setting(STEPS)
+    force: bool = setting(Flag(), "give up components whose state does not end in time", default=False)
+    steps: list[Step] = setting(STEPS, "the steps; all of them take effect, or none")
 
 
 _SHOULD: Mapping[str, str] = {

@@ -41,25 +41,37 @@ MOST_PRIORITY = 1000
 class Undo(Section):
     """What a rule does once its condition has been false for `for_s` seconds without a break."""
 
-    for_s: float = setting(_SECONDS, default=0.0)
-    do: list[Step] = setting(STEPS)
+    for_s: float = setting(_SECONDS, "the condition must be false for so long without a break", default=0.0)
+    do: list[Step] = setting(STEPS, "the steps that undo the action")
 
 
 class Rule(Section):
     """One condition and what to do about it. Times in seconds."""
 
-    name: str = setting(IDENTIFIER)
-    when: When = setting(WhenPart())
+    name: str = setting(IDENTIFIER, "name of the rule, unique in the file")
+    when: When = setting(WhenPart(), "the condition")
     where: Literal["executor", "supervisor"] = setting(
-        Choice("executor", "supervisor"), default="executor", key="in"
+        Choice("executor", "supervisor"), "process that runs the rule", default="executor", key="in"
     )
-    priority: int = setting(Whole(0, MOST_PRIORITY), default=0)
-    for_s: float = setting(_SECONDS, default=0.0)
-    do: list[Step] = setting(STEPS)
-    undo: Undo | None = setting(Part(Undo), default=None)
-    cooldown_s: float = setting(_SECONDS, default=0.0)
-    otherwise: Literal["stop", "safe_outputs"] | None = setting(Choice("stop", "safe_outputs"), default=None)
-    otherwise_after_s: float = setting(_SECONDS, default=0.1)
+    priority: int = setting(
+        Whole(0, MOST_PRIORITY),
+        "of several rules that hold for one component, the highest priority decides",
+        default=0,
+    )
+    for_s: float = setting(_SECONDS, "the condition must hold for so long without a break", default=0.0)
+    do: list[Step] = setting(STEPS, "the action: steps as in a steps file")
+    undo: Undo | None = setting(Part(Undo), "what undoes the action; without the key nothing", default=None)
+    cooldown_s: float = setting(
+        _SECONDS, "shortest time from the outcome of an action to the next action of the rule", default=0.0
+    )
+    otherwise: Literal["stop", "safe_outputs"] | None = setting(
+        Choice("stop", "safe_outputs"),
+        "reserve action where `do` does not take effect; only for rules of an executor",
+        default=None,
+    )
+    otherwise_after_s: float = setting(
+        _SECONDS, "time from the instant at which `do` is due to the reserve action", default=0.1
+    )
 
     def steps(self, act: str) -> list[Step]:
         """The transaction of `do` or `undo`."""
@@ -75,9 +87,11 @@ class Rule(Section):
 class Rules(Section):
     """A whole rules file."""
 
-    mauve: Literal[1] = setting(Choice(1))
-    executor: str = setting(ROS_NAME, default="executor")
-    rules: list[Rule] = setting(ListOf(Part(Rule), few=1))
+    mauve: Literal[1] = setting(Choice(1), "version of the schema")
+    executor: str = setting(
+        ROS_NAME, "node of the executor, relative to the namespace of the supervisor", default="executor"
+    )
+    rules: list[Rule] = setting(ListOf(Part(Rule), few=1), "the rules")
 
 
 def lacks_type(leaf: When) -> bool:

@@ -58,24 +58,37 @@ _WORDS: Mapping[str, Mapping[str, int]] = {
 class Heard(Section):
     """One thing that happens, once or at equal distances."""
 
-    topic: str | None = setting(ROS_NAME, default=None)
-    resource: str | None = setting(Text(), default=None)
-    overruns: str | None = setting(Text(), default=None)
-    late: str | None = setting(Text(), default=None)
-    over_declared: str | None = setting(Text(), default=None)
-    released: str | None = setting(Text(), default=None)
-    state: str | None = setting(Text(), default=None)
-    peer: str | None = setting(Text(), default=None)
-    diagnostic: str | None = setting(Text(), default=None)
-    change: str | None = setting(Text(), default=None)
-    node: str | None = setting(Text(), default=None)
-    word: str | None = setting(
-        Choice(*dict.fromkeys(each for words in _WORDS.values() for each in words)), default=None, key="is"
+    topic: str | None = setting(ROS_NAME, "topic that receives a message", default=None)
+    resource: str | None = setting(Text(), "resource that is written", default=None)
+    overruns: str | None = setting(Text(), "component whose number of overruns grows", default=None)
+    late: str | None = setting(
+        Text(), "component whose number of late wake-ups or responses grows", default=None
     )
-    value: float = setting(Real(), default=0.0)
-    every_s: float | None = setting(Real(least=SHORTEST_PERIOD_S), default=None)  # absent: once
-    from_s: float = setting(Real(least=0, most=LONGEST_S), default=0.0)
-    until_s: float = setting(Real(least=0, most=LONGEST_S), default=LONGEST_S)
+    over_declared: str | None = setting(
+        Text(), "component whose number of executions over the declared time grows", default=None
+    )
+    released: str | None = setting(Text(), "component that is released", default=None)
+    state: str | None = setting(Text(), "component that enters the state of `is`", default=None)
+    peer: str | None = setting(Text(), "executor that enters the state of `is`", default=None)
+    diagnostic: str | None = setting(
+        Text(), "status of /diagnostics that has the level of `is`", default=None
+    )
+    change: str | None = setting(Text(), "component that is changed; empty: the architecture", default=None)
+    node: str | None = setting(
+        Text(), "that the Python side of the executor works; always empty", default=None
+    )
+    word: str | None = setting(
+        Choice(*dict.fromkeys(each for words in _WORDS.values() for each in words)),
+        "state or level of a `state`, `peer` or `diagnostic`",
+        default=None,
+        key="is",
+    )
+    value: float = setting(Real(), "value of the field that a condition reads", default=0.0)
+    every_s: float | None = setting(
+        Real(least=SHORTEST_PERIOD_S), "time between two repetitions; without the key once", default=None
+    )  # absent: once
+    from_s: float = setting(Real(least=0, most=LONGEST_S), "time of the first event", default=0.0)
+    until_s: float = setting(Real(least=0, most=LONGEST_S), "time of the last event", default=LONGEST_S)
 
     def misfit(self) -> Fault | None:
         """It is about one thing, and has a word where that has words."""
@@ -128,9 +141,9 @@ class Heard(Section):
 class Script(Section):
     """A whole script."""
 
-    mauve: Literal[1] = setting(Choice(1))
-    lasts_s: float = setting(Real(above=0, most=LONGEST_S))
-    heard: list[Heard] = setting(ListOf(Part(Heard)), default=[])
+    mauve: Literal[1] = setting(Choice(1), "version of the schema")
+    lasts_s: float = setting(Real(above=0, most=LONGEST_S), "virtual time that the script takes")
+    heard: list[Heard] = setting(ListOf(Part(Heard)), "the events", default=[])
 
 
 def load_script(path: Path, rules: Sequence[Rule]) -> Script:

@@ -19,10 +19,20 @@ from mauve_rt.model.yaml_file import Location
 from mauve_rt.supervision.condition_table import conditions, parameter_kind, parameters_of
 
 ALL, ANY, NOT, AT_LEAST = "all", "any", "not", "at_least"
-COMBINATIONS = (ALL, ANY, NOT, AT_LEAST)
+COMBINATIONS: Mapping[str, str] = {
+    ALL: "each of the listed conditions holds",
+    ANY: "at least one of the listed conditions holds",
+    NOT: "the condition does not hold",
+    AT_LEAST: "at least `count` of the conditions of the list `of` hold",
+}
+"""The combinations of conditions, and when each holds."""
 MOST_PARTS = 64  # of one combination
 _SECONDS = Real(above=0)
-_TIMES = ("for_s", "within_s")
+TIMES: Mapping[str, str] = {
+    "for_s": "the condition has held for so long without a break",
+    "within_s": "the condition has held at an instant of the last so many seconds",
+}
+"""The keys for times in seconds beside a condition, and when the condition holds with each."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +74,13 @@ class WhenPart(Kind):
         before = len(faults)
         known = (*conditions(), *COMBINATIONS)
         for key in value:
-            if key not in known and key not in _TIMES:
+            if key not in known and key not in TIMES:
                 faults.append(Fault((*place, key), "condition", known=known))
         named = [key for key in value if key in known]
         if len(named) != 1 and len(faults) == before:
             found = value if not named else " and ".join(named)
             faults.append(Fault(place, "form", limit="exactly one kind of condition", found=found))
-        times = {key: _SECONDS.read(value[key], (*place, key), faults) for key in _TIMES if key in value}
+        times = {key: _SECONDS.read(value[key], (*place, key), faults) for key in TIMES if key in value}
         if len(faults) > before:
             return value
         node = self._node(named[0], value[named[0]], (*place, named[0]), faults)

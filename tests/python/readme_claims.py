@@ -909,6 +909,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         _KERNEL_ALONE,
     ),
     "has the paper's Listings 1 to 3 as a program": ("ctest: listings",),
+    "go from a first component to a robot of your own": (
+        "ros/test_tutorials.py::test_the_page_does_what_it_says",
+    ),
     "Whole components can be written in Python": (
         "python/parts/test_components.py::test_python_and_cpp_exchange_data_both_ways",
     ),
@@ -1099,9 +1102,10 @@ PROMISE_NOTHING = (
     "Each row is meant to be one that its authors would sign",
     "If a row is wrong, please open an issue",
     "| | |",
+    "| learn | nine tutorials",
     "| do | [install]",
     "| understand | [components]",
-    "| look up | [rules]",
+    "| look up | [reference]",
     "On the disk the demo takes",  # figures of one day
     "`scripts/lint` takes 0.3 GB more",
     "The demo's verdict is about its supervisors' swaps",

@@ -33,6 +33,11 @@ REMAPPINGS = (
     "~/stop:=/halt",
     "/diagnostics:=health",
 )
+PARAMETERS = """\
+/robot_7/boss: {ros__parameters: {counter: {step: 3}}}
+/robot_8/boss: {ros__parameters: {guard: {step: 4}}}
+/robot_7/executor: {ros__parameters: {guard: {step: 5}}}
+"""
 RULES = """\
 mauve: 1
 rules:
@@ -46,10 +51,13 @@ def test_an_executor_s_names_are_remapped(
     architecture: Path, start_executor: Callable[..., Any], graph: Any, tmp_path: Path
 ) -> None:
     bag = tmp_path / "bag"
+    parameters = tmp_path / "parameters.yaml"
+    parameters.write_text(PARAMETERS, encoding="utf-8")
     arguments = [word for rule in REMAPPINGS for word in ("-r", rule)]
-    for parameter in ("boss:counter.step:=3", "executor:guard.step:=4", f"architecture:={architecture}"):
-        arguments += ["-p", parameter]
-    arguments += ["-p", f"bag:={bag}", "-p", "record_topics:=['talk:std_msgs/msg/Float64']"]
+    arguments += ["--params-file", str(parameters)]
+    topics = "record_topics:=['talk:std_msgs/msg/Float64']"
+    for parameter in (f"architecture:={architecture}", f"bag:={bag}", topics, "boss:guard.step:=6"):
+        arguments += ["-p", parameter]  # `boss:` stands for `/boss`, as in rcl
     executor = start_executor(*arguments)
 
     states = graph.hear(ArchitectureState, "/robot_7/boss/state", LATCHED)
@@ -59,7 +67,8 @@ def test_an_executor_s_names_are_remapped(
     voice, speech = graph.voice(Float64, "/robot_7/count"), graph.voice(Float64, "/speech")
 
     counter, guard, _ = graph.ask(ListComponents, "/robot_7/boss/list_components").components
-    assert ("step=3.0" in counter.properties, "step=4.0" in guard.properties) == (True, False)
+    assert "step=3.0" in counter.properties
+    assert not {"step=4.0", "step=5.0", "step=6.0"} & set(guard.properties)
     graph.spin_until(lambda: len(counts) > 2, "counts by their other name")
     graph.spin_until(lambda: len(states) > 0, "the state")
     graph.spin_until(lambda: len(health) > 0, "diagnostics by their other name")

@@ -8,6 +8,7 @@
 #include "bridge.hpp"
 #include "console.hpp"
 #include "node_watch.hpp"
+#include "parameters.hpp"
 #include "stop_guard.hpp"
 
 namespace py = pybind11;
@@ -73,6 +74,16 @@ void answer_transition(StopGuard& self, std::uint64_t number, std::string_view r
   self.answer(number, {begin, begin + response.size()});
 }
 
+py::list python_parameters(const std::vector<std::string>& words) {
+  py::list all;
+  for (const NodeParameters& each : parameters_of(words)) {
+    py::dict values;
+    for (const auto& [name, value] : each.values) values[py::str(name)] = py::cast(value);
+    all.append(py::make_tuple(each.nodes, values));
+  }
+  return all;
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_bridge, module) {
@@ -81,6 +92,7 @@ PYBIND11_MODULE(_bridge, module) {
   using Unlocked = py::call_guard<py::gil_scoped_release>;
   module.def("start_console", &Console::start);
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked());
+  module.def("parameters_of", &python_parameters, py::arg("words"));
   py::class_<NodeWatch>(module, "NodeWatch")
       .def(py::init<std::string, time_ns_t>(), py::arg("logger"), py::kw_only(), py::arg("silent_after_ns"))
       .def("beat", &NodeWatch::beat)

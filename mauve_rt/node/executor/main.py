@@ -87,7 +87,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
     try:
         init_logging_apart(words, signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
-        node = ExecutorNode(runtime, namespace=namespace)
+        node = ExecutorNode(runtime, namespace=namespace, settings=settings.values)
         discovery = reach(sockets)
         # Components in Python would wait for the interpreter while modules load: then these come first.
         waits_for_python = any(map(runtime.has_python_parts, runtime.components()))

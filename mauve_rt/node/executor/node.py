@@ -14,17 +14,17 @@ from mauve_rt._kernel import STOP_TIMEOUT_NS
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
-from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
+from mauve_rt.errors import MauveError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch, number_of
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
-from mauve_rt.node.executor.settings import PARAMETERS
+from mauve_rt.node.executor.settings import DEFAULTS, PARAMETERS
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.shared.service_thread import refused_reply
-from mauve_rt.node.shared.setting_parameters import declare_settings
-from mauve_rt.node.shared.settings import NO_SIMULATED_TIME, OF_RCLPY, refusal
+from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
+from mauve_rt.node.shared.settings import OF_RCLPY, refusal
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.errors import TraceError
@@ -51,21 +51,26 @@ class ExecutorNode(LifecycleNode):
 
     THREADS = 3
 
-    def __init__(self, runtime: Runtime, *, namespace: str) -> None:
+    def __init__(self, runtime: Runtime, *, namespace: str, settings: Mapping[str, Any] = DEFAULTS) -> None:
         """Create the node with all that transitions need; the runtime may be configured already. Then open().
 
-        Raises:
-            ParameterError: a parameter of the wrong type, or `use_sim_time`.
+        `settings`: the values of PARAMETERS.
         """
         # Transitions are in the node's default group.
         self.watch = Watch(lambda text: self.get_logger().error(text))
-        super().__init__(NODE_NAME, namespace=namespace, start_parameter_services=False)
+        super().__init__(
+            NODE_NAME,
+            namespace=namespace,
+            start_parameter_services=False,
+            parameter_overrides=list(NO_SIMULATED_TIME),
+        )
         self._answer_every_transition()
         self.control_group = MutuallyExclusiveCallbackGroup()
         self._runtime = runtime
         # A signal may come while a transition starts or ends threads: nobody else may do that then.
         self._starting_or_ending = threading.Lock()
-        self._settings = self._declared()
+        self._settings = settings
+        declare_settings(self, PARAMETERS, settings)
         self._bound = BoundResources(self)
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
@@ -356,15 +361,6 @@ class ExecutorNode(LifecycleNode):
             self.get_logger().warning(f"no real time: {missing}")
 
     # ---- parameters
-
-    def _declared(self) -> dict[str, Any]:
-        try:
-            settings = declare_settings(self, PARAMETERS)
-        except Exception as error:  # rclpy has an exception class of its own for each mistake
-            raise ParameterError(one_line(f"bad parameter: {error}")) from error
-        if self.get_parameter("use_sim_time").value:
-            raise ParameterError(f"use_sim_time: {NO_SIMULATED_TIME}")
-        return settings
 
     def _refusal(self, parameter: str) -> str:
         setting = PARAMETERS.get(parameter) or OF_RCLPY.get(parameter)

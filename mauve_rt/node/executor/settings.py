@@ -1,8 +1,9 @@
 """What the command line says to an executor before there is a node."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from mauve_rt._kernel import TASK_SETTINGS
@@ -12,7 +13,7 @@ from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
 from mauve_rt.model.words import shown
 from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
-from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage
+from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage, values_of
 
 _LIMITS = RequestLimits()
 MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
@@ -63,6 +64,7 @@ PARAMETERS: dict[str, Setting] = {
         maximum=TASK_SETTINGS["priority"].most,
     ),
 }
+DEFAULTS: Mapping[str, Any] = MappingProxyType(values_of({}, PARAMETERS))
 # Not declared: without a value the file's peers count, which are no default that could be told.
 PEERS = Setting([], "the other robots' names; overrides the file's")
 
@@ -71,10 +73,7 @@ PEERS = Setting([], "the other robots' names; overrides the file's")
 class Settings:
     """The executor's parameters; those of the node with the same names are for people to look at."""
 
-    architecture: str = ""
-    autostart: bool = True
-    require_realtime: bool = False
-    trace: bool = True
+    values: Mapping[str, Any] = field(default_factory=lambda: DEFAULTS)
     overrides: Overrides = Overrides()  # noqa: RUF009 - immutable
     remarks: tuple[str, ...] = ()  # to be told; nothing is refused for them
 
@@ -107,17 +106,26 @@ class Settings:
                 raise ParameterError(f"parameter {name}: {expected}", element=name)
             properties[component, property_name] = value
         return cls(
-            architecture=_typed(given, "architecture", str, ""),
-            autostart=_typed(given, "autostart", bool, default=True),
-            require_realtime=_typed(given, "require_realtime", bool, default=False),
-            trace=_typed(given, "trace", bool, default=True),
+            values=values_of(given, PARAMETERS),
             overrides=Overrides(namespace=arguments.namespace, peers=peers, properties=properties),
             remarks=near_misses(arguments, settings, namespace=namespace),
         )
 
+    @property
+    def architecture(self) -> str:
+        """The file; empty: none."""
+        return str(self.values["architecture"])
+
+    @property
+    def autostart(self) -> bool:
+        """Whether to configure and activate at the start."""
+        return bool(self.values["autostart"])
+
     def runtime(self) -> Runtime:
         """The runtime of the named file, nothing loaded yet."""
-        return Runtime(self._load, require_realtime=self.require_realtime, trace=self.trace)
+        return Runtime(
+            self._load, require_realtime=self.values["require_realtime"], trace=self.values["trace"]
+        )
 
     def node_namespace(self) -> str:
         """The namespace of the node before remapping.
@@ -151,11 +159,3 @@ def _namespace(arguments: RosArguments) -> str:
         return load_architecture(str(arguments.parameters.get("architecture", ""))).namespace
     except MauveError:
         return "/"
-
-
-def _typed(given: dict[str, Any], name: str, kind: type, default: Any = None) -> Any:
-    value = given.get(name, default)
-    if not isinstance(value, kind):
-        words = {bool: "true or false", str: "text"}[kind]
-        raise ParameterError(f"parameter {name}: expected {words}, found {value}")
-    return value

@@ -13,28 +13,27 @@ _INT64_MAX = 2**63 - 1
 _STRINGS = Parameter.Type.STRING_ARRAY
 
 
-def declare_settings(node: Node, settings: Mapping[str, Setting]) -> dict[str, Any]:
-    """Declare all of them; returns their values. What rclpy declares for every node is marked as well.
+NO_SIMULATED_TIME = (Parameter("use_sim_time", value=False),)
+"""For the node's constructor: whatever a file says to nodes of any name."""
 
-    Raises:
-        Exception: of rclpy, for a value of another type or out of range.
-    """
-    values = {name: _declare(node, name, setting) for name, setting in settings.items()}
+
+def declare_settings(node: Node, settings: Mapping[str, Setting], values: Mapping[str, Any]) -> None:
+    """Declare all of them with these values. What rclpy declares for every node is marked as well."""
+    for name, setting in settings.items():
+        _declare(node, name, setting, values[name])
     for name, setting in OF_RCLPY.items():
         if not node.describe_parameter(name).read_only:
             node.set_descriptor(name, _descriptor(setting))
-    return values
 
 
-def _declare(node: Node, name: str, setting: Setting) -> Any:
+def _declare(node: Node, name: str, setting: Setting, value: Any) -> None:
     if not isinstance(setting.default, list):
-        return node.declare_parameter(name, setting.default, _descriptor(setting)).value
-    # rclpy takes an empty list for one of bytes, and rcl reads [] in a file as no value at all.
-    value = node.declare_parameter(name, _STRINGS, ParameterDescriptor(type=_STRINGS.value)).value
-    texts = list(setting.default if value is None else value)
-    node.set_parameters([Parameter(name, _STRINGS, texts)])
+        node.declare_parameter(name, value, _descriptor(setting), ignore_override=True)
+        return
+    # rclpy takes an empty list for one of bytes.
+    node.declare_parameter(name, _STRINGS, ParameterDescriptor(type=_STRINGS.value), ignore_override=True)
+    node.set_parameters([Parameter(name, _STRINGS, list(value))])
     node.set_descriptor(name, _descriptor(setting))
-    return texts
 
 
 def _descriptor(setting: Setting) -> ParameterDescriptor:

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from mauve_rt.errors import ParameterError
-from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.shared.ros_arguments import RosArguments
 
 QOS_OVERRIDES = "qos_overrides."
@@ -52,7 +52,7 @@ def check_given(arguments: RosArguments, settings: Mapping[str, Setting], *, nam
     """Check the names that are given to this very node; returns those of components' properties.
 
     Raises:
-        ParameterError: a name that the table has not, `qos_overrides`, or `use_sim_time`.
+        ParameterError: a name that the table has not, `qos_overrides`, or `use_sim_time` for it alone.
     """
     names = [*settings, *OF_RCLPY]
     properties = []
@@ -64,7 +64,7 @@ def check_given(arguments: RosArguments, settings: Mapping[str, Setting], *, nam
         elif name not in names:
             what = f"parameter {name}: {_article(arguments.default_node)} has none of that name"
             raise ParameterError(f"{what}; {did_you_mean(name, names)}")
-    if arguments.within(namespace).get("use_sim_time"):
+    if arguments.meant_for_it(namespace).get("use_sim_time"):
         raise ParameterError(f"use_sim_time: {NO_SIMULATED_TIME}")
     return properties
 
@@ -78,11 +78,56 @@ def near_misses(
     unknown = [name for name in arguments.within(namespace) if name not in its_own and name not in names]
     remedies = {name: did_you_mean(name, names) for name in unknown if "." not in name}
     who = _article(arguments.default_node)
-    return tuple(
+    remarks = [
         f"parameter {name}: given to nodes of any name, and {who} has none of it; {remedy}"
         for name, remedy in remedies.items()
         if remedy.startswith("did you mean")
-    )
+    ]
+    if arguments.within(namespace).get("use_sim_time"):
+        remarks.append(
+            f"parameter use_sim_time: given to nodes of any name, and ignored; {NO_SIMULATED_TIME}"
+        )
+    return tuple(remarks)
+
+
+def values_of(given: Mapping[str, Any], settings: Mapping[str, Setting]) -> dict[str, Any]:
+    """The value of each setting: what is given, or its default.
+
+    Raises:
+        ParameterError: a value of another type, or out of range. An integer is a number, too.
+    """
+    return {name: _value_of(name, given.get(name), setting) for name, setting in settings.items()}
+
+
+def _value_of(name: str, value: Any, setting: Setting) -> Any:
+    if value is None or (value == [] and isinstance(setting.default, list)):
+        return setting.default
+    if isinstance(setting.default, float) and type(value) is int:
+        value = float(value)
+    fits = type(value) is type(setting.default)
+    if isinstance(value, list):
+        fits = fits and all(isinstance(one, str) for one in value)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        fits = fits and setting.minimum <= value <= setting.maximum
+    if not fits:
+        raise ParameterError(f"parameter {name}: expected {_expected(setting)}, found {shown(value)}")
+    return value
+
+
+def _expected(setting: Setting) -> str:
+    words = {
+        bool: "true or false",
+        int: "a whole number",
+        float: "a number",
+        str: "text",
+        list: "a list of texts",
+    }
+    text = words[type(setting.default)]
+    if setting.minimum > -math.inf:
+        text += f" of at least {setting.minimum:g}"
+    if setting.maximum < math.inf:
+        text += f" and at most {setting.maximum:g}"
+    return text
 
 
 def no_qos_overrides(node: str) -> str:

@@ -13,7 +13,6 @@ from functools import partial
 from itertools import count
 from typing import Any
 
-import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -33,9 +32,9 @@ from mauve_rt.node.shared.background_console import init_logging_apart, last_lin
 from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
-from mauve_rt.node.shared.setting_parameters import declare_settings
+from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
 from mauve_rt.node.shared.watch import Watch
-from mauve_rt.node.supervisor.settings import PARAMETERS, check_arguments
+from mauve_rt.node.supervisor.settings import PARAMETERS, settings_of
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rules import RulesFile
@@ -176,10 +175,11 @@ class Supervisor:
 def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
-        remarks = check_arguments(arguments)
+        settings, remarks = settings_of(arguments)
         addresses, sockets = usable_addresses(), udp_sockets()
         init_logging_apart(arguments, signal_handler_options=SignalHandlerOptions.NO)
-        node = Node(NODE_NAME)
+        node = Node(NODE_NAME, parameter_overrides=list(NO_SIMULATED_TIME))
+        declare_settings(node, PARAMETERS, settings)
         discovery = reach(sockets)
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"supervisor: {error}")
@@ -188,7 +188,7 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     executor = SingleThreadedExecutor()
     interfaces = None
     try:
-        supervisor = Supervisor(node, RulesFile(_rules_path(node)))
+        supervisor = Supervisor(node, RulesFile(settings["rules"]))
         interfaces = NetworkInterfaces(node, supervisor.watch, before=addresses)
         executor.add_node(node)
         discovery.log(node.get_logger())
@@ -213,13 +213,3 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         last_lines()
         try_shutdown()
     return 0
-
-
-def _rules_path(node: Node) -> str:
-    try:
-        path = str(declare_settings(node, PARAMETERS)["rules"])
-    except rclpy.exceptions.InvalidParameterTypeException:
-        path = ""
-    if not path:
-        raise ValueError("parameter 'rules' is missing: --ros-args -p rules:=FILE")
-    return path

@@ -29,17 +29,21 @@ def faults_of(kind: Kind, value: Any) -> list[str]:
 class Lamp(Section):
     """What the tests set."""
 
-    name: str = setting(Text(r"\w+", "a word"))
-    watts: float = setting(Real(above=0, most=100), default=5.0, hint="what it draws")
-    rooms: list[int] | None = setting(ListOf(Whole(1, 9), few=1, many=2), default=None, hint="1 to 9")
-    spare: "list[str]" = setting(ListOf(Text()), default=[])
+    name: str = setting(Text(r"\w+", "a word"), "its name")
+    watts: float = setting(Real(above=0, most=100), "its power", default=5.0, hint="what it draws")
+    rooms: list[int] | None = setting(
+        ListOf(Whole(1, 9), few=1, many=2), "where", default=None, hint="1 to 9"
+    )
+    spare: "list[str]" = setting(ListOf(Text()), "parts", default=[])
 
 
 class House(Section):
     """With a section in it."""
 
-    lamp: Lamp = setting(Part(Lamp))
-    lamps: dict[str, Lamp] = setting(TableOf(Part(Lamp), names=Text("[a-z]+", "small letters")), default={})
+    lamp: Lamp = setting(Part(Lamp), "the first")
+    lamps: dict[str, Lamp] = setting(
+        TableOf(Part(Lamp), names=Text("[a-z]+", "small letters")), "others", default={}
+    )
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)

@@ -1,7 +1,11 @@
 """What the executor reads of its command line before there is a node."""
 
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -19,11 +23,16 @@ def test_parameters_only_within_ros_args() -> None:
     assert _parse(*words) == {"b": 2, "c": "x"}
 
 
-def test_values_are_yaml() -> None:
-    given = _parse(
-        "--ros-args", "-p", "a:=true", "-p", "b:=[x, y]", "-p", "c:=1.5", "-p", "d:='5'", "-p", "e:=["
-    )
-    assert given == {"a": True, "b": ["x", "y"], "c": 1.5, "d": "5", "e": "["}
+def test_values_are_as_rcl_reads_them() -> None:
+    words = ("a:=true", "b:=[x, z]", "c:=1.5", "d:='5'", "e:=no", "f:=0x10", "g:='no'")
+    given = _parse("--ros-args", *(word for value in words for word in ("-p", value)))
+    assert given == {"a": True, "b": ["x", "z"], "c": 1.5, "d": "5", "e": False, "f": 16, "g": "no"}
+
+
+@pytest.mark.parametrize("value", ["a:=[", "a:=[1, x]", "a:="])
+def test_what_rcl_refuses_is_refused(value: str) -> None:
+    with pytest.raises(ParameterError, match="Couldn't parse parameter override rule: '-p a:="):
+        _parse("--ros-args", "-p", value)
 
 
 def test_parameters_of_other_nodes_are_not_ours() -> None:
@@ -33,14 +42,17 @@ def test_parameters_of_other_nodes_are_not_ours() -> None:
 def test_parameter_files_and_their_wildcards(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text(
-        "/**:\n  ros__parameters: {bag: everybody}\n"
+        "/**:\n  ros__parameters: {bag: everybody, bags: here}\n"
         "/robot_1/executor:\n  ros__parameters: {architecture: robot.yaml, guidance: {path_step: 2}}\n"
         "/robot_1/other:\n  ros__parameters: {architecture: other.yaml}\n",
         encoding="utf-8",
     )
     given = _parse("--ros-args", "--params-file", str(file), "-p", "bag:=mine")
-    assert given == {"bag": "mine", "architecture": "robot.yaml", "guidance.path_step": 2}
-    assert _parse("--ros-args", "--params-file", str(tmp_path / "none.yaml")) == {}
+    assert given == {
+        "bag": "mine", "bags": "here", "architecture": "robot.yaml", "guidance.path_step": 2
+    }  # fmt: skip
+    with pytest.raises(ParameterError, match=r"none\.yaml'\. Error: Error opening YAML file"):
+        _parse("--ros-args", "--params-file", str(tmp_path / "none.yaml"))
 
 
 def test_parameters_of_one_file_for_several_robots(tmp_path: Path) -> None:
@@ -72,7 +84,7 @@ def test_parameters_of_one_file_for_several_robots(tmp_path: Path) -> None:
         (("__ns:=/first", "__ns:=/second"), "/first"),
         (("executor:__ns:=/old", "__node:=boss", "boss:__ns:=/new"), "/new"),
         (("other:__node:=boss", "executor:__ns:=/old"), "/old"),
-        (("count:=__ns",), ""),
+        (("count:=ns",), ""),
     ],
 )
 def test_namespace(rules: tuple[str, ...], namespace: str) -> None:
@@ -101,7 +113,7 @@ def test_settings() -> None:
     parameters = ("architecture:=a.yaml", "trace:=false", "peers:=[b]", "guidance.path_step:=2")
     words = [word for parameter in parameters for word in ("-p", parameter)]
     settings = Settings.of(["--ros-args", *words, "-r", "__ns:=/robot_2"])
-    assert (settings.architecture, settings.trace, settings.autostart) == ("a.yaml", False, True)
+    assert (settings.architecture, settings.values["trace"], settings.autostart) == ("a.yaml", False, True)
     assert settings.overrides.namespace == "/robot_2"
     assert settings.overrides.peers == ["b"]
     assert settings.overrides.properties == {("guidance", "path_step"): 2}
@@ -138,6 +150,13 @@ def test_bad_properties(parameter: str, message: str, tmp_path: Path, plugin_pre
     [
         ("use_sim_time:=true", "use_sim_time: expected false"),
         ("autostart:=5", "parameter autostart: expected true or false, found 5"),
+        ("bag_split_s:=soon", "parameter bag_split_s: expected a number of at least 0, found 'soon'"),
+        ("bag_split_s:=-1", "parameter bag_split_s: expected a number of at least 0, found -1"),
+        (
+            "max_request_bytes:=1.5",
+            "parameter max_request_bytes: expected a whole number of at least 1, found",
+        ),
+        ("record_topics:=[1]", "parameter record_topics: expected a list of texts, found a list of 1"),
         ("architecture:=[a]", "parameter architecture: expected text"),
         ("peers:=robot_2", "parameter peers: expected a list of names"),
         ("guidance.path_step:=[1, 2]", r"parameter guidance.path_step: expected .* found a list of 2"),
@@ -176,9 +195,87 @@ def test_qos_overrides_are_refused(tmp_path: Path) -> None:
 
 def test_a_parameter_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
-    file.write_text("executor: {ros__parameters: {counter.step: 1, counter.step: 2}}\n", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"parameter file .*parameters\.yaml: .*counter\.step"):
+    file.write_text("executor: {ros__parameters: {counter.step: [1, x]}}\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"parameters\.yaml'. Error: .* at line_num 1"):
         Settings.of(["executor", "--ros-args", "--params-file", str(file)])
+
+
+def test_an_integer_is_a_number_and_words_of_ros_are_booleans(tmp_path: Path) -> None:
+    settings = Settings.of(["--ros-args", "-p", "bag_split_s:=5", "-p", "trace:=no", "-p", "autostart:=off"])
+    assert (settings.values["bag_split_s"], settings.values["trace"], settings.autostart) == (
+        5.0,
+        False,
+        False,
+    )
+    assert isinstance(settings.values["bag_split_s"], float)
+    file = tmp_path / "parameters.yaml"
+    file.write_text("\ufeffexecutor: {ros__parameters: {bag_split_s: 7}}\n", encoding="utf-8")
+    assert Settings.of(["--ros-args", "--params-file", str(file)]).values["bag_split_s"] == 7.0
+
+
+def test_simulated_time_for_everybody_is_a_remark(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("/**: {ros__parameters: {use_sim_time: true}}\n", encoding="utf-8")
+    (remark,) = Settings.of(["--ros-args", "--params-file", str(file)]).remarks
+    assert remark.startswith("parameter use_sim_time: given to nodes of any name, and ignored")
+    file.write_text("executor: {ros__parameters: {use_sim_time: true}}\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match="use_sim_time: expected false"):
+        Settings.of(["--ros-args", "--params-file", str(file)])
+
+
+NAMES = ("executor", "/robot_1/executor", "/robot_2/executor", "/**", "/**/executor", "/*/executor", "/other")
+VALUES = ("1", "2.5", "no", "on", "'no'", "text", "[1, 2]", "[a, b]", "1e3", "0x1F", "true")
+
+
+def test_everything_is_as_a_plain_node_has_it(tmp_path: Path) -> None:
+    """Any files and words in any order: the own settings and the properties as rclpy's node has them."""
+    lines, cases = [], 60
+    for seed in range(cases):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        words: list[str] = []
+        for number in range(random.randint(1, 4)):
+            if random.random() < 0.5:
+                sections = random.sample(NAMES, random.randint(1, 3))
+                file = tmp_path / f"{seed}_{number}.yaml"
+                body = ""
+                for section in sections:
+                    values = {random.choice("abc"): random.choice(VALUES) for _ in range(2)}
+                    told = ", ".join(f"{name}: {value}" for name, value in values.items())
+                    body += (
+                        f"{section}: {{ros__parameters: {{{told}, part: {{x: {random.choice(VALUES)}}}}}}}\n"
+                    )
+                file.write_text(body, encoding="utf-8")
+                words += ["--params-file", str(file)]
+            else:
+                scope = random.choice(("", "", "executor:", "other:"))
+                words += ["-p", f"{scope}{random.choice('abc')}:={random.choice(VALUES)}"]
+        lines.append(json.dumps([random.choice(("/", "/robot_1", "/robot_2")), *words]))
+    command = [sys.executable, "-c", PLAIN]
+    done = subprocess.run(command, input="\n".join(lines), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    plain = done.stdout.splitlines()
+    assert len(plain) == cases
+    for line, expected in zip(lines, plain, strict=True):
+        namespace, *words = json.loads(line)
+        found = parse_ros_arguments(["executor", "--ros-args", *words], node="executor").within(namespace)
+        assert found == json.loads(expected), line
+
+
+PLAIN = """
+import json, sys
+import rclpy
+from rclpy.node import Node
+for line in sys.stdin:
+    namespace, *words = json.loads(line)
+    context = rclpy.Context()
+    context.init(["executor", "--ros-args", *words])
+    node = Node("executor", namespace=namespace, context=context, enable_rosout=False,
+                start_parameter_services=False, enable_logger_service=False)
+    values = {name: one.value for name, one in node._parameter_overrides.items()}
+    print(json.dumps({name: list(one) if hasattr(one, "tolist") else one for name, one in values.items()}))
+    node.destroy_node()
+    context.shutdown()
+"""
 
 
 def test_parameters_for_nodes_of_any_name_may_be_for_others(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Each block of commands or code in README.md and docs/ is run by a test, or its marker says why not.
 
 The table names the tests: they read the block from its page and try it, or run its commands with names of
-their own.
+their own. The pages in docs/tutorials/ are in no table: one test runs all their blocks.
 """
 
 from collections.abc import Collection
@@ -11,9 +11,12 @@ import pytest
 from page_blocks import Block, blocks
 from pages import PAGES
 from proofs import is_there
+from tutorial_pages import is_run
 
 ROOT = Path(__file__).resolve().parents[3]
 README = "python/project/test_readme_examples.py::test_"
+TUTORIALS = "docs/tutorials/"
+TUTORIALS_RUN_BY = "ros/test_tutorials.py::test_the_page_does_what_it_says"
 HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
 HOWTO = "python/project/test_howto_pages.py::test_"
 OVERRUN = f"{HOWTO}the_commands_that_find_an_overrun_print_what_it_shows"
@@ -215,12 +218,26 @@ def _unexplained(text: str, table: Collection[str]) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("page", PAGES)
+OTHERS = [page for page in PAGES if not page.startswith(TUTORIALS)]
+
+
+@pytest.mark.parametrize("page", OTHERS)
 def test_each_block_is_run_or_says_why_not(page: str) -> None:
     assert _unexplained(PAGES[page], RUN_BY.get(page, {})) == [], (
         "name the test that runs it in RUN_BY, or write <!-- not run: REASON --> in the line above"
         " (a directive that is no code begins with :::)"
     )
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith(TUTORIALS)])
+def test_each_block_of_a_tutorial_is_a_file_or_commands_or_says_why_not(page: str) -> None:
+    text = PAGES[page]
+    wrong = [block for block in blocks(text) if is_run(block, text) == bool(block.not_run)]
+    assert [f"line {block.lines.start + 1}: {block.first_line}" for block in wrong] == [], (
+        "end the paragraph above with `path/of/file`: or make it a console block (tests/tutorial_pages.py),"
+        " or write <!-- not run: REASON --> in the line above"
+    )
+    assert is_there(TUTORIALS_RUN_BY)
 
 
 @pytest.mark.parametrize(("page", "words"), [(page, words) for page in RUN_BY for words in RUN_BY[page]])
@@ -246,3 +263,14 @@ def test_a_block_with_neither_is_found() -> None:
     assert [each.partition(": ")[2] for each in _unexplained(page, ["known()"])] == [
         *("unknown --word", "far", "inside", "in an item", "no reason", "known() again")
     ]
+
+
+def test_a_block_of_a_tutorial_that_is_neither_a_file_nor_commands_is_found() -> None:
+    page = "\n".join(
+        [
+            *("Write `a/file.yaml`:", "", "```yaml", "mauve: 1", "```", ""),
+            *("```console", "$ mauve list", "```", "", "Look:", "", "```yaml", "mauve: 2", "```", ""),
+            *("<!-- not run: it takes a day -->", "```console", "$ mauve list", "```", ""),
+        ]
+    )
+    assert [is_run(block, page) for block in blocks(page)] == [True, True, False, False]

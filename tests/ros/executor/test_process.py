@@ -81,7 +81,7 @@ def test_bad_architecture(
         (["-p", "architecture:=FILE", "-p", "bag:=5"], "bag"),
         (
             ["-p", "architecture:=FILE", "-p", "report_phase_timeout_s:=5.0"],
-            "report_phase_timeout_s out of range Min: 0, Max: 2.0",
+            "report_phase_timeout_s: expected a number of at least 0 and at most 2, found 5",
         ),
         (
             ["-p", "architecture:=FILE", "-p", "counter.step:=99"],

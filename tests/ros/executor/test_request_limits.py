@@ -111,8 +111,8 @@ def test_limits_are_parameters(start_executor: Callable[..., Any], architecture:
 @pytest.mark.parametrize(
     ("setting", "words"),
     [
-        ("max_request_bytes:=0", "max_request_bytes out of range. Min: 1, "),
-        ("max_requested_priority:=99", "max_requested_priority out of range. Min: 1, Max: 98, value: 99"),
+        ("max_request_bytes:=0", "max_request_bytes: expected a whole number of at least 1, found 0"),
+        ("max_requested_priority:=99", "expected a whole number of at least 1 and at most 98, found 99"),
         ("max_requested_bytes:=many", "max_requested_bytes"),
     ],
 )

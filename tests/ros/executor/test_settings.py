@@ -146,7 +146,7 @@ def test_a_dump_is_a_parameter_file(
         "sleepy.label": "12.0",
         "twin_0.factor": math.inf,
         "twin_1.factor": -math.inf,
-        "twin_2.factor": 5e-324,
+        "twin_2.factor": 2.5e-308,
     }
     for name, value in given.items():
         assert remote.set(name, value).successful, name

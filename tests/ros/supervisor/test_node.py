@@ -311,7 +311,7 @@ def run(*arguments: str) -> subprocess.Popen[str]:
     [
         ([], "parameter 'rules' is missing"),
         (["-p", "rules:=/nowhere.yaml"], "/nowhere.yaml:1:1: "),
-        (["-p", "rules:=7"], "parameter 'rules'"),
+        (["-p", "rules:=7"], "parameter rules: expected text, found 7"),
         (["--no-such-option"], "supervisor: "),
     ],
 )

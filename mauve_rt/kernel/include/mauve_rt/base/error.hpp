@@ -12,40 +12,75 @@
 
 namespace mauve {
 
+/// Each code has its meaning, then the remedy.
 enum class ErrorCode : std::uint16_t {
+  /// A value or a combination of values has the wrong form. Correct the element that the message names.
   invalid_argument,
+  /// The architecture has no component of this name. Correct the name, or add the component.
   unknown_component,
+  /// No core of this name is registered. Correct the name, or install its package.
   unknown_core,
+  /// The core is installed, but not among the alternatives of the component. Add the core to `alternatives`.
   undeclared_core,
+  /// No shell of this name is registered. Correct the name, or install its package.
   unknown_shell,
+  /// No fsm of this name is registered. Correct the name, or install its package.
   unknown_fsm,
+  /// The architecture has no resource, or the registry no kind of resource, of this name. Correct the name.
   unknown_resource,
+  /// The resource has no service of this name. Connect to one of the services that the message lists.
   unknown_service,
+  /// The shell has no port of this name. Use one of the ports that the message lists.
   unknown_port,
+  /// The component has no property of this name. Use one of the properties that the message lists.
   unknown_property,
+  /// No library registered a type of this name. Correct the name, or install the package of the type.
   unknown_type,
+  /// Two elements that belong together have different types. Give both elements the type that the message expects.
   type_mismatch,
+  /// A number is outside its range. Choose a number within the range that the message names.
   out_of_range,
+  /// The name is already in use. Choose another name, or remove the element that has it.
   duplicate_name,
+  /// The fsm has a loop without a wait, so its clock would stand still. Add a wait to the loop.
   loop_without_wait,
+  /// The states or transitions of the fsm are wrong. Correct the state that the message names.
   bad_fsm,
+  /// The period does not fit the cycles of the fsm. Choose a period that the message allows, or leave it out.
   bad_period,
+  /// A part reported a failure from its configure function. Correct the cause that the message names.
   configure_failed,
+  /// The component or the executor is not configured. Configure it first.
   not_configured,
+  /// A required port has no connection. Connect the port, or declare it optional in the shell.
   not_connected,
+  /// The component does not run. Start the component first.
   not_running,
+  /// The component already runs. Stop the component first.
   already_running,
+  /// The component is FAULTED. Replace its core or configure the component, then start it.
   faulted,
+  /// The architecture file protects the component. Set `reconfigurable: true` in the file.
   not_reconfigurable,
+  /// A part reads the property only when it is configured. Replace that part in the same transaction.
   structural_property,
+  /// The new part refused to take over. Correct the cause that the part reports, then ask again.
   adopt_refused,
+  /// A new part could not be made. Correct the cause that the message names.
   prepare_failed,
+  /// A state did not end in time. Ask again with a longer time-out, or with `force`.
   timeout,
+  /// The architecture changed since the caller read its revision. Read the architecture, then ask again.
   wrong_revision,
+  /// A component, or a hook inside a change, asks for a change and would wait for itself. Ask from an ordinary thread.
   would_deadlock,
+  /// The system refused real-time rights. Grant the rights that the message names.
   realtime_denied,
+  /// A plug-in cannot be loaded or is declared wrongly. Correct or install the package that the message names.
   plugin,
+  /// The system refused to read or write. Correct the cause that the message names.
   io,
+  /// The system refused a thread or a lock, or a part threw an unexpected exception. Correct the cause that the message names.
   internal,
 };
 
