@@ -1104,6 +1104,8 @@ PROMISE_NOTHING = (
     "| | |",
     "| learn | nine tutorials",
     "| do | [install]",
+    "| when it fails | [messages",
+    "| coming from | [rclpy",
     "| understand | [components]",
     "| look up | [reference]",
     "On the disk the demo takes",  # figures of one day

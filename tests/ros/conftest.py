@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 sys.path.insert(0, str(Path(__file__).parent))  # for ros_processes
+sys.path.append(str(Path(__file__).parents[1] / "python"))  # for pages
 
 from ros_processes import PATIENCE_S, ExecutorProcess, keep_interpreter
 

@@ -18,6 +18,16 @@ README = "python/project/test_readme_examples.py::test_"
 TUTORIALS = "docs/tutorials/"
 TUTORIALS_RUN_BY = "ros/test_tutorials.py::test_the_page_does_what_it_says"
 HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
+HOWTO = "python/project/test_howto_pages.py::test_"
+OVERRUN = f"{HOWTO}the_commands_that_find_an_overrun_print_what_it_shows"
+HOWTO_ROS = "ros/executor/test_howto_pages.py::test_"
+REPAIRED = f"{HOWTO_ROS}a_faulted_component_is_repaired_as_the_page_says"
+ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
+GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
+PEERS = f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same"
+UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
+WAKEUP = f"{HOWTO}the_wakeup_latency_is_measured_and_used_as_the_page_says"
+PINNED = f"{HOWTO}the_settings_of_pinned_components_are_accepted"
 
 # Of each page: words that stand in one of its blocks only, and the tests that run that block.
 RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
@@ -35,6 +45,28 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     "docs/concepts/timing_proof.md": {
         "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
     },
+    "docs/howto/ci_for_your_package.md": {
+        "def test_ten_beats_in_a_second": (f"{HOWTO}the_test_in_virtual_time_passes",),
+        "mauve check install/share/mauve_examples": (f"{HOWTO}the_checks_of_ci_end_with_status_0",),
+        "runs-on: ubuntu-24.04": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
+        "image: ros:jazzy": (f"{HOWTO}the_jobs_of_ci_have_one_set_of_commands",),
+    },
+    "docs/howto/coming_from.md": {
+        "class Doubler(Node)": (PEERS,),
+        "class Doubler(Core)": (PEERS,),
+        "core; my_robot/Doubler;": (PEERS,),
+        "doubler: {shell: mauve_rt/Float64FilterShell": (PEERS,),
+    },
+    "docs/howto/find_an_overrun.md": {
+        "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
+        "--suppose mapping.Integrate=120ms --witness too_long": (OVERRUN,),
+        "mauve report preempted": (OVERRUN,),
+        "No: 1 missed deadline": (OVERRUN,),
+        "mauve report too_long": (OVERRUN,),
+        "its state Integrate took longest": (OVERRUN,),
+        "mauve trace stats preempted": (OVERRUN,),
+        "component  what             count": (OVERRUN,),
+    },
     "docs/howto/is_my_robot_schedulable.md": {
         "mauve analyze robot.yaml --witness DIR": (
             "python/cli/test_analyze.py::test_what_is_not_says_who_misses_when_and_why_and_shows_it",
@@ -48,6 +80,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "--suppose guidance.Planning=120ms --witness slow": (HOWTO_ANALYZE,),
         "not schedulable: mapping": (HOWTO_ANALYZE,),
         "mauve report slow": (HOWTO_ANALYZE,),
+    },
+    "docs/howto/launch_files.md": {
+        "def generate_launch_description": (f"{HOWTO}the_launch_file_of_the_page_gives_arguments_there_are",),
     },
     "docs/howto/operate.md": {
         "mauve list /robot_1/executor": (
@@ -78,6 +113,15 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "executor: {diagnostics:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
         "printf 'force: true": ("ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",),
     },
+    "docs/howto/pin_and_isolate_cpus.md": {
+        "priority: 70, cpus: [2]": (PINNED,),
+        "asks for a CPU": (f"{HOWTO}a_cpu_that_is_not_there_is_refused_as_the_page_says",),
+        "mauve trace stats docs/sample/metronome": (WAKEUP,),
+        "metronome  wake-up latency": (WAKEUP,),
+        "--wakeup-us 300": (WAKEUP,),
+        "threads begin 300 us": (WAKEUP,),
+        "wakeup_max_us: {warn: 300": (PINNED,),
+    },
     "docs/howto/record_and_report.md": {
         "mauve record start": (
             f"{README}every_command_is_one_that_mauve_takes",
@@ -94,6 +138,29 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "# writes DIR/report.html": (
             "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
         ),
+    },
+    "docs/howto/repair_a_faulted_component.md": {
+        "# before the repair": (REPAIRED,),
+        "refused, FAULTED (6)": (REPAIRED,),
+        "printf -- '- {kind: configure": (REPAIRED,),
+        "2 steps are in force": (REPAIRED,),
+        "mauve replace-core /robot_1/executor guidance": (REPAIRED,),
+        "kind: remove_component": (ADDED,),
+        "anew.yaml --dry-run": (ADDED,),
+        "guidance --force": (GIVEN_UP,),
+        "is stopped by force": (GIVEN_UP,),
+    },
+    "docs/howto/systemd.md": {
+        "Description=MAUVE RT executor": (
+            UNIT_FILES,
+            f"{HOWTO_ROS}the_command_of_the_unit_file_starts_an_executor",
+        ),
+        "systemd-analyze verify": (UNIT_FILES,),
+        "Description=MAUVE RT supervisor": (UNIT_FILES,),
+    },
+    "docs/howto/uninstall.md": {
+        "rm -rf .venv build install": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),
+        "# bags and reports of scripts/demo": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),
     },
     "docs/howto/write_a_core.md": {
         "struct MetronomeShell": (f"{README}listings_stand_in_the_sources",),
