@@ -29,6 +29,7 @@ from mauve_rt._kernel import (
     TransactionReport,
     monotonic_ns,
 )
+from mauve_rt.model.build import open_architecture
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
 from mauve_rt.parts.fsms import Fsm, State
@@ -41,6 +42,7 @@ from mauve_rt.parts.resources import (
     RingBuffer,
     SharedData,
     parameter,
+    read_resource,
     service,
 )
 from mauve_rt.parts.shells import NativeShell, Shell
@@ -90,9 +92,11 @@ __all__ = [
     "event_port",
     "monotonic_ns",
     "ms_to_ns",
+    "open_architecture",
     "parameter",
     "property",
     "read_port",
+    "read_resource",
     "s_to_ns",
     "service",
     "us_to_ns",

@@ -34,11 +34,12 @@ from mauve_rt.model.build import add_component_step, add_resource_step, allowed_
 from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
+from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
 from mauve_rt.model.steps import Step
-from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.model.words import did_you_mean, shown, some
 from mauve_rt.yaml.text import YamlError, read_yaml
 
 _TOLD_PROBLEMS = 10
@@ -160,8 +161,7 @@ class Plan:
         with self._runtime.loading() as loader:
             allowed = allowed_parts(sketch.model, kind, loader)
             if step.name not in allowed:
-                installed = step.name in loader.names(kind)
-                raise _undeclared(step, kind, allowed, installed=installed)
+                raise _undeclared(step, kind, allowed, loader)
             loader.require(kind, step.name)
         self.transaction.add(step.kind, step.target, step.name)
         if kind == "shell":
@@ -231,12 +231,15 @@ def _sketch_of(part: ComponentDescription, model: ComponentModel) -> _Sketch:
     return _Sketch(model, {item.name: item for item in part.properties})
 
 
-def _undeclared(step: Step, kind: str, allowed: list[str], *, installed: bool) -> RefusalError:
-    takes = f"component '{step.target}' takes {', '.join(allowed)}"
-    if not installed:
-        return RefusalError(Code.UNKNOWN_CORE, f"{kind} {shown(step.name)} is not installed; {takes}")
-    text = f"{kind} '{step.name}' is installed, but not declared: {takes}"
-    return RefusalError(Code.UNDECLARED_CORE, f"{text}; name it among its alternatives in the file")
+def _undeclared(step: Step, kind: str, allowed: list[str], loader: PluginLoader) -> RefusalError:
+    takes = f"component '{step.target}' takes {some(allowed)}"
+    if loader.has(kind, step.name):
+        text = f"{kind} '{step.name}' is installed, but not declared: {takes}"
+        return RefusalError(Code.UNDECLARED_CORE, f"{text}; name it among its alternatives in the file")
+    if package := loader.missing_package(step.name):
+        text = f"{kind} {shown(step.name)}: {package}; {SOURCE_IT} before the executor starts"
+        return RefusalError(Code.UNKNOWN_CORE, text)
+    return RefusalError(Code.UNKNOWN_CORE, f"{kind} {shown(step.name)} is not installed; {takes}")
 
 
 def _check_structs(shell: ShellDescription) -> None:

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from mauve_rt._kernel import Architecture, DescribedState, PluginRegistry, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError
-from mauve_rt.model.architecture_file import ArchitectureModel
+from mauve_rt.model.architecture_file import ArchitectureModel, load_architecture
 from mauve_rt.model.checks import Checks
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
 from mauve_rt.model.resource_parts import resource_part
@@ -29,6 +30,18 @@ def build(
     architecture = Architecture(registry)
     with _errors_at(model, *places):
         architecture.commit(transaction)
+    return architecture
+
+
+def open_architecture(path: str | Path, registry: PluginRegistry | None = None) -> Architecture:
+    """The architecture of a file, configured and ready for a `Deployer` or a `Simulation`.
+
+    Raises:
+        ArchitectureFileError: the file, or a plug-in that it names, cannot be used; `problems` has all.
+    """
+    model = load_architecture(Path(path))
+    architecture = build(model, PluginRegistry() if registry is None else registry)
+    configure(model, architecture)
     return architecture
 
 
@@ -76,13 +89,14 @@ _ANY_CORE = "*"  # to the kernel; what is installed may be another thing every d
 
 
 def allowed_parts(component: ComponentModel, kind: str, loader: PluginLoader) -> list[str]:
-    """The cores, fsms or shells (`kind`) that a component takes: its own first, then its alternatives."""
+    """The cores, fsms or shells (`kind`) that a component takes: its own, its fallback, its alternatives."""
     own = {"core": component.core, "fsm": component.fsm, "shell": component.shell}[kind]
+    fallback = [component.fallback] if kind == "core" and component.fallback is not None else []
     if isinstance(component.alternatives, list):
         others = [name for name in component.alternatives if loader.has(kind, name)]
     else:
         others = loader.index.names(kind)
-    return list(dict.fromkeys([own, *others]))
+    return list(dict.fromkeys([own, *fallback, *others]))
 
 
 def add_component_step(
@@ -132,7 +146,7 @@ def _settings(component: ComponentModel, loader: PluginLoader) -> dict[str, Any]
         **component.task_settings(),
         "alternatives": [_ANY_CORE]
         if installed
-        else [core for core in allowed_parts(component, "core", loader) if core != component.core],
+        else [core for core in component.alternatives if loader.has("core", core) and core != component.core],
         "reconfigurable": component.reconfigurable,
     }
 

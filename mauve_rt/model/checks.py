@@ -14,7 +14,7 @@ from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, Port
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.kinds import Faults
 from mauve_rt.model.message_shapes import REMEDY, message_definition, mismatches
-from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
 from mauve_rt.model.resource_kinds import given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import PropertyValue, ResourceModel
@@ -34,6 +34,7 @@ class Checks:
         self._described: dict[str, ShellDescription] = {}  # by the shell's name: described and checked once
         self._resources: dict[str, ResourceDescription] = {}
         self._unlike: set[str] = set()  # types that were told to differ from their messages
+        self._absent: set[str] = set()  # what was told about packages that are not found
         # A message is looked up in the ament index's files: once for all ports of its type.
         self._message_definition = cache(message_definition)
 
@@ -47,7 +48,23 @@ class Checks:
             found += self._resource(resource)
         for connection in self._model.connections:
             found += self._connection(connection)
-        return found
+        return [*self._each_package_once(found)]
+
+    def _each_package_once(self, problems: Iterable[Problem]) -> Iterator[Problem]:
+        """A package that is not sourced is one problem, however many of its parts the file names."""
+        told: set[str] = set()
+        for problem in problems:
+            if problem.what not in told:
+                yield problem
+            if problem.what in self._absent:
+                told.add(problem.what)
+
+    def _absence(self, kind: str, name: str, place: Location) -> Problem | None:
+        """Of the package of a plug-in or type."""
+        if not (what := self._loader.missing_package(name)):
+            return None
+        self._absent.add(what)
+        return self._model.problem(place, what, remedy=SOURCE_IT, code=f"unknown_{kind}")
 
     def _component(self, name: str) -> Iterator[Problem]:
         component = self._model.components[name]
@@ -113,7 +130,8 @@ class Checks:
         try:
             self._loader.require(kind, name)
         except PluginError as error:
-            yield self._model.problem(place, str(error), code=f"unknown_{kind}")
+            absence = self._absence(kind, name, place)
+            yield absence or self._model.problem(place, str(error), code=f"unknown_{kind}")
 
     def _same_shell(self, component: str, plugin: str, shell: str, place: Location) -> Iterator[Problem]:
         wanted = self._model.components[component].shell
@@ -157,6 +175,10 @@ class Checks:
             self._resources[name] = describe_resource(resource, self._loader.registry)
         except MauveError as error:
             about = "type" if resource.type else "kind"
+            absence = self._absence("type", resource.type, (*place, about))
+            if error.code == "unknown_type" and absence is not None:
+                yield absence
+                return
             what = f"bad {about} '{resource.type or resource.kind}' of resource '{name}': {error}"
             known = self._loader.names(type_kind)
             remedy = did_you_mean(resource.type, known) if error.code == "unknown_type" else ""

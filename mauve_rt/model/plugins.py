@@ -6,32 +6,36 @@ A package lists its classes in the ament index resource `mauve_rt_plugins/<packa
     shell; mauve_examples/GuidanceShell; ; mauve_examples
     core; mauve_examples/Guidance; mauve_examples/GuidanceShell; mauve_examples
     core; my_package/PyGuidance; mauve_examples/GuidanceShell; my_package.cores:PyGuidance
+    fsm; my_package/PyHoverFsm; my_package/PyHoverShell; my_package.hover:HoverFsm
 
 Only what is listed is ever loaded, and only when an architecture file or a request names it: no request makes
 a process import anything else.
 """
 
 import importlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
 from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp, module_files
-from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.words import did_you_mean, nearest, shown
 from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "mauve_rt_plugins"
 KINDS: Mapping[str, str] = {
     "shell": "the ports and properties of a component",
-    "core": "the data and algorithms of a component; in C++ or in Python",
+    "core": "the data and algorithms of a component",
     "fsm": "the states of a component",
     "resource": "a kind of resource",
     "type": "a type of values of resources, such as a ROS message",
     "call_type": "a type of calls, such as a ROS service",
 }
+IN_PYTHON = ("shell", "core", "fsm", "resource")
+"""Kinds that a Python class can be; types are written in C++, or are ROS messages, which nothing lists."""
+SOURCE_IT = "source its install/setup.bash"
 _FIELDS = 4
 
 
@@ -79,8 +83,9 @@ def parse_index(text: str, *, prefix: Path, origin: str) -> tuple[list[Plugin], 
         elif not words[1] or not words[3] or (words[0] in ("core", "fsm") and not words[2]):
             needs = "a name, a library or module:Class, and a core or fsm a shell too"
             complaints.append(f"{where}: a {words[0]} needs {needs}")
-        elif ":" in words[3] and words[0] != "core":
-            complaints.append(f"{where}: only cores can be written in Python, found a {words[0]}")
+        elif ":" in words[3] and words[0] not in IN_PYTHON:
+            what = f"a {words[0]} is written in C++: expected a library"
+            complaints.append(f"{where}: {what}, found '{words[3]}'")
         else:
             kind, name, shell, target = words
             plugins.append(Plugin(kind=kind, name=name, shell=shell, target=target, prefix=prefix))
@@ -144,12 +149,13 @@ def _index_files() -> _Files:
 class PluginLoader:
     """Loads plug-ins into a registry the first time somebody needs them. Not thread-safe: for setting up."""
 
-    _loaded = LoadedCode()  # one for the process, as libraries and modules are
+    # One for the process, as libraries and modules are.
+    _loaded = LoadedCode()
+    _sources: ClassVar[dict[tuple[str, str], str]] = {}  # of what was loaded; the index may list it no longer
 
     def __init__(self, registry: PluginRegistry, index: PluginIndex) -> None:
         self.registry = registry
         self.index = index
-        self._python_cores: set[str] = set()
 
     def names(self, kind: str) -> list[str]:
         """What is installed or built in."""
@@ -176,20 +182,40 @@ class PluginLoader:
                 is another one on the disk by now.
         """
         plugin = self.index.find(kind, name)
-        if plugin is not None and (change := self._loaded.change_of(plugin.source)):
+        source = self._sources.get((kind, name), "") if plugin is None else plugin.source
+        if change := self._loaded.change_of(source):
             raise PluginError(f"{kind} '{name}': {change}", element=name, remedy=REMEDY)
         if name in self.registry.names(kind):
             return
         if plugin is None:
-            remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
-            raise PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
+            raise self._not_installed(kind, name)
+        before = self._registered()
         if plugin.is_python:
-            self._add_python_core(plugin)
+            self._add_python_part(plugin)
         else:
             self._load_library(plugin)
+        self._sources.update(dict.fromkeys(self._registered() - before, plugin.source))
         if name not in self.registry.names(kind):
             remedy = "correct the package's list of plug-ins"
             raise PluginError(f"{plugin.library} has no {kind} '{name}'", element=name, remedy=remedy)
+
+    def _registered(self) -> set[tuple[str, str]]:
+        return {(kind, name) for kind in KINDS for name in self.registry.names(kind)}
+
+    def _not_installed(self, kind: str, name: str) -> PluginError:
+        if package := self.missing_package(name):
+            return PluginError(f"{kind} '{name}': {package}", element=name, remedy=SOURCE_IT)
+        remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
+        return PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
+
+    def missing_package(self, name: str) -> str:
+        """`package 'my_arm' is not found`, of `my_arm/Arm`; empty: there is one of that or a similar name."""
+        package, separator, _ = name.partition("/")
+        packages = {found for found, _, _ in ament_index.resources("packages")}
+        packages |= {plugin.name.partition("/")[0] for plugin in self.index}
+        if not separator or nearest(package, packages, likeness=0.8):
+            return ""
+        return f"package {shown(package)} is not found"
 
     def require_type(self, name: str, kind: str = "type") -> None:
         """As require(), but leaves a type (or call_type) that nothing lists to the registry's own words."""
@@ -206,21 +232,44 @@ class PluginLoader:
         except MauveError as error:
             raise PluginError(f"{plugin.kind} '{plugin.name}': {error}", element=plugin.name) from None
 
-    def _add_python_core(self, plugin: Plugin) -> None:
-        self.require("shell", plugin.shell)
-        factory = _factory(plugin)
+    def _add_python_part(self, plugin: Plugin) -> None:
+        if plugin.shell:
+            self.require("shell", plugin.shell)
+        part = _python_class(plugin)
         self._loaded.note(plugin.source, module_files(plugin.source))
-        self.registry.add_python_core(plugin.name, plugin.shell, factory)
+        if plugin.kind == "core":
+            from mauve_rt.parts.cores import core_factory  # noqa: PLC0415
+
+            self.registry.add_python_core(plugin.name, plugin.shell, core_factory(part))
+        elif plugin.kind == "fsm":
+            self.registry.fsm(plugin.name, part, plugin.shell)
+        elif plugin.kind == "shell":
+            self.registry.shell(plugin.name, part)
+        else:
+            self.registry.resource(plugin.name, part)
 
 
-def _factory(plugin: Plugin) -> Callable[[Any], object]:
-    from mauve_rt.parts.cores import core_factory  # noqa: PLC0415 - needs ROS, which the architecture file does not
-
+def _python_class(plugin: Plugin) -> Any:
     module_name, _, class_name = plugin.target.partition(":")
     try:
         importlib.invalidate_caches()  # it may have been installed a moment ago
-        core_class = getattr(importlib.import_module(module_name), class_name)
+        found = getattr(importlib.import_module(module_name), class_name)
     except BaseException as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
-        text = f"core '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
+        text = f"{plugin.kind} '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
         raise PluginError(text, element=plugin.name) from None
-    return core_factory(core_class)
+    base = _base_of(plugin.kind)
+    if base is not None and not (isinstance(found, type) and issubclass(found, base)):
+        bases = found.__mro__[1].__name__ if isinstance(found, type) else type(found).__name__
+        text = f"{plugin.kind} '{plugin.name}': {plugin.target}: expected a class derived from"
+        raise PluginError(f"{text} mauve_rt.api.{base.__name__}, found one derived from {bases}")
+    return found
+
+
+def _base_of(kind: str) -> type | None:
+    """What a class in Python is derived from; a core may also only look like one."""
+    from mauve_rt.parts.fsms import Fsm  # noqa: PLC0415 - these need ROS, unlike the architecture file
+    from mauve_rt.parts.resources import Resource  # noqa: PLC0415
+    from mauve_rt.parts.shells import Shell  # noqa: PLC0415
+
+    bases: Mapping[str, type] = {"shell": Shell, "fsm": Fsm, "resource": Resource}
+    return bases.get(kind)

@@ -3,22 +3,30 @@
 from collections.abc import Iterable
 
 _SHORT = 60
+_SHOWN_WORDS = 30
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown word: the nearest known one, else all that are known."""
+    """The remedy for an unknown word: the nearest known one, else those that are known."""
     names = sorted(set(known))
     if near := nearest(word, names):
         return f"did you mean {near}?"
-    return f"known: {', '.join(names)}" if names else "there are none"
+    return f"known: {some(names)}" if names else "there are none"
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The known word that is most like it; empty: none is."""
+def some(words: Iterable[str], limit: int = _SHOWN_WORDS) -> str:
+    """`a, b, c`; of many the first ones and the number of the others."""
+    names = list(words)
+    more = len(names) - limit
+    return ", ".join(names) if more <= 0 else f"{', '.join(names[:limit])} and {more:,} more"
+
+
+def nearest(word: str, known: Iterable[str], *, likeness: float = 0.6) -> str:
+    """The known word that is most like it; empty: none is, to a `likeness` of 0 to 1."""
     import difflib  # noqa: PLC0415 - only when something is wrong
 
     by_lower = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=likeness)
     return by_lower[close[0]] if close else ""
 
 

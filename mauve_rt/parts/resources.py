@@ -4,9 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar, overload
 
-from mauve_rt._kernel import DataResource, PartFactory, ResourceParameter
+from mauve_rt._kernel import DataResource, Host, PartFactory, ResourceParameter
 from mauve_rt.parts import messages
 from mauve_rt.parts.part import Configurable, implementation_name
+from mauve_rt.parts.ports import Sample
 
 __all__ = [
     "AnyResource",
@@ -18,6 +19,7 @@ __all__ = [
     "RingBuffer",
     "SharedData",
     "parameter",
+    "read_resource",
     "service",
     "service_type",
 ]
@@ -208,3 +210,15 @@ class EventCounter(DataOfKind[int]):
 
 def _told(**parameters: int | None) -> dict[str, int]:
     return {name: value for name, value in parameters.items() if value is not None}
+
+
+def read_resource(host: Host, resource: str, type: type[T]) -> Sample[T]:  # noqa: A002
+    """What a `shared_data` resource holds, for tests and programs; the message's default before any write.
+
+    Raises:
+        MauveError: there is no such resource, or it is of another kind.
+        TypeError: `type` is no class of ROS messages.
+    """
+    messages.type_name(type)
+    data, sequence, time_ns = host.read_resource(resource)
+    return Sample(messages.deserialize(data, type), "new" if sequence else "none", time_ns)

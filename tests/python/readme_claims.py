@@ -918,6 +918,19 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`mauve_examples/tutorials/python_component.py` has a shell, a core and an fsm": (
         "python/parts/test_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",
     ),
+    "mauve replace-core /executor rover": (
+        "python/model/test_python_parts.py::test_the_rover_of_the_examples_takes_another_core",
+    ),
+    "An architecture file names them as it names those in C++": (
+        "python/model/test_python_parts.py::test_a_whole_component_of_a_file_runs_and_is_changed_in_flight",
+        "python/model/test_python_parts.py::test_a_resource_of_a_file_has_its_parameter",
+    ),
+    "An fsm in Python needs a core in Python": (
+        "python/model/test_python_parts.py::test_an_fsm_in_python_needs_a_core_in_python",
+    ),
+    "A test runs the same file in virtual time, and reads a resource by its message": (
+        "python/model/test_python_parts.py::test_the_rover_of_the_examples_is_tested_as_the_page_says",
+    ),
     "a laser's driver faults and the robot stands still": ("ctest: sensor_breaks",),
     "removes the old chain, and the robot drives again": ("ctest: sensor_breaks",),
     "its pose does not jump": ("ctest: gps_lost",),

@@ -174,8 +174,12 @@ void Component::check_allowed(const std::string& core_implementation) const {
   const auto is_it = [&core_implementation](const std::string& name) {
     return name == core_implementation || name == any_core;
   };
-  if (is_it(declared_core_) || std::any_of(alternatives_.begin(), alternatives_.end(), is_it)) return;
+  if (is_it(declared_core_) || is_it(fallback_name_) ||
+      std::any_of(alternatives_.begin(), alternatives_.end(), is_it)) {
+    return;
+  }
   std::vector<std::string> allowed{declared_core_};
+  if (!fallback_name_.empty()) allowed.push_back(fallback_name_);
   allowed.insert(allowed.end(), alternatives_.begin(), alternatives_.end());
   throw Error(ErrorCode::undeclared_core, "the core is not one that the component declares",
               {.component = name_,

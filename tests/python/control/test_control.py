@@ -260,7 +260,11 @@ REFUSED = {
         Code.UNDECLARED_CORE,
         "declared: component 'free' takes executor_tests/CounterFsm; name it among its alternatives",
     ),
-    "shell": ((Step("replace_shell", "counter", "os/Shell"),), Code.UNKNOWN_CORE, "shell 'os/Shell' is not"),
+    "shell": (
+        (Step("replace_shell", "counter", "os/Shell"),),
+        Code.UNKNOWN_CORE,
+        "package 'os' is not found",
+    ),
     "shell alone": (
         (Step("replace_shell", "counter", "executor_tests/TwinShell"),),
         Code.PREPARE_FAILED,
@@ -394,6 +398,8 @@ def test_a_fallback_core_takes_over_and_tells_the_fault(runtime: Runtime, contro
     assert outcome.success, outcome.message
     brave = _part(runtime, "brave")
     assert (brave.core, brave.fell_back, brave.fault) == ("executor_tests/Counter", False, "")
+    fallback = _ask(control, Step("replace_core", "brave", "executor_tests/Backwards"))
+    assert fallback.success, "declared as the fallback"
 
 
 def test_a_faulted_component_can_be_removed(runtime: Runtime, control: Control) -> None:

@@ -44,7 +44,10 @@ def test_lines_of_an_index() -> None:
         ("kore; p/Core; p/Shell; p", "p:1:1: unknown kind 'kore'; did you mean core?"),
         ("core; p/Core; ; p", "p:1:1: a core needs a name"),
         ("shell; ; ; p", "p:1:1: a shell needs a name"),
-        ("fsm; p/Fsm; p/Shell; p.module:Fsm", "p:1:1: only cores can be written in Python, found a fsm"),
+        (
+            "type; p/Type; ; p.module:Type",
+            "p:1:1: a type is written in C++: expected a library, found 'p.mod",
+        ),
     ],
 )
 def test_bad_lines_are_told_and_left_out(line: str, message: str) -> None:
@@ -89,6 +92,11 @@ def test_libraries_are_loaded_when_asked_for(plugin_prefix: Path) -> None:
     ("name", "message"),
     [
         ("executor_tests/Countr", "is not installed; did you mean executor_tests/Counter?"),
+        ("executor_tets/Counter", "is not installed; did you mean executor_tests/Counter?"),
+        (
+            "my_arm/Counter",
+            "package 'my_arm' is not found; source its install/setup.bash",
+        ),
         ("executor_tests/Missing", "has no core 'executor_tests/Missing'"),
         ("executor_tests/PyMissing", "cannot load executor_tests_cores:Nobody: AttributeError"),
     ],
@@ -112,3 +120,11 @@ def test_library_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "lib" / "libtext.so").write_text("not a library", encoding="utf-8")
     with pytest.raises(PluginError, match="does not load"):
         PluginLoader(PluginRegistry(), PluginIndex(plugins)).require("core", "p/Core")
+
+
+def test_many_known_names_are_not_all_told(tmp_path: Path) -> None:
+    names = [f"p/Core{number:02}" for number in range(99)]
+    lines = "\n".join(f"core; {name}; p/Shell; p" for name in names)
+    plugins, _ = parse_index(lines, prefix=tmp_path, origin="p")
+    with pytest.raises(PluginError, match=r"known: p/Core00, .*, p/Core29 and 69 more \(`mauve plugins`"):
+        PluginLoader(PluginRegistry(), PluginIndex(plugins)).require("core", "p/zzzzzzzzzzzzzzz")

@@ -1,16 +1,16 @@
 """The basic elements as plug-ins of the package mauve_rt: in architecture files, with cores in Python."""
 
 import itertools
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
+from waiting import wait_until
 
 from mauve_rt._kernel import Deployer, PluginRegistry
 from mauve_rt.model import load_architecture
@@ -19,6 +19,7 @@ from mauve_rt.model.plugins import INDEX_RESOURCE, PluginIndex, PluginLoader, pa
 from mauve_rt.parts import ament_index
 from mauve_rt.parts.cores import Core, core_factory
 from mauve_rt.parts.message_types import message_class
+from mauve_rt.parts.resources import read_resource
 
 FILTER_SHELL = "mauve_rt/Float64FilterShell"
 
@@ -119,22 +120,14 @@ def deployed(text: str, folder: Path) -> Iterator[Deployer]:
         deployer.shutdown()
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
-    """Wait until the condition holds; gives up after 10 s."""
-    until = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < until, "it does not come to it"
-        time.sleep(0.002)
-
-
 def number(deployer: Deployer, resource: str) -> float:
     """The number in a resource."""
-    return float(deserialize_message(deployer.read_resource(resource)[0], Float64).data)
+    return float(read_resource(deployer, resource, Float64).value.data)
 
 
 def forward_m_s(deployer: Deployer) -> float:
     """The command that goes to the robot."""
-    return float(deserialize_message(deployer.read_resource("command")[0], Twist).linear.x)
+    return float(read_resource(deployer, "command", Twist).value.linear.x)
 
 
 def _numbered(message: Any) -> Any:
@@ -187,7 +180,7 @@ def test_a_common_type_is_on_the_wire_as_ros_has_it(name: str, tmp_path: Path):
     text = RELAY.replace("TYPE", f"{package}/msg/{name}").replace("NAME", name)
     with deployed(text, tmp_path) as deployer:
         assert deployer.write_resource("before", serialize_message(message))
-        wait_until(lambda: deserialize_message(deployer.read_resource("after")[0], type(message)) == message)
+        wait_until(lambda: read_resource(deployer, "after", type(message)).value == message)
 
 
 @pytest.mark.parametrize("element", ["Multiplexer", "PriorityMultiplexer"])

@@ -168,6 +168,12 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "architecture/metronome.yaml": (
             "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
         ),
+        "rover.yaml &": (
+            "python/model/test_python_parts.py::test_the_rover_of_the_examples_takes_another_core",
+        ),
+        "open_architecture(": (
+            "python/model/test_python_parts.py::test_the_rover_of_the_examples_is_tested_as_the_page_says",
+        ),
         "find_package(mauve_rt REQUIRED)": (
             "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
         ),

@@ -5,11 +5,12 @@ import resource
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
+from waiting import wait_until
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.recorded import Split, TopicQos
@@ -57,13 +58,6 @@ def recorder(tmp_path: Path, source: SyntheticSource, errors: list[str]) -> Iter
     )
     yield made
     made.stop()
-
-
-def wait_until(condition: Callable[[], object], timeout_s: float = 60.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.005)
 
 
 def records_in(directory: Path, component: str) -> int:

@@ -47,6 +47,14 @@ class Installed(NamedTuple):
         new.write_text(text, encoding="utf-8")
         new.replace(self.modules / f"{module}.py")
 
+    def unlist(self, name: str) -> None:
+        """Take the lines about a part out of the index of plug-ins."""
+        index = (
+            self.prefix / "share" / "ament_index" / "resource_index" / "mauve_rt_plugins" / "executor_tests"
+        )
+        lines = index.read_text(encoding="utf-8").splitlines(keepends=True)
+        index.write_text("".join(line for line in lines if f"; {name};" not in line), encoding="utf-8")
+
     def list_core(self, module: str) -> None:
         """Name a core in the index of plug-ins."""
         index = self.prefix / "share" / "ament_index" / "resource_index" / "mauve_rt_plugins"
@@ -68,10 +76,11 @@ def installed(plugin_prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.fixture
-def start(start_executor: Callable[..., Any], tmp_path: Path) -> Callable[[], None]:
-    def started() -> None:
+def start(start_executor: Callable[..., Any], tmp_path: Path) -> Callable[..., None]:
+    def started(alternatives: str = "installed") -> None:
         path = tmp_path / "robot.yaml"
-        path.write_text(ARCHITECTURE, encoding="utf-8")
+        text = ARCHITECTURE.replace("alternatives: installed", f"alternatives: {alternatives}")
+        path.write_text(text, encoding="utf-8")
         start_executor("-p", f"architecture:={path}")
 
     return started
@@ -87,7 +96,7 @@ def _counter(graph: Any) -> Any:
 
 
 def test_a_library_that_was_rebuilt_is_told(
-    installed: Installed, start: Callable[[], None], graph: Any
+    installed: Installed, start: Callable[..., None], graph: Any
 ) -> None:
     start()
     assert _replace(graph, "Backwards").success
@@ -95,8 +104,7 @@ def test_a_library_that_was_rebuilt_is_told(
     shutil.copyfile(installed.library, new)
     new.replace(installed.library)
     assert _replace(graph, "Counter").success, "the same contents are the same code"
-    with new.open("wb") as file:
-        file.write(installed.library.read_bytes() + b"\0")
+    new.write_bytes(installed.library.read_bytes() + b"\0")
     new.replace(installed.library)
     before = _counter(graph)
     refused = _replace(graph, "Backwards")
@@ -108,8 +116,27 @@ def test_a_library_that_was_rebuilt_is_told(
     assert f"{installed.library} is gone since" in _replace(graph, "Backwards").message
 
 
+def test_a_library_that_was_rebuilt_without_a_core_is_told(
+    installed: Installed, start: Callable[..., None], graph: Any
+) -> None:
+    """The index lists the core no longer, but the old library, which is loaded, still has it."""
+    start("[executor_tests/Backwards]")
+    assert _replace(graph, "Backwards").success
+    assert _replace(graph, "Counter").success
+    installed.unlist("executor_tests/Backwards")
+    assert _replace(graph, "Backwards").success, "it is the code that was listed"
+    assert _replace(graph, "Counter").success
+    new = installed.library.with_suffix(".new")
+    new.write_bytes(installed.library.read_bytes() + b"\0")
+    new.replace(installed.library)
+    refused = _replace(graph, "Backwards")
+    assert (refused.success, refused.code) == (False, Code.PREPARE_FAILED)
+    assert f"{installed.library} was changed since this process loaded it" in refused.message
+    assert _counter(graph).core == "executor_tests/Counter"
+
+
 def test_a_python_module_that_was_changed_is_told(
-    installed: Installed, start: Callable[[], None], graph: Any
+    installed: Installed, start: Callable[..., None], graph: Any
 ) -> None:
     installed.write_core("first", CORE)
     installed.list_core("first")
@@ -124,7 +151,7 @@ def test_a_python_module_that_was_changed_is_told(
 
 
 def test_a_core_installed_meanwhile_is_taken(
-    installed: Installed, start: Callable[[], None], graph: Any
+    installed: Installed, start: Callable[..., None], graph: Any
 ) -> None:
     start()
     assert _replace(graph, "late").code == Code.UNKNOWN_CORE
