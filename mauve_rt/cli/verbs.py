@@ -2,11 +2,14 @@
 
 import argparse
 import sys
+import time
 from typing import Any
 
 from mauve_rt.cli import analyze_verb, check_verb, report_verb, rules_verb, trace_verb
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
+
+_LOOK_S = 0.02  # between two looks at what a change cost
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +25,9 @@ def _add_request(parser: argparse.ArgumentParser) -> None:
 
 def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cause", default="", help="why, for the record")
-    parser.add_argument("--request-id", default="", help="a repeated id returns the first outcome")
+    parser.add_argument(
+        "--request-id", default="", help="a repeated id returns the outcome of the first request"
+    )
     parser.add_argument(
         "--expected-revision", type=int, default=0, metavar="N", help="refuse at any other revision"
     )
@@ -47,6 +52,16 @@ def _add_force(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_phase_timeout(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--phase-timeout",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="seconds to wait for the first release after it, which is reported (default 1; 0: none)",
+    )
+
+
 def _add_stop(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
@@ -55,6 +70,7 @@ def _add_stop(parser: argparse.ArgumentParser) -> None:
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
+    _add_phase_timeout(parser)
     parser.add_argument("core", help="the new core, package/Class")
 
 
@@ -65,6 +81,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     _add_record(parser)
     _add_timeout(parser)
     _add_force(parser)
+    _add_phase_timeout(parser)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -140,7 +157,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
 
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_json, report_lines  # noqa: PLC0415
+    from mauve_rt.cli.views import is_incomplete, print_json, report_lines  # noqa: PLC0415
     from mauve_rt.control.requests import code_name  # noqa: PLC0415
 
     request = service_type.Request(
@@ -152,6 +169,11 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
     )
     with connected(first=True) as client:
         reply = client.call(service_type, f"{args.executor}/{name}", request)
+        # Who repeats a request gets its outcome, with the releases that came meanwhile.
+        until_s = time.monotonic() + getattr(args, "phase_timeout", 0.0)
+        while is_incomplete(reply) and time.monotonic() < until_s:
+            time.sleep(_LOOK_S)
+            reply = client.call(service_type, f"{args.executor}/{name}", request)
     if args.json:
         print_json(reply)
     elif reply.success:

@@ -43,6 +43,14 @@ def console() -> "Console":
     return OurConsole(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
 
 
+def is_incomplete(reply: Any) -> bool:
+    """Whether a release is still to come that the report of a change tells of."""
+    return any(
+        step.blackout_ns != step.NOT_MEASURED and step.missed_releases == step.NOT_MEASURED
+        for step in getattr(reply, "report", ())
+    )
+
+
 def report_lines(report: Sequence[Any]) -> list[str]:
     """What each step cost, in words: a line for each of several, for one when something was measured."""
     lines = []

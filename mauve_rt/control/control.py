@@ -144,6 +144,11 @@ class Control:
         with self._answered:
             self._log.add(request, outcome)
 
+    def complete(self, request: Request, outcome: Outcome) -> None:
+        """The releases came that a report lacked: who repeats the request gets them, too."""
+        with self._answered:
+            self._log.complete(request, outcome)
+
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
         kernel_revision = self._runtime.kernel_revision()

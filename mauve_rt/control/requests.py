@@ -182,7 +182,7 @@ class RequestLog:
         self._entries: OrderedDict[bytes, tuple[bytes, str, Outcome]] = OrderedDict()
 
     def find(self, request: Request) -> Outcome | None:
-        """The first outcome of a repeated request; a refusal for the id of another one; None: not seen."""
+        """What came of a repeated request, as far as known; a refusal for an id in use; None: not seen."""
         known = self._entries.get(_key(request)) if request.request_id else None
         if known is None:
             return None
@@ -197,6 +197,12 @@ class RequestLog:
             self._entries[_key(request)] = (request.digest(), cut(str(request), SHOWN_STEP), outcome)
             while len(self._entries) > self._kept:
                 self._entries.popitem(last=False)
+
+    def complete(self, request: Request, outcome: Outcome) -> None:
+        """Replace the outcome of a request that it remembers by one whose report is complete."""
+        known = self._entries.get(_key(request)) if request.request_id else None
+        if known is not None and known[0] == request.digest():
+            self._entries[_key(request)] = (*known[:2], outcome)
 
 
 def reused_id(request: Request, first: "Request | str") -> Outcome:

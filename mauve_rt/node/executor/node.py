@@ -112,6 +112,7 @@ class ExecutorNode(LifecycleNode):
             recordings=RecordingOrders(self._recording, self._runtime, folder=Path(self._settings["bags"])),
             limits=_limits(self._settings),
         )
+        self._state.completed = control.complete
         services = Services(
             self,
             self._runtime,

@@ -38,6 +38,7 @@ class StatePublisher:
         self._states = node.create_publisher(ArchitectureState, "~/state", self._state_qos)
         self._events = node.create_publisher(ReconfigurationEvent, "~/events", self._event_qos)
         self.rules: Callable[[], list[str]] = list  # names of those at work
+        self.completed: Callable[[Request, Outcome], None] = lambda _request, _outcome: None
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
         self._published_revision = -1
@@ -123,6 +124,7 @@ class StatePublisher:
         self._behind = False
 
     def _publish_event(self, event: Event) -> None:
+        self.completed(event.request, event.outcome)
         self.refresh()
         instance_id = self._runtime.instance_id
         message = reconfiguration_event(
