@@ -1,6 +1,8 @@
 """What reconfigurations cost, from the records that the component's own thread wrote.
 
 *Blackout*: from the `parked` to the `armed` record.
+A fallback core that takes over after a fault counts as one: from the `fault` record to the `start` record.
+
 *Missed releases*: the instants, by the g before the commit, from the one pending at the park up to the first
 nominal one after it.
 *Phase*: that release, nominal and actual, minus the nearest instant of the grid epoch + offset + k*g that the
@@ -8,18 +10,22 @@ deployment record tells, and minus where the machine's waits since its initial s
 after the waits 4, 6, 5 of a g of 15 that is 4, 10 and 0.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from mauve_rt.trace.format.records import IN_VAIN, Kind, ReconfigurationPhase
+from mauve_rt.trace.format.records import IN_VAIN, Kind, ReconfigurationPhase, Records
 from mauve_rt.trace.reading.trace import Trace
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reconfiguration:
-    """A component was parked, something was committed (or refused), and it was armed again. Times in ns."""
+    """A component was parked, something was committed (or refused), and it was armed again. Times in ns.
+
+    After a fault: it was stopped by the fault, and went on with its fallback core.
+    """
 
     component: str
     what: str
@@ -41,6 +47,8 @@ class Reconfiguration:
     phase_actual_ns: int | None
     complete: bool
     """False when records are missing between the park and the first release: the figures are doubtful."""
+    after_fault: bool = False
+    """A fallback core took over: `parked_ns` is the time of the fault, `armed_ns` that of the new start."""
 
     @property
     def blackout_ns(self) -> int:
@@ -61,15 +69,32 @@ def _of_component(trace: Trace, component: str) -> list[Reconfiguration]:
     records = trace.of(component)
     (marks,) = np.nonzero(np.isin(records["kind"], (Kind.PARKED, Kind.ARMED)))
     kinds = records["kind"]
-    return [
-        _measure(trace, component, int(parked), int(armed))
+    changes = [
+        (int(parked), int(armed))
         for parked, armed in pairwise(marks)
         if kinds[parked] == Kind.PARKED and kinds[armed] == Kind.ARMED
         if records["b"][armed] != IN_VAIN
     ]
+    return [
+        *(_measure(trace, component, *change) for change in changes),
+        *(_measure(trace, component, *takeover, after_fault=True) for takeover in _takeovers(records)),
+    ]
 
 
-def _measure(trace: Trace, component: str, parked: int, armed: int) -> Reconfiguration:
+def _takeovers(records: Records) -> Iterator[tuple[int, int]]:
+    """Indices of each fault after which a fallback core took over, and of the start that followed."""
+    kinds = records["kind"]
+    (ends,) = np.nonzero(np.isin(kinds, (Kind.START, Kind.STOP, Kind.FAULT, Kind.RELEASE, Kind.PARKED)))
+    for fault, end in pairwise(ends.tolist()):
+        between = records[fault:end]
+        taken = (between["kind"] == Kind.RECONFIGURATION) & (between["c"] == 0)
+        if kinds[fault] == Kind.FAULT and kinds[end] == Kind.START and taken.any():
+            yield fault, end
+
+
+def _measure(
+    trace: Trace, component: str, parked: int, armed: int, *, after_fault: bool = False
+) -> Reconfiguration:
     records = trace.of(component)
     between = records[parked:armed]
     phases = between[between["kind"] == Kind.RECONFIGURATION]
@@ -78,18 +103,19 @@ def _measure(trace: Trace, component: str, parked: int, armed: int) -> Reconfigu
     released = records["kind"][last] == Kind.RELEASE
     nominal_ns = int(records["a"][last]) if released else None
     actual_ns = int(records["b"][last]) if released else None
-    pending_ns = int(records["a"][parked])
+    period_ns = _period_before(trace, component, parked)
+    pending_ns = int(records["a"][parked]) + (period_ns if after_fault else 0)
     grid = trace.deployment_at(component, int(records["time_ns"][armed]))
     phase_nominal_ns, phase_actual_ns, missed_releases = None, None, None
     if grid is not None and grid.period_ns > 0 and nominal_ns is not None and actual_ns is not None:
         place_ns = int(records["c"][last])
         phase_nominal_ns = grid.phase_ns(nominal_ns - place_ns)
         phase_actual_ns = phase_nominal_ns + actual_ns - nominal_ns
-        missed_releases = _missed(pending_ns, nominal_ns, _period_before(trace, component, parked))
+        missed_releases = _missed(pending_ns, nominal_ns, period_ns)
     return Reconfiguration(
         component=component,
         what=", ".join(dict.fromkeys(trace.name(int(name)) for name in phases["name"])),
-        committed=bool(records["b"][armed]),
+        committed=after_fault or bool(records["b"][armed]),
         parked_ns=int(records["time_ns"][parked]),
         armed_ns=int(records["time_ns"][armed]),
         pending_ns=pending_ns,
@@ -101,6 +127,7 @@ def _measure(trace: Trace, component: str, parked: int, armed: int) -> Reconfigu
         phase_nominal_ns=phase_nominal_ns,
         phase_actual_ns=phase_actual_ns,
         complete=int(records["sequence"][last] - records["sequence"][parked]) == last - parked,
+        after_fault=after_fault,
     )
 
 

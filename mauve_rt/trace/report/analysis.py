@@ -1,6 +1,6 @@
 """Everything the parts of a report tell about one trace, computed once."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -26,11 +26,15 @@ class Swap(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A component parked FAULTED."""
+    """A fault of a component. Without a fallback core it is parked FAULTED from then on."""
 
     component: str
     state: str
     time_ns: int
+    reason: str = ""
+    """What was raised, in one line; empty where the bag does not tell."""
+    takeover: Reconfiguration | None = None
+    """Of its fallback core."""
 
 
 class DeadlineMiss(NamedTuple):
@@ -87,6 +91,7 @@ def analyse(
     *,
     events: Iterable[Any] = (),
     zero_ns: int | None = None,
+    states: Iterable[Any] = (),
     progress: Progress = silent,
 ) -> Analysis:
     """Compute it all.
@@ -94,6 +99,7 @@ def analyse(
     Args:
         trace: the trace.
         events: messages of type ReconfigurationEvent, by time.
+        states: messages of type ArchitectureState, by time; looked at only when there was a fault.
         zero_ns: what the page's clock counts from; the first record when not given.
         progress: told what is being done.
     """
@@ -112,7 +118,7 @@ def analyse(
         releases=releases,
         slices=slices,
         swaps=[Swap(*one) for one in zip(measured, requests, _changed_ns(trace, measured), strict=True)],
-        faults=_faults(trace),
+        faults=_faults(trace, measured, states),
         begin_ns=begin_ns,
         end_ns=end_ns,
         zero_ns=begin_ns if zero_ns is None else zero_ns,
@@ -135,13 +141,32 @@ def _changed_ns(trace: Trace, measured: list[Reconfiguration]) -> list[int]:
     return found
 
 
-def _faults(trace: Trace) -> list[Fault]:
+def _faults(trace: Trace, measured: Iterable[Reconfiguration], states: Iterable[Any]) -> list[Fault]:
+    takeovers = {(one.component, one.parked_ns): one for one in measured if one.after_fault}
     found = [
-        Fault(component, trace.name(int(row["name"])), int(row["time_ns"]))
+        Fault(component, trace.name(int(row["name"])), time_ns, takeover=takeovers.get((component, time_ns)))
         for component in trace.components
         for row in np.atleast_1d(trace.of(component, Kind.FAULT))
+        for time_ns in [int(row["time_ns"])]
     ]
-    return sorted(found, key=lambda fault: fault.time_ns)
+    return sorted(_with_reasons(found, states) if found else [], key=lambda fault: fault.time_ns)
+
+
+def _with_reasons(faults: Iterable[Fault], states: Iterable[Any]) -> Iterator[Fault]:
+    """Faults with what the first state of the executor after them says.
+
+    Components of merged traces are named <bag>/<component>; the state's topic has the name of the bag.
+    """
+    told = [(state, part) for state in states for part in state.msg.components if part.fault]
+    for fault in faults:
+        owner, _, name = fault.component.rpartition("/")
+        reasons = (
+            part.fault
+            for state, part in told
+            if part.name == name and state.monotonic_ns >= fault.time_ns
+            if not owner or f"/{owner}/" in state.topic
+        )
+        yield fault._replace(reason=next(reasons, "").partition("\n")[0].partition(" (in state ")[0])
 
 
 def _misses(trace: Trace) -> list[DeadlineMiss]:

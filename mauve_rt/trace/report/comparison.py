@@ -73,7 +73,10 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
 def _in_words(analysis: Analysis, swap: Swap) -> str:
     one, request, _ = swap
     due_ns = one.pending_ns - one.parked_ns
-    text = f"{one.component} was parked for {time_text(one.blackout_ns)}"
+    lasted = time_text(one.blackout_ns)
+    text = f"{one.component} was parked for {lasted}"
+    if one.after_fault:
+        text = f"{one.component} had a fault, and its fallback core took over after {lasted}"
     if due_ns > 0:
         text += f", {time_text(due_ns)} before its next release was due"
     if request is not None and request.cause:

@@ -26,6 +26,7 @@ from mauve_rt.trace.report.timeline_section import timeline_section
 from mauve_rt.trace.report.verdict import Verdict, judge, verdict_html
 
 _EVENT_TYPE = "mauve_msgs/msg/ReconfigurationEvent"
+_STATE_TYPE = "mauve_msgs/msg/ArchitectureState"
 _ANALYSED, _PACKED = 0.5, 0.7
 
 
@@ -49,7 +50,7 @@ def write_report(
         trace: of one executor, or of several merged ones.
         title: the page's.
         extra: sections to stand before those about the trace.
-        figures: cards to stand before those about the trace.
+        figures: cards to stand before those about the trace, which are fewer for it.
         verdict: makes what stands at the top of what the trace tells; that itself when not given.
         events: the executors' ReconfigurationEvent messages by time, when they have been read already.
         zero_ns: what the page's clock counts from, CLOCK_MONOTONIC; the first record when not given.
@@ -61,7 +62,13 @@ def write_report(
         OSError: the page cannot be written.
     """
     told = trace.messages(_EVENT_TYPE) if events is None else events
-    analysis = analyse(trace, events=told, zero_ns=zero_ns, progress=part(progress, 0, _ANALYSED))
+    analysis = analyse(
+        trace,
+        events=told,
+        states=trace.messages(_STATE_TYPE),
+        zero_ns=zero_ns,
+        progress=part(progress, 0, _ANALYSED),
+    )
     progress(_ANALYSED, "packing the timeline")
     described, data = timeline_data(analysis, budget=budget)
     makers: tuple[Callable[[Analysis], Section | None], ...] = (
@@ -81,7 +88,7 @@ def write_report(
             sections.append(made)
     told_by_trace = judge(analysis)
     outcome = verdict_html(verdict(told_by_trace) if verdict else told_by_trace, title=title)
-    outcome += cards([*figures, *key_figures(analysis)])
+    outcome += cards(key_figures(analysis, figures))
     parts = [*(section.render() for section in sections), words_section()]
     elements = data_element("timeline-described", "application/json", json_for_script(described))
     elements += data_element("timeline-columns", "text/plain", data)

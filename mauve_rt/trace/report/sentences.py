@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from mauve_rt.trace.reading.statistics import ComponentStatistics
-from mauve_rt.trace.report.analysis import Analysis
+from mauve_rt.trace.report.analysis import Analysis, Fault
 from mauve_rt.trace.report.machine import Machine
 from mauve_rt.trace.report.overruns import culprits
 from mauve_rt.trace.report.units import counted, listed, share_text, time_text, times
@@ -207,9 +207,23 @@ def _faults(analysis: Analysis) -> Iterator[Sentence]:
     for fault in analysis.faults[:_NAMED]:
         at = time_text(fault.time_ns - analysis.zero_ns)
         where = f" in its state {fault.state}" if fault.state else ""
-        yield Sentence(BAD, f"{fault.component} was parked faulted{where}, {at} after the begin.")
+        reason = f": {fault.reason}" if fault.reason else ""
+        what = f"{fault.component} had a fault{where}, {at} after the begin{reason}"
+        yield Sentence(BAD, f"{what}; {_what_followed(fault)}.")
     if len(analysis.faults) > _NAMED:
         yield Sentence(BAD, f"{len(analysis.faults) - _NAMED} more faults followed.")
+
+
+def _what_followed(fault: Fault) -> str:
+    takeover = fault.takeover
+    if takeover is None:
+        return "it was parked (FAULTED)"
+    text = (
+        f"fallback core {takeover.what.rsplit('/', 1)[-1]} took over after {time_text(takeover.blackout_ns)}"
+    )
+    if takeover.actual_ns is None:
+        return text
+    return f"{text}, and was released {time_text(takeover.actual_ns - fault.time_ns)} after the fault"
 
 
 def _doubts(analysis: Analysis) -> Iterator[Sentence]:

@@ -47,7 +47,7 @@ def grid_figure(analysis: Analysis, one: Reconfiguration) -> str:
     window = window_around(analysis, one)
     others = [name for name in analysis.trace.components if name != one.component][:_OTHERS]
     height = _TOP + _TALL_ROW + len(others) * _ROW + 26
-    parts = [_axis(window, one.parked_ns, height - 22), _grid_lines(analysis, one, window)]
+    parts = [_axis(window, one, height - 22), _grid_lines(analysis, one, window)]
     band = max(window.x(one.armed_ns) - window.x(one.parked_ns), 2)
     parts.append(svg.rect(window.x(one.parked_ns) - 1, _TOP - 8, band, height - _TOP - 14, css="blackout"))
     parts.append(_row(analysis, one.component, window, _TOP, _TALL_ROW, css="own"))
@@ -64,7 +64,7 @@ def blackout_figure(swap: Swap) -> str:
     margin_ns = max(one.blackout_ns * 0.25, 200)
     window = Window(one.parked_ns - margin_ns, one.armed_ns + margin_ns)
     top, height = 30.0, 96.0
-    parts = [_axis(window, one.parked_ns, height - 22)]
+    parts = [_axis(window, one, height - 22)]
     left, right = window.x(one.parked_ns), window.x(one.armed_ns)
     parts.append(svg.rect(left, top, right - left, 30, css="blackout solid", round_=3))
     at_ns = float(max(one.parked_ns, swap.changed_ns - one.adopt_ns - one.take_ns))
@@ -75,8 +75,8 @@ def blackout_figure(swap: Swap) -> str:
             svg.rect(begin, top + 5, max(end - begin, 1.5), 20, css=f"phase {phase}", tip=tip, round_=2)
         )
         at_ns += took_ns
-    parts.append(svg.label(left - 6, top + 20, "parked", css="strong", anchor="end"))
-    parts.append(svg.label(right + 6, top + 20, "armed", css="strong"))
+    parts.append(svg.label(left - 6, top + 20, _began(one), css="strong", anchor="end"))
+    parts.append(svg.label(right + 6, top + 20, "started" if one.after_fault else "armed", css="strong"))
     parts_told = f"adopt {time_text(one.adopt_ns)}, take {time_text(one.take_ns)}"
     told = f"blackout {time_text(one.blackout_ns)}: {parts_told}"
     parts.append(svg.label((left + right) / 2, top - 8, told, css="strong", anchor="middle"))
@@ -151,12 +151,17 @@ def window_around(analysis: Analysis, one: Reconfiguration) -> Window:
     return Window(first_ns - around, last_ns + around)
 
 
-def _axis(window: Window, zero_ns: float, y: float) -> str:
+def _began(one: Reconfiguration) -> str:
+    return "fault" if one.after_fault else "parked"
+
+
+def _axis(window: Window, one: Reconfiguration, y: float) -> str:
+    zero_ns, zero = one.parked_ns, _began(one)
     parts = [svg.line(_LEFT, y, WIDTH - _RIGHT, y, css="axis")]
     ticks = list(window.ticks(zero_ns))
     texts = tick_texts([value for _, value in ticks])
     for (x, value), told in zip(ticks, texts, strict=True):
-        text = "parked" if value == 0 else ("+" if value > 0 else "") + told
+        text = zero if value == 0 else ("+" if value > 0 else "") + told
         parts += [
             svg.line(x, y, x, y + 4, css="axis"),
             svg.label(x, y + 17, text, css="tick", anchor="middle"),
@@ -215,7 +220,7 @@ def _apart_by_pixels(begin_ns: Times, end_ns: Times, window: Window) -> list[tup
 
 def _flags(one: Reconfiguration, window: Window) -> str:
     x = window.x(one.parked_ns)
-    parts = [svg.label(x + 6, 14, f"parked, blackout {time_text(one.blackout_ns)}", css="strong")]
+    parts = [svg.label(x + 6, 14, f"{_began(one)}, blackout {time_text(one.blackout_ns)}", css="strong")]
     if one.nominal_ns is not None:
         end = window.x(one.nominal_ns)
         missed = "" if one.missed_releases is None else f", {one.missed_releases or 'none'} missed"

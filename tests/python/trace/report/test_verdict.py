@@ -1,8 +1,11 @@
 """The verdict on traces whose course is known: nothing is said that they do not prove."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 from synthetic_traces import (
     EPOCH_NS,
     MS,
@@ -19,8 +22,12 @@ from mauve_rt.trace.format.records import DEADLINE_MISSED, Kind
 from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.report import Verdict, judge
+from mauve_rt.trace.report import Card, Verdict, judge
 from mauve_rt.trace.report.analysis import analyse
+from mauve_rt.trace.report.distributions import distributions_section
+from mauve_rt.trace.report.key_figures import key_figures
+
+FAULT = "RuntimeError: cable on fire"
 
 
 def verdict_on(trace: Trace) -> Verdict:
@@ -160,7 +167,7 @@ def test_the_most_serious_reason_comes_first():
     levels = [one.level for one in found.sentences]
     assert levels == sorted(levels, key=weights.index)
     assert set(levels) == set(weights)
-    assert found.sentences[0].text.startswith("faulty was parked faulted")
+    assert found.sentences[0].text.startswith("faulty had a fault")
 
 
 def test_overruns_as_a_habit_are_bad():
@@ -205,7 +212,54 @@ def test_a_fault_is_bad():
     source.add("c", Kind.FAULT, EPOCH_NS + 50 * MS, name="act")
     found = verdict_on(trace_of(source))
     assert (found.level, found.sentence) == ("bad", "No: 1 fault.")
-    assert "c was parked faulted in its state act, 70 ms after the begin." in said(found)
+    assert "c had a fault in its state act, 70 ms after the begin; it was parked (FAULTED)." in said(found)
+
+
+def faulted_at(time_ns: int, *components: str) -> Any:
+    """A message of type ArchitectureState, as a trace gives it."""
+    parts = [SimpleNamespace(name=name, fault=f"{FAULT}\n\nAt:\n  a.py(7): act") for name in components]
+    state = SimpleNamespace(components=parts)
+    return SimpleNamespace(topic="/robot_1/executor/state", monotonic_ns=time_ns, msg=state)
+
+
+def fallback_trace(component: str) -> tuple[SyntheticSource, int]:
+    """A fault, after which the core `p/Safe` goes on at the next instant; and the time of the fault."""
+    source = SyntheticSource([component])
+    deploy(source, component)
+    pending = run(source, component, 3)
+    fault_ns = pending - PERIOD_NS + MS
+    source.add(component, Kind.FAULT, fault_ns, a=pending - PERIOD_NS, name="act")
+    source.add(component, Kind.RECONFIGURATION, fault_ns + 2000, a=2, name="replace_core p/Safe")
+    source.add(component, Kind.START, fault_ns + 3000, a=pending)
+    run(source, component, 3, begin_ns=pending)
+    return source, fault_ns
+
+
+def test_a_fault_tells_its_reason_and_what_followed():
+    source, fault_ns = fallback_trace("c")
+    trace = trace_of(source)
+    states = [faulted_at(fault_ns - 1), faulted_at(fault_ns + MS, "other", "c")]
+    analysis = analyse(trace, states=states)
+    assert (
+        f"c had a fault in its state act, 41 ms after the begin: {FAULT}; fallback core Safe took over after "
+        "3 µs, and was released 9.01 ms after the fault."
+    ) in said(judge(analysis))
+    (swap,) = analysis.swaps
+    measured = swap.measured
+    assert (measured.after_fault, measured.what, measured.blackout_ns) == (True, "replace_core p/Safe", 3000)
+    assert (measured.missed_releases, measured.phase_nominal_ns, measured.complete) == (0, 0, True)
+
+
+def test_a_fault_that_is_followed_by_a_start_alone_is_no_takeover():
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 3)
+    source.add("c", Kind.FAULT, pending, a=pending, name="act")
+    source.add("c", Kind.START, pending + MS, a=pending + PERIOD_NS)
+    run(source, "c", 3, begin_ns=pending + PERIOD_NS)
+    found = analyse(trace_of(source))
+    assert found.swaps == []
+    assert [fault.takeover for fault in found.faults] == [None]
 
 
 def test_lost_records_make_every_count_a_lower_bound():
@@ -258,3 +312,29 @@ def test_a_policy_is_known_after_the_threads_have_ended():
     running = ComponentInfo("c", "p/S", "p/C", "p/F", PERIOD_NS, 0, "SCHED_OTHER", 0, (), ())
     other = replace(running, name="new", policy="")
     assert with_known_policies([replace(running, policy=""), other], [running]) == (running, other)
+
+
+@pytest.mark.parametrize("extra", [0, 3, 9])
+def test_there_are_at_most_eight_cards_and_none_of_trouble_is_left_out(extra: int):
+    source, _ = fallback_trace("c")
+    overrun(source, "c", EPOCH_NS + 40 * PERIOD_NS)
+    cards = key_figures(
+        analyse(trace_of(source)), [Card(f"{index}", "of the caller") for index in range(extra)]
+    )
+    assert len(cards) == 8
+    assert {"1 fault", "1 overrun"} <= {f"{card.value} {card.meaning}" for card in cards}
+    assert sum(card.meaning == "of the caller" for card in cards) == min(extra, 6)
+
+
+def test_what_took_no_time_has_no_panels():
+    source = SyntheticSource(["real", "simulated"])
+    deploy(source, "real")
+    run(source, "real", 3)
+    deploy(source, "simulated")
+    instant = EPOCH_NS
+    for _ in range(3):
+        instant = source.cycle("simulated", instant, states={"act": 0}, wait_ns=PERIOD_NS, wakeup_ns=0)
+    body = distributions_section(analyse(trace_of(source))).html
+    assert "<summary>real</summary>" in body
+    assert "<summary>simulated</summary>" not in body
+    assert "All times of simulated are 0, as in simulated time." in body
