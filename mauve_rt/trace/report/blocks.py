@@ -17,6 +17,7 @@ _BEFORE_A_UNIT = re.compile(
 _FILLERS = '<i aria-hidden="true"></i>' * 7
 """In the last row of cards: without height, so that its cards are as wide as those above."""
 _WORDY = 26  # characters from which a column of words may break
+_WORDS = ' class="words"'
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,21 @@ def details(summary: str, html: str, *, opened: bool = False) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, css: str = "") -> str:
-    """Return a table. Columns with numbers are set to the right; None is a dash."""
+    """Return a table. Columns with numbers are set to the right; None is a dash.
+
+    On a narrow screen a table with a column of words shows each row as a list, with the columns' names.
+    """
     body = [list(row) for row in rows]
     kinds = [_column_css([row[index] for row in body]) for index in range(len(columns))]
     head = "".join(f"<th{kinds[index]}>{_label(text)}</th>" for index, text in enumerate(columns))
+    attributes = kinds
+    if _WORDS in kinds:
+        css = f"{css} stacks".strip()
+        attributes = [
+            f'{kind} data-label="{attribute(text)}"' for kind, text in zip(kinds, columns, strict=True)
+        ]
     lines = "".join(
-        "<tr>" + "".join(_cell(value, kinds[index]) for index, value in enumerate(row)) + "</tr>"
+        "<tr>" + "".join(_cell(value, attributes[index]) for index, value in enumerate(row)) + "</tr>"
         for row in body
     )
     inside = f"<thead><tr>{head}</tr></thead><tbody>{lines}</tbody>"
@@ -122,7 +132,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, css: str 
 def _column_css(values: list[object]) -> str:
     if any(isinstance(one, int | float) or (isinstance(one, Cell) and one.number) for one in values):
         return ' class="number"'
-    return ' class="words"' if any(len(_text(one)) > _WORDY for one in values) else ""
+    return _WORDS if any(len(_text(one)) > _WORDY for one in values) else ""
 
 
 def _cell(value: object, css: str) -> str:

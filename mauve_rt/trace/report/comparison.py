@@ -97,6 +97,8 @@ def _before_and_after(analysis: Analysis, swap: Swap) -> str:
     rows, figures = [], []
     for what, before, after in _measures(analysis, swap):
         rows.append((what, *_three(before), *_three(after), _change(before, after)))
+        if not any(values.any() for values in (before, after)):
+            continue  # simulated time: nothing is measured
         drawing = histogram([("before", before), ("after", after)], described=f"{what} before and after")
         if drawing:
             figures.append(f"<figure><figcaption>{escape(what)}</figcaption>{drawing}</figure>")

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from headless_browser import Browser, started_browser
 from synthetic_traces import deploy, overrun, run, swap, trace_of
 
 from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import Card, write_report
 
@@ -123,3 +125,30 @@ def test_a_usual_page_shows_all_tiles_without_scrolling(browser: Browser, tmp_pa
     assert browser.evaluate("document.querySelector('.cards').getBoundingClientRect().bottom") <= FOLD[1]
     assert browser.evaluate("document.querySelector('h1').innerText").startswith("Yes: ")
     assert browser.complaints == []
+
+
+WORDS_CUT = """[...document.querySelectorAll("td.words")].filter(one => one.checkVisibility()).filter(
+  one => one.scrollWidth > one.clientWidth || one.getBoundingClientRect().right > innerWidth).length"""
+
+
+def test_a_reason_is_read_whole_on_a_phone(browser: Browser, tmp_path: Path):
+    source = SyntheticSource(["c"])
+    deploy(source, "c")
+    pending = run(source, "c", 20)
+    swap(source, "c", pending)
+    run(source, "c", 20, begin_ns=pending)
+    step = SimpleNamespace(component="c", blackout_ns=-1, step="replace_core p/B", to_core="", prepare_ns=0)
+    cause = "the operator saw that the arm does not follow, and chose the core that follows more slowly"
+    event = SimpleNamespace(success=True, requested_by="mauve", cause=cause, report=[step])
+    told = Message(topic="/executor/events", monotonic_ns=pending + 10**9, log_time_ns=0, msg=event)
+    path = tmp_path / "report.html"
+    write_report(path, trace_of(source), events=[told])
+    browser.resize(400, 800)
+    browser.open(path)
+    shown = browser.evaluate("document.querySelector('#reconfigurations table').innerText")
+    assert cause in shown
+    assert browser.evaluate(WORDS_CUT) == 0
+    label = "getComputedStyle(document.querySelector('td[data-label=why]'), '::before').content"
+    assert browser.evaluate(label) == '"why"'
+    browser.evaluate("document.querySelectorAll('table').forEach(one => one.classList.remove('stacks'))")
+    assert browser.evaluate(WORDS_CUT) > 0, "it was the list that makes it so"
