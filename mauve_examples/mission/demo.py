@@ -126,7 +126,7 @@ def _report(options: Any, world: Any, mission: Any, interrupts: Interrupts) -> i
         from mauve_examples.mission.results import write_results  # noqa: PLC0415
 
         summary = write_results(options.out, facts, area=world.area, supervised=supervised)
-    print(ending(options.out, mission.story.lines(by_time=True), summary), flush=True)
+    print(ending(options.out, summary), flush=True)
     if interrupts.asked():
         return INTERRUPTED
     return SUCCESS if summary["success"] else FAILURE

@@ -1,4 +1,4 @@
-"""The last words of a demo: what happened, what it cost, where to read more."""
+"""The last words of a demo: what came of it, what it cost, where to read more."""
 
 import shlex
 from collections.abc import Iterator
@@ -13,9 +13,9 @@ from mauve_examples.mission.supervised import compared_in_words
 from mauve_rt.trace import TraceError
 
 
-def ending(out: Path, events: list[str], summary: dict[str, Any]) -> str:
-    """The story of a mission as text. `events`: lines as they happened; `summary`: as summary.json."""
-    return "\n".join(_lines(out, events, summary))
+def ending(out: Path, summary: dict[str, Any]) -> str:
+    """What came of a mission, as text. `summary`: as summary.json."""
+    return "\n".join(_lines(out, summary))
 
 
 def summarise(out: Path, facts: MissionFacts, area: MissionArea) -> dict[str, Any]:
@@ -33,9 +33,7 @@ def summarise(out: Path, facts: MissionFacts, area: MissionArea) -> dict[str, An
     return summary
 
 
-def _lines(out: Path, events: list[str], summary: dict[str, Any]) -> Iterator[str]:
-    yield "\nWhat happened:"
-    yield from (f"  {event}" for event in events or ["nothing"])
+def _lines(out: Path, summary: dict[str, Any]) -> Iterator[str]:
     swaps = [(robot, swap) for robot, one in summary["robots"].items() for swap in one["reconfigurations"]]
     if swaps:
         yield "\nReconfigurations, as the trace measured them:"
@@ -85,14 +83,12 @@ def _swap(swap: dict[str, Any]) -> str:
     if swap.get("took_ms") is not None:
         bound = f" (at most {swap['bound_ms']:.1f} ms)" if swap["bound_ms"] is not None else ""
         words.append(f"at work {swap['took_ms']:.1f} ms after the cause{bound}")
-    if swap["prepare_us"] is not None:
+    if swap["prepare_us"]:
         words.append(f"prepared in {swap['prepare_us']:.0f} us")
-    if swap["blackout_us"] is not None:
+    if swap["blackout_us"]:
         words.append(f"blackout {swap['blackout_us']:.0f} us")
     if swap["missed_releases"] is not None:
         words.append(f"{swap['missed_releases']} releases missed")
-    if swap.get("decided_by"):
-        words.append(f"decided by {swap['decided_by']}")
     return ", ".join(words)
 
 

@@ -9,6 +9,7 @@ from mauve_examples.mission.coverage import CoverageTracker
 from mauve_examples.mission.demo_options import Options
 from mauve_examples.mission.demo_story import MissionStory
 from mauve_examples.mission.facts import ComponentFacts, MissionFacts, RealtimeFacts, SimulationFacts
+from mauve_examples.mission.plan import Plan
 from mauve_examples.mission.progress import Progress
 
 SHOW_PERIOD_S = 0.2
@@ -28,11 +29,10 @@ class Mission(ABC):
         self._started_ns = 0  # of the mission's clock; 0: not started
         self._ended_ns = 0
         self._next_show_s = 0.0
-        self._shown_events = 0
         self._components: dict[str, dict[str, ComponentFacts]] = {}
         self.trouble: list[str] = []
         self.coverage = CoverageTracker(world.area, options.names)
-        self.story = MissionStory(options.names, clock=self.time_s)
+        self.story = MissionStory(options.names, clock=self.time_s, age_s=self._age_s)
 
     @abstractmethod
     def run(self) -> None:
@@ -41,6 +41,14 @@ class Mission(ABC):
     @abstractmethod
     def _now_ns(self) -> int:
         """Ns of the clock that the traces are on."""
+
+    def _stamp_ns(self) -> int:
+        """Ns of the clock that stamps messages."""
+        return self._now_ns()
+
+    def _age_s(self, stamp: Any) -> float:
+        stamp_ns = int(stamp.sec) * 10**9 + int(stamp.nanosec)
+        return (self._stamp_ns() - stamp_ns) / 1e9
 
     def _simulation(self) -> SimulationFacts | None:
         return None
@@ -108,14 +116,17 @@ class Mission(ABC):
         return all(robot.done for robot in robots) and (swapped or not self._options.supervisor)
 
     def _show(self, *, now: bool = False) -> None:
-        if not now and self.time_s() < self._next_show_s and len(self.story.events) == self._shown_events:
+        """Show how it goes; `now`: for the last time."""
+        if not now and self.time_s() < self._next_show_s:
             return
         self._next_show_s = self.time_s() + SHOW_PERIOD_S
-        self._shown_events = len(self.story.events)
+        names = self._options.names
         self._progress.show(
             self.story.picture(
                 duration_s=self._options.duration_s,
                 explored=self.coverage.shares(),
                 together=self.coverage.union(),
+                plan=Plan(self._world.area.cells, {name: self.coverage.explored(name) for name in names}),
+                at_the_end=now,
             )
         )

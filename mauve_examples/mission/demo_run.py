@@ -50,6 +50,9 @@ class MissionRun(Mission):
     def _now_ns(self) -> int:
         return time.monotonic_ns()
 
+    def _stamp_ns(self) -> int:
+        return time.time_ns()
+
     def run(self) -> None:
         """Run the mission to its end, however it ends; no process is left.
 

@@ -1,15 +1,29 @@
 """What has happened in a mission so far: the lines people read, and the picture of now. For one thread."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
+from mauve_examples.mission.plan import Plan
 from mauve_examples.mission.progress import MissionPicture, RobotPicture
 from mauve_msgs.msg import ComponentInfo, StepReport
+from mauve_rt.supervision.remote_rules import LEFT_TO_EXECUTOR
 
 COMPONENT = "exploration"
 DONE_LASTS_S = 1.5  # before its first scan, or while a peer's map arrives, a robot may think so for a moment
 TOLD_DECISIONS = ("adopted", "condition_true", "failed", "suppressed")
+SETTLE_S = 1.0  # so much later nothing comes any more that happened before
+DRY_RUN = " (dry run)"
+
+
+class Happening(NamedTuple):
+    """What happened; of two at the same time the cause comes first."""
+
+    time_s: float
+    """Mission time."""
+    is_effect: bool
+    text: str
 
 
 @dataclass
@@ -38,23 +52,35 @@ class RobotStory:
 
 
 class MissionStory:
-    """Fed with messages as they arrive; `clock` gives the mission time, s, negative before the start."""
+    """Fed with messages as they arrive.
 
-    def __init__(self, robots: list[str], *, clock: Callable[[], float]) -> None:
+    What happened is told in the order in which it happened: a message may come half a second late, so each
+    line waits for SETTLE_S.
+    """
+
+    def __init__(
+        self, robots: list[str], *, clock: Callable[[], float], age_s: Callable[[Any], float] = lambda _: 0.0
+    ) -> None:
+        """`clock`: the mission time, s, negative before the start; `age_s`: of a message's stamp, s."""
         self.robots = {robot: RobotStory() for robot in robots}
         self.link_up = True
         self.link_changes: list[tuple[float, bool]] = []
-        self.events: list[tuple[float, str]] = []  # as they became known; mission time in s
+        self._waiting: list[Happening] = []
+        self._lines: list[str] = []
         self._clock = clock
+        self._age_s = age_s
 
-    def tell(self, text: str, *, at_s: float | None = None) -> None:
+    def tell(self, text: str, *, at_s: float | None = None, is_effect: bool = True) -> None:
         """Add to the story what happened at a mission time, now by default."""
-        self.events.append((self._clock() if at_s is None else at_s, text))
+        self._waiting.append(Happening(self._clock() if at_s is None else at_s, is_effect, text))
 
-    def lines(self, *, by_time: bool = False) -> list[str]:
-        """The story so far, with mission times, in the order in which it became known or by time."""
-        events = sorted(self.events) if by_time else self.events
-        return [f"{time_s:6.1f} s  {text}" for time_s, text in events]
+    def lines(self, *, to_the_end: bool = False) -> list[str]:
+        """The story so far, by mission time; `to_the_end`: with what has not settled."""
+        until_s = math.inf if to_the_end else self._clock() - SETTLE_S
+        due = sorted(one for one in self._waiting if one.time_s <= until_s)
+        self._waiting = [one for one in self._waiting if one.time_s > until_s]
+        self._lines += [f"{one.time_s:6.1f} s  {one.text}" for one in due]
+        return [*self._lines]
 
     def on_state(self, robot: str, state: Any) -> None:
         """mauve_msgs/msg/ArchitectureState."""
@@ -72,7 +98,10 @@ class MissionStory:
 
     def on_event(self, robot: str, event: Any) -> None:
         """mauve_msgs/msg/ReconfigurationEvent."""
-        who = f" (asked by {event.requested_by})" if event.requested_by else ""
+        if event.success and event.request.endswith(DRY_RUN):
+            return  # a rule asks beforehand whether its action would be taken
+        own = (f"/{robot}/executor", f"/{robot}/supervisor")
+        who = f" (asked by {event.requested_by})" if event.requested_by not in ("", *own) else ""
         if not event.success:
             self.tell(f"{robot}: refused: {event.request}: {event.message}{who}")
             return
@@ -96,9 +125,11 @@ class MissionStory:
 
     def on_decision(self, robot: str, decision: Any) -> None:
         """mauve_msgs/msg/SupervisorDecision; what the executor's events tell better is left out."""
-        if decision.decision in TOLD_DECISIONS:
-            message = f": {decision.message}" if decision.message else ""
-            self.tell(f"{robot}: {decision.rule}: {decision.reason}{message}")
+        if decision.decision not in TOLD_DECISIONS or decision.reason == LEFT_TO_EXECUTOR:
+            return
+        message = f": {decision.message}" if decision.message else ""
+        at_s = self._clock() - self._age_s(decision.stamp)
+        self.tell(f"{robot}: {decision.rule}: {decision.reason}{message}", at_s=at_s, is_effect=False)
 
     def on_done(self, robot: str, done: bool) -> None:  # noqa: FBT001 - the message's one field
         """The robot has nothing left that it can explore, or has again; believed when it stays so."""
@@ -131,8 +162,16 @@ class MissionStory:
                 gaps.append((time_s, None))
         return gaps
 
-    def picture(self, *, duration_s: float, explored: dict[str, float], together: float) -> MissionPicture:
-        """What to show now. `explored`: share per robot, 0 to 1."""
+    def picture(
+        self,
+        *,
+        duration_s: float,
+        explored: dict[str, float],
+        together: float,
+        plan: Plan | None = None,
+        at_the_end: bool = False,
+    ) -> MissionPicture:
+        """What to show now. `explored`: share per robot, 0 to 1; `at_the_end`: nothing more will happen."""
         robots = [
             RobotPicture(name=name, explored=explored[name], core=story.core, remark=_remark(story))
             for name, story in self.robots.items()
@@ -143,19 +182,19 @@ class MissionStory:
             link_up=self.link_up,
             robots=robots,
             together=together,
-            events=self.lines(),
+            events=self.lines(to_the_end=at_the_end),
+            plan=plan,
         )
 
 
 def describe(swap: Swap) -> str:
     """One swap in words: what, and what it cost."""
-    blackout = "blackout not measured"
-    if swap.blackout_ns != StepReport.NOT_MEASURED:
-        blackout = f"blackout {swap.blackout_ns / 1e3:.0f} us"
-    missed = f"{swap.missed_releases} releases missed" if swap.missed_releases else "no release missed"
-    if swap.missed_releases == StepReport.NOT_MEASURED:
-        missed = "releases missed not measured"
-    return f"{swap.component}: {swap.from_core} -> {swap.to_core}, {blackout}, {missed}"
+    words = [f"{swap.component}: {swap.from_core} -> {swap.to_core}"]
+    if swap.blackout_ns not in (StepReport.NOT_MEASURED, 0):  # simulated time measures nothing
+        words.append(f"blackout {swap.blackout_ns / 1e3:.0f} us")
+    if swap.missed_releases != StepReport.NOT_MEASURED:
+        words.append(f"{swap.missed_releases or 'no'} release{'s' * (swap.missed_releases > 1)} missed")
+    return ", ".join(words)
 
 
 def _remark(story: RobotStory) -> str:

@@ -11,7 +11,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-PLAIN_PERIOD_S = 2.0
+from mauve_examples.mission.plan import Plan, colour
+
+PLAIN_PERIOD_S = 5.0
 REFRESH_HZ = 5.0
 
 
@@ -35,6 +37,7 @@ class MissionPicture:
     robots: list[RobotPicture]
     together: float
     events: list[str] = field(default_factory=list)  # all so far, oldest first
+    plan: Plan | None = None
 
 
 class Progress(Protocol):
@@ -62,7 +65,7 @@ def open_progress(stream: TextIO | None = None) -> Progress:
 
 
 class PlainProgress:
-    """A line for every event as it happens, and one about everybody every two seconds."""
+    """A line for every event as it happens, and one about everybody every five seconds."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -92,7 +95,7 @@ class PlainProgress:
 
 
 class LiveProgress:
-    """A table that is redrawn in place; events scroll by above it."""
+    """A map of what each robot knows and a table, redrawn in place; events scroll by above it."""
 
     def __init__(self, stream: TextIO) -> None:
         self._console = Console(file=stream, highlight=False)
@@ -130,9 +133,11 @@ def _table(picture: MissionPicture) -> Group:
     link = Text("link up", "green") if picture.link_up else Text("link down", "bold red")
     head = Text.assemble(f"{picture.time_s:5.1f} s of at most {picture.duration_s:g} s   ", link)
     table = Table("robot", "explored", "", "exploration runs", "", box=None, pad_edge=False)
-    for robot in picture.robots:
+    for index, robot in enumerate(picture.robots):
         bar = ProgressBar(total=1.0, completed=robot.explored, width=30)
-        table.add_row(robot.name, bar, f"{robot.explored:.0%}", robot.core or "-", robot.remark)
+        table.add_row(
+            Text(robot.name, colour(index)), bar, f"{robot.explored:.0%}", robot.core or "-", robot.remark
+        )
     bar = ProgressBar(total=1.0, completed=picture.together, width=30)
     table.add_row("together", bar, f"{picture.together:.0%}", "", "")
-    return Group(Text(), head, table)
+    return Group(Text(), *([picture.plan.drawn()] if picture.plan is not None else []), head, table)

@@ -88,7 +88,8 @@ def _joined(evidence: RobotEvidence, one: Reconfiguration, request: RequestTold 
         from_core=(request.from_core or None) if request is not None else None,
         to_core=(request.to_core or None) if request is not None else None,
         cause=cause,
-        silence_ms=_ms(decision, "silence_s"),
+        # The silence of an undo is over: its last sample has just come.
+        silence_ms=None if getattr(decision, "decision", "") == "undo" else _ms(decision, "silence_s"),
         decided_by=request.requested_by if request is not None and decision is not None else "",
         took_ms=_ms(done, "took_s"),
         bound_ms=_ms(done, "bound_s"),

@@ -24,7 +24,7 @@ from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import ViewSignals
 
 ACTS = ("do", "undo")
-_LEFT = "the executor runs it itself: left to it while it does"
+LEFT_TO_EXECUTOR = "the executor runs it itself: left to it while it does"
 
 
 @dataclass
@@ -164,7 +164,7 @@ class RemoteRules:
                 self._engine.forget(each.number)
                 each.forget()
                 each.left = True
-                self._say(each, "suppressed", _LEFT, now_ns)
+                self._say(each, "suppressed", LEFT_TO_EXECUTOR, now_ns)
             return
         each.left = False
         if each.unobservable:
