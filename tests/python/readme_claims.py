@@ -24,7 +24,7 @@ PAGES_OF_CLAIMS = (
     ),
     *(
         f"docs/howto/{name}.md"
-        for name in ("install", "operate", "realtime_rights", "record_and_report", "write_a_core")
+        for name in ("install", "operate", "record_and_report", "write_a_core")
     ),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
@@ -1125,12 +1125,12 @@ PROMISE_NOTHING = (
     "The **core** is data and algorithms",
     "The **fsm** says when",
     "An fsm may also wait for an *event*",
+    "[Time and grids](time_and_grids.md) explains",
     "**Resources** hold data and offer services that ports connect to",
     "[0]}}` says how urgently it runs",
     "T is an instant of the components' clocks",
     "For the common ROS types architecture files name them directly",
     "Architecture files are YAML",
-    "To grant the rights to a group `realtime`",
     "`scripts/bench --quick` on 2026-11-22",
     "Intel Xeon, 2 CPUs, a **virtual machine**",
     "Your machine will show others",
