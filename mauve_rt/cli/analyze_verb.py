@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
+from mauve_rt.counts import counted
 
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Subject
@@ -233,7 +234,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
         unfinished.replace(whole)
     finally:
         unfinished.unlink(missing_ok=True)
-    print(f"{path}: {count} times written as wcet_ns; nothing enforces them", file=sys.stderr)
+    print(f"{path}: {counted(count, 'time')} written as wcet_ns; nothing enforces them", file=sys.stderr)
 
 
 def _as_json(subject: "Subject") -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mauve_rt.cli import rules_live, rules_of_bags
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
+from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError, Problem
 
 if TYPE_CHECKING:  # loaded by those who use it only
@@ -65,8 +66,9 @@ def _check(args: argparse.Namespace) -> int:
         _complain(file, problem)
     for warning in warnings:
         _complain(file, warning, "warning: ")
-    counted = f"{len(file.rules.rules)} rules{_held_against(model)}"
-    print(f"{file.path}: {counted}: {f'{len(found)} findings' if found else 'no error found'}")
+    rules = counted(len(file.rules.rules), "rule")
+    findings = counted(len(found), "finding") if found else "no error found"
+    print(f"{file.path}: {rules}{_held_against(model)}: {findings}")
     return REFUSED if found else OK
 
 

@@ -22,10 +22,7 @@ PAGES_OF_CLAIMS = (
             "traces",
         )
     ),
-    *(
-        f"docs/howto/{name}.md"
-        for name in ("install", "operate", "record_and_report", "write_a_core")
-    ),
+    *(f"docs/howto/{name}.md" for name in ("install", "operate", "record_and_report", "write_a_core")),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
 
