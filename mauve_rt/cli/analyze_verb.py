@@ -26,43 +26,47 @@ _LEAST_MARGIN = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to analyze, and where missing times come from."""
     parser.add_argument(
-        "target", metavar="FILE|NODE|BAG", help="an architecture file, an executor's node, or a bag of one"
+        "target", metavar="FILE|NODE|BAG", help="an architecture file, the node of an executor, or a bag"
     )
     parser.add_argument(
         "--budget-from",
         type=Path,
         metavar="BAG",
-        help="take times that nobody declares from this bag, of states and of locks: the longest measured",
+        help="for times that are not declared, take the longest that this bag measured",
     )
     parser.add_argument(
-        "--margin", type=float, default=1.2, metavar="X", help="times this (default 1.2), with --budget-from"
+        "--margin",
+        type=float,
+        default=1.2,
+        metavar="X",
+        help="factor for the times of --budget-from (default 1.2)",
     )
     parser.add_argument(
         "--write",
         action="store_true",
-        help="put the measured times into FILE as wcet_ns, which nothing enforces",
+        help="write the measured times into FILE as wcet_ns (nothing enforces wcet_ns)",
     )
     parser.add_argument(
         "--suppose",
         action="append",
         default=[],
         metavar="COMPONENT.STATE=TIME",
-        help="as if a state took this long, e.g. guidance.Planning=20ms; may be repeated",
+        help="assume this time of a state, e.g. guidance.Planning=20ms; may be repeated",
     )
     parser.add_argument(
         "--wakeup-us",
         type=float,
         default=0.0,
         metavar="X",
-        help="how long after its instant a thread begins at the latest, on that machine (default 0)",
+        help="longest time from an instant to the start of its thread, in us (default 0)",
     )
     parser.add_argument(
         "--witness",
         type=Path,
         metavar="DIR",
-        help="of what is not schedulable, write the run that misses a deadline: a bag for `mauve report`",
+        help="if a deadline is missed, write the run that misses it as a bag for mauve report",
     )
-    parser.add_argument("--json", action="store_true", help="print it as JSON")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def main(args: argparse.Namespace) -> int:

@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="an architecture file, rules of a supervisor, steps of a transaction; beside an architecture "
-        "file the others are tried on it",
+        help="files of an architecture, rules or steps; given together with an architecture file, rules and "
+        "steps are tried on it",
     )
 
 

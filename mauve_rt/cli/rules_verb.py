@@ -37,9 +37,12 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
+    parser.add_argument("file", type=Path, metavar="FILE", help="rules file")
     parser.add_argument(
-        "--architecture", type=Path, metavar="FILE", help="what they are about: its names are known then"
+        "--architecture",
+        type=Path,
+        metavar="FILE",
+        help="architecture file: check the rules' names and steps against it",
     )
 
 
@@ -104,8 +107,10 @@ def _print_parts(bound: "Bound") -> None:
 
 
 def _add_try(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
-    parser.add_argument("script", type=Path, metavar="SCRIPT", help="what happens when: see docs/rules.md")
+    parser.add_argument("file", type=Path, metavar="FILE", help="rules file")
+    parser.add_argument(
+        "script", type=Path, metavar="SCRIPT", help="script of inputs over time (docs/rules.md shows one)"
+    )
 
 
 def _try(args: argparse.Namespace) -> int:
@@ -122,19 +127,24 @@ def _try(args: argparse.Namespace) -> int:
 
 
 SUB_VERBS = (
-    Verb("check", "find what is wrong with rules, and how long each may take", _add_file, _check),
-    Verb("try", "play a script to rules in virtual time and tell what they decide", _add_try, _try),
-    Verb("list", "show how the rules of an executor fare", rules_live.add_list, rules_live.list_rules),
-    Verb("load", "let an executor run other rules, all or none", rules_live.add_load, rules_live.load_rules),
+    Verb("check", "find errors in rules, and compute how long each rule takes at most", _add_file, _check),
+    Verb(
+        "try",
+        "run rules against a script of inputs in virtual time, and show their decisions",
+        _add_try,
+        _try,
+    ),
+    Verb("list", "show the state of each rule of an executor", rules_live.add_list, rules_live.list_rules),
+    Verb("load", "replace the rules of an executor, all or none", rules_live.add_load, rules_live.load_rules),
     Verb(
         "replay",
-        "compare what rules would have done on the day of a bag with what was done",
+        "run rules against a bag, and compare their actions with the recorded ones",
         rules_of_bags.add_replay,
         rules_of_bags.replay,
     ),
     Verb(
         "explain",
-        "tell what rules decided, and why, according to a bag",
+        "show the decisions of rules in a bag, and the reason of each",
         rules_of_bags.add_explain,
         rules_of_bags.explain,
     ),
