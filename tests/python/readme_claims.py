@@ -337,7 +337,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_required_ports.py::test_a_required_port_stays_connected",
         "python/model/test_misfits.py::test_an_unconnected_call_port_is_refused",
     ),
-    "which is held against that one field by field": (
+    "Its fields are compared with the fields of the message": (
+        "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
+        "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
+    ),
+    "A plain struct declares once which message or service it represents": (
         "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
         "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
     ),
@@ -547,6 +551,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule1Loops.ALoopWithoutAWaitIsRefusedByName",
     ),
     "a write to the resource that one of its ports reads": ("Rule12Events.EveryKindOfResourceRaisesThem",),
+    "| `event` | a count of events, for `wait_event` |": ("Rule12Events.EveryKindOfResourceRaisesThem",),
     "`wait_event(port, timeout, min_interarrival)`": ("Rule12Events.AreKeptApartByTheMinimalInterarrival",),
     "The clock is then set to the time of the event": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
     "is *sporadic*: it has no period": ("Rule12Events.AreNoPeriodNorPhase",),
@@ -570,7 +575,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "of any installed message type": (
         "ros/bridge/test_topics.py::test_a_type_nobody_registered_is_received_and_written",
     ),
-    "the messages travel in C++, the interpreter has no part in them": (
+    "The messages travel in C++, the interpreter has no part in them": (
         "bench: CPU of an executor that sends ",
         "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
     ),
@@ -582,14 +587,14 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
         "python/model/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
     ),
-    "a file sets and checks it as a `ring_buffer`'s `capacity`": (
+    "a file sets and checks them as a `ring_buffer`'s `capacity`": (
         "python/model/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
         "python/model/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
     ),
     "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
         "ros/bridge/test_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
     ),
-    "counts what passed, what was refused": (
+    "counts received and sent messages, refused messages": (
         "ros/bridge/test_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
         "ros/bridge/test_topics.py::test_missed_deadlines_are_counted",
     ),
@@ -597,21 +602,21 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/bridge/test_topics.py::test_another_type_that_comes_to_the_topic_is_told",
         "ros/bridge/test_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
     ),
-    "A thread of its own sends them: real-time, at the lowest priority": (
+    "One thread sends all messages: real-time, at the lowest priority": (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
     ),
-    "Where a message must not wait for other components' work": (
+    "If a message must not wait for other components' work": (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
         "bench: the same, sent on the component's CPU, p",
     ),
-    "the calls of a `client` are answered by one": (
+    "a resource `client` calls a service": (
         "ros/bridge/test_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
         "ros/bridge/test_calls.py::test_a_resources_call_is_a_ros_service",
     ),
     "never blocks longer than `timeout_ms`": ("ClientCall.TimesOutAndIsNotAnsweredByALateReply",),
-    "a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
-    "bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
-    "What a transaction adds may be bound as well": (
+    "and a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
+    "Bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
+    "A transaction may add bound resources as well": (
         "ros/bridge/test_calls.py::test_topics_and_services_come_and_go_while_all_runs",
     ),
     # ---- concepts: deployment and change
@@ -639,7 +644,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Prefaulted.TheWholeDeclaredStackIsInMemory",
     ),
     "The **deployer** turns each component into a thread": ("Prefaulted.TheWholeDeclaredStackIsInMemory",),
-    "Memory that parts allocated in their constructors and in `configure` is put into memory before they run": (
+    "Memory that parts allocated in their constructors and in `configure`": (
         "Prefaulted.WhatANewCoreAllocatedIsInMemory",
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
     ),
@@ -1206,7 +1211,10 @@ PROMISE_NOTHING = (
     "An fsm may also wait for an *event*",
     "[Time and grids](time_and_grids.md) explains",
     "**Resources** hold data and offer services that ports connect to",
-    "[0]}}` says how urgently it runs",
+    "`executor: {sender: {priority: 70, cpus:",
+    "[0]}}`.",
+    "The kinds are:",
+    "| kind | content |",
     "T is an instant of the components' clocks",
     "Architecture files name the elements for common ROS types directly",
     "**Architecture files** are YAML",

@@ -7,8 +7,8 @@ ConditionKind late_kind() {
   return {
       .name = "late",
       .summary =
-          "a component has woken up, or ended its response, later than a time after its instant, so often "
-          "within a time",
+          "a component woke up, or ended its response, later than `longer_than_s` after its instant, "
+          "`at_least` times within `within_s`",
       .parameters = often_parameters(
           {{.name = "what", .type = "wake_up|response", .initial = std::string("response")},
            {.name = "longer_than_s", .type = "float", .unit = "s", .minimum = 1e-9, .required = true}}),

@@ -5,7 +5,7 @@ namespace mauve::rules {
 
 ConditionKind over_declared_kind() {
   return {.name = "over_declared",
-          .summary = "executions of a component have lasted longer than declared so often within a time",
+          .summary = "executions of a component lasted longer than declared, `at_least` times within `within_s`",
           .parameters = often_parameters(),
           .hears =
               [](const Parameters& told) {

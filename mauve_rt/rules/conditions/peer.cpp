@@ -19,7 +19,7 @@ ConditionKind peer_kind() {
   return {
       .name = "peer",
       .summary =
-          "another executor is gone, was started anew, has a FAULTED component, is there, or was never heard",
+          "another executor is gone, was started again, has a FAULTED component, is there, or was never received",
       .parameters = {{.name = "executor", .type = "executor", .required = true},
                      {.name = "is",
                       .type = "gone|another_instance|faulted|there|unheard",
