@@ -20,7 +20,7 @@ from typing import Any, Self
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
 from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp, module_files
-from mauve_rt.model.words import did_you_mean
+from mauve_rt.model.words import did_you_mean, nearest
 from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "mauve_rt_plugins"
@@ -181,7 +181,7 @@ class PluginLoader:
         if name in self.registry.names(kind):
             return
         if plugin is None:
-            remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
+            remedy = f"{self._remedy_for(kind, name)} (`mauve plugins` lists what is installed)"
             raise PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
         if plugin.is_python:
             self._add_python_core(plugin)
@@ -195,6 +195,16 @@ class PluginLoader:
         """As require(), but leaves a type (or call_type) that nothing lists to the registry's own words."""
         if self.index.find(kind, name) is not None:
             self.require(kind, name)
+
+    def _remedy_for(self, kind: str, name: str) -> str:
+        """The nearest name, else the names of its package, else where packages are looked for."""
+        names = self.names(kind)
+        package = name.partition("/")[0]
+        its_own = [each for each in names if each.partition("/")[0] == package]
+        if its_own or nearest(name, names):
+            return did_you_mean(name, names if nearest(name, names) else its_own)
+        found = f"no package '{package}' with a {kind} is found"
+        return f"{found}: source its install/setup.bash, or add its prefix to AMENT_PREFIX_PATH"
 
     def _load_library(self, plugin: Plugin) -> None:
         if not plugin.library.is_file():

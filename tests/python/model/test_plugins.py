@@ -89,6 +89,10 @@ def test_libraries_are_loaded_when_asked_for(plugin_prefix: Path) -> None:
     ("name", "message"),
     [
         ("executor_tests/Countr", "is not installed; did you mean executor_tests/Counter?"),
+        (
+            "nowhere/Core",
+            "no package 'nowhere' with a core is found: source its install/setup.bash, or add its prefix",
+        ),
         ("executor_tests/Missing", "has no core 'executor_tests/Missing'"),
         ("executor_tests/PyMissing", "cannot load executor_tests_cores:Nobody: AttributeError"),
     ],
