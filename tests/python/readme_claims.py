@@ -993,6 +993,26 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "A package of your own (`tests/downstream/` is a complete one)": (
         "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
     ),
+    # ---- parts and values
+    "A bag has the values of each resource that is bound to a topic": (
+        "python/project/test_readme_examples.py::test_the_python_example_plots_a_value",
+        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    ),
+    "| `bool configure_hook()` |": (
+        "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
+        "Rule9Replace.RefusalsLeaveTheOldCoreRunning",
+    ),
+    "| `void cleanup_hook()` |": (
+        "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
+    ),
+    "| `bool adopt(const CoreBase& old)` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "| `void take(CoreBase& old) noexcept` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "An exception of `adopt` carries its reason to the requester": (
+        "HostConformance.ARefusalNamesItsComponentOnceAndItsReason",
+    ),
+    "A core that replaces another one derives from the class for which the fsm was written": (
+        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
+    ),
     # ---- real time
     "Without the rights to it everything runs all the same": (
         "ros/executor/test_process.py::test_without_real_time_rights_it_runs_and_says_so",
@@ -1204,6 +1224,14 @@ PROMISE_NOTHING = (
     "describes conditions, priorities and tools",
     "| command | use |",
     "`mauve_examples/architecture/robot.yaml` is the mission's",
+    "Bind a resource to see its values",
+    "The values of other resources are not recorded",
+    "`DIR_csv/topic.beat.csv`",
+    "While the robot runs, plot the topic with any ROS tool",
+    "A C++ core may override these functions",
+    "| function | runs | purpose |",
+    '`throw std::runtime_error("the map is empty")`',
+    "Functions that the new core changes have to be `virtual`",
     "A **component** is three things",
     "| **shell** |",
     "| **core** |",

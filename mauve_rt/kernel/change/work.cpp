@@ -324,7 +324,7 @@ void TransactionCommit::Work::throw_not_made() {
   } catch (...) {
     throw_refused(caught_text());
   }
-  throw_refused("it refused the old core's state");
+  throw_refused("the adopt of the new core returned false");
 }
 
 void TransactionCommit::Work::throw_refused(const std::string& what) const {
@@ -343,7 +343,7 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
     const int step = draft.core_step != 0 ? draft.core_step : draft.first_step;
     throw Error(ErrorCode::adopt_refused, "adopt refused: " + what,
                 {.component = draft.name(),
-                 .remedy = "nothing was changed; all goes on as before",
+                 .remedy = "nothing was changed; an adopt that throws an exception gives its reason here",
                  .step = step,
                  .step_name = text_of(step)});
   }
