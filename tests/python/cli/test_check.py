@@ -152,7 +152,7 @@ def test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning(check: C
     assert (status, len(out)) == (0, 1)
     (warning,) = errors
     assert warning.startswith(
-        "robot:8:103: warning: topic 'set' of resource 'set' will not hear, by its deadline_ms"
+        "robot:8:103: warning: topic 'set' of resource 'set' will not receive, by its deadline_ms"
     )
     assert "leave it out" in warning
 
