@@ -70,8 +70,12 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
     architecture.cleanup()
     for warning in file_warnings(model):
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
-    parts = {"component": model.components, "resource": model.resources, "connection": model.connections}
-    found = ", ".join(counted(len(parts[what]), what) for what in parts)
+    counts = {
+        "component": len(model.components),
+        "resource": len(model.resources),
+        "connection": len(model.connections),
+    }
+    found = ", ".join(counted(count, what) for what, count in counts.items())
     print(f"{path}: {found}: no error found")
     return model
 
