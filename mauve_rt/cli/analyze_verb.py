@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
+from mauve_rt.counts import counted
 
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Subject
@@ -25,43 +26,47 @@ _LEAST_MARGIN = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to analyze, and where missing times come from."""
     parser.add_argument(
-        "target", metavar="FILE|NODE|BAG", help="an architecture file, an executor's node, or a bag of one"
+        "target", metavar="FILE|NODE|BAG", help="an architecture file, the node of an executor, or a bag"
     )
     parser.add_argument(
         "--budget-from",
         type=Path,
         metavar="BAG",
-        help="take times that nobody declares from this bag, of states and of locks: the longest measured",
+        help="for times that are not declared, take the longest that this bag measured",
     )
     parser.add_argument(
-        "--margin", type=float, default=1.2, metavar="X", help="times this (default 1.2), with --budget-from"
+        "--margin",
+        type=float,
+        default=1.2,
+        metavar="X",
+        help="factor for the times of --budget-from (default 1.2)",
     )
     parser.add_argument(
         "--write",
         action="store_true",
-        help="put the measured times into FILE as wcet_ns, which nothing enforces",
+        help="write the measured times into FILE as wcet_ns (nothing enforces wcet_ns)",
     )
     parser.add_argument(
         "--suppose",
         action="append",
         default=[],
         metavar="COMPONENT.STATE=TIME",
-        help="as if a state took this long, e.g. guidance.Planning=20ms; may be repeated",
+        help="assume this time of a state, e.g. guidance.Planning=20ms; may be repeated",
     )
     parser.add_argument(
         "--wakeup-us",
         type=float,
         default=0.0,
         metavar="X",
-        help="how long after its instant a thread begins at the latest, on that machine (default 0)",
+        help="longest time from an instant to the start of its thread, in us (default 0)",
     )
     parser.add_argument(
         "--witness",
         type=Path,
         metavar="DIR",
-        help="of what is not schedulable, write the run that misses a deadline: a bag for `mauve report`",
+        help="if a deadline is missed, write the run that misses it as a bag for mauve report",
     )
-    parser.add_argument("--json", action="store_true", help="print it as JSON")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -233,7 +238,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
         unfinished.replace(whole)
     finally:
         unfinished.unlink(missing_ok=True)
-    print(f"{path}: {count} times written as wcet_ns; nothing enforces them", file=sys.stderr)
+    print(f"{path}: {counted(count, 'time')} written as wcet_ns; nothing enforces them", file=sys.stderr)
 
 
 def _as_json(subject: "Subject") -> dict[str, Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mauve_rt.cli.verb import BAD_USAGE, OK
+from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
@@ -22,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="an architecture file, rules of a supervisor, steps of a transaction; beside an architecture "
-        "file the others are tried on it",
+        help="files of an architecture, rules or steps; given together with an architecture file, rules and "
+        "steps are tried on it",
     )
 
 
@@ -69,8 +70,13 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
     architecture.cleanup()
     for warning in file_warnings(model):
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
-    counts = (len(model.components), len(model.resources), len(model.connections))
-    print(f"{path}: {counts[0]} components, {counts[1]} resources, {counts[2]} connections: no error found")
+    counts = {
+        "component": len(model.components),
+        "resource": len(model.resources),
+        "connection": len(model.connections),
+    }
+    found = ", ".join(counted(count, what) for what, count in counts.items())
+    print(f"{path}: {found}: no error found")
     return model
 
 
@@ -81,7 +87,7 @@ def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
     change = load_change(path)
     if model is not None:
         try_change(path, change, model)
-    print(f"{path}: {len(change.steps)} steps{_tried_on(model)}: no error found")
+    print(f"{path}: {counted(len(change.steps), 'step')}{_tried_on(model)}: no error found")
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
@@ -95,7 +101,7 @@ def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
         found += rehearsal_problems(file, model)[0]
     if found:
         raise ArchitectureFileError(path, found)
-    print(f"{path}: {len(file.rules.rules)} rules{_tried_on(model)}: no error found")
+    print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")
 
 
 def _tried_on(model: "ArchitectureModel | None") -> str:

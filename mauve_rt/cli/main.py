@@ -50,7 +50,7 @@ class _Version(argparse.Action):
 
 def build_parser() -> argparse.ArgumentParser:
     """The command's arguments."""
-    description = "Look at MAUVE executors and reconfigure them while they run."
+    description = "Show, check and change MAUVE RT executors while they run."
     parser = argparse.ArgumentParser(prog="mauve", description=description)
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)

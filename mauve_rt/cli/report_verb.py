@@ -11,15 +11,18 @@ from mauve_rt.cli.verb import BAD_USAGE, OK
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "bag", nargs="+", type=Path, help="bags of one run: rosbag2 folders, folders of such, or MCAP files"
+        "bag",
+        nargs="+",
+        type=Path,
+        help="bags of one run: rosbag2 folders, folders with several bags, or MCAP files",
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE.html",
-        help="the page (default: report.html inside the first folder named, or beside its file)",
+        help="file of the page (default: report.html in the first folder, or next to the first file)",
     )
-    parser.add_argument("--title", default="", help="of the page (default: the bags' names)")
+    parser.add_argument("--title", default="", help="title of the page (default: names of the bags)")
 
 
 def main(args: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ def add_load(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default="",
         metavar="FILE",
-        help="the rules, as the executor sees the file (default: the one that it runs, read again)",
+        help="rules file, on the executor's computer (default: read the present file again)",
     )
 
 

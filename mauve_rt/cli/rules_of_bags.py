@@ -17,7 +17,10 @@ def add_explain(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `explain`."""
     _add_bag(parser)
     parser.add_argument(
-        "--at", type=float, metavar="T", help="how each rule stood then, s from the bag's begin"
+        "--at",
+        type=float,
+        metavar="T",
+        help="show the state of each rule T seconds after the start of the bag",
     )
 
 
@@ -50,7 +53,7 @@ def explain(args: argparse.Namespace) -> int:
 
 def add_replay(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `replay`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
+    parser.add_argument("file", type=Path, metavar="FILE", help="rules file")
     _add_bag(parser)
 
 

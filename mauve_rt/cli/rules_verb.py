@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mauve_rt.cli import rules_live, rules_of_bags
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
+from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError, Problem
 
 if TYPE_CHECKING:  # loaded by those who use it only
@@ -36,9 +37,12 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
+    parser.add_argument("file", type=Path, metavar="FILE", help="rules file")
     parser.add_argument(
-        "--architecture", type=Path, metavar="FILE", help="what they are about: its names are known then"
+        "--architecture",
+        type=Path,
+        metavar="FILE",
+        help="architecture file: check the rules' names and steps against it",
     )
 
 
@@ -65,8 +69,9 @@ def _check(args: argparse.Namespace) -> int:
         _complain(file, problem)
     for warning in warnings:
         _complain(file, warning, "warning: ")
-    counted = f"{len(file.rules.rules)} rules{_held_against(model)}"
-    print(f"{file.path}: {counted}: {f'{len(found)} findings' if found else 'no error found'}")
+    rules = counted(len(file.rules.rules), "rule")
+    findings = counted(len(found), "finding") if found else "no error found"
+    print(f"{file.path}: {rules}{_held_against(model)}: {findings}")
     return REFUSED if found else OK
 
 
@@ -102,8 +107,10 @@ def _print_parts(bound: "Bound") -> None:
 
 
 def _add_try(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="the rules")
-    parser.add_argument("script", type=Path, metavar="SCRIPT", help="what happens when: see docs/rules.md")
+    parser.add_argument("file", type=Path, metavar="FILE", help="rules file")
+    parser.add_argument(
+        "script", type=Path, metavar="SCRIPT", help="script of inputs over time (docs/rules.md shows one)"
+    )
 
 
 def _try(args: argparse.Namespace) -> int:
@@ -120,19 +127,24 @@ def _try(args: argparse.Namespace) -> int:
 
 
 SUB_VERBS = (
-    Verb("check", "find what is wrong with rules, and how long each may take", _add_file, _check),
-    Verb("try", "play a script to rules in virtual time and tell what they decide", _add_try, _try),
-    Verb("list", "show how the rules of an executor fare", rules_live.add_list, rules_live.list_rules),
-    Verb("load", "let an executor run other rules, all or none", rules_live.add_load, rules_live.load_rules),
+    Verb("check", "find errors in rules, and compute how long each rule takes at most", _add_file, _check),
+    Verb(
+        "try",
+        "run rules against a script of inputs in virtual time, and show their decisions",
+        _add_try,
+        _try,
+    ),
+    Verb("list", "show the state of each rule of an executor", rules_live.add_list, rules_live.list_rules),
+    Verb("load", "replace the rules of an executor, all or none", rules_live.add_load, rules_live.load_rules),
     Verb(
         "replay",
-        "compare what rules would have done on the day of a bag with what was done",
+        "run rules against a bag, and compare their actions with the recorded ones",
         rules_of_bags.add_replay,
         rules_of_bags.replay,
     ),
     Verb(
         "explain",
-        "tell what rules decided, and why, according to a bag",
+        "show the decisions of rules in a bag, and the reason of each",
         rules_of_bags.add_explain,
         rules_of_bags.explain,
     ),

@@ -32,18 +32,25 @@ def main(args: argparse.Namespace) -> int:
 
 def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "bags", nargs="+", type=Path, metavar="BAG", help="folder of a bag or of several; several are merged"
+        "bags",
+        nargs="+",
+        type=Path,
+        metavar="BAG",
+        help="folder of one bag or of several; several bags are merged",
     )
     parser.add_argument(
         "--format",
         choices=("perfetto", "csv"),
         default="perfetto",
-        help="for ui.perfetto.dev (default), or CSV, with a file for each topic, too",
+        help="perfetto: for ui.perfetto.dev (default); csv: tables, and a file for each topic",
     )
     parser.add_argument(
-        "--out", type=Path, metavar="PATH", help="default: BAG.pftrace, or folder BAG_csv, here"
+        "--out",
+        type=Path,
+        metavar="PATH",
+        help="output (default: BAG.pftrace, or the folder BAG_csv, in the current folder)",
     )
-    parser.add_argument("--force", action="store_true", help="replace what is there")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 
 
 def _export(args: argparse.Namespace) -> int:
@@ -163,9 +170,14 @@ def _stats(args: argparse.Namespace) -> int:
 
 
 SUB_VERBS = (
-    Verb("info", "show what a bag holds", _add_bag_and_json, _info),
-    Verb("check", "see whether a bag is whole, nothing is missing and no change was split", _add_bag, _check),
-    Verb("repair", "finish a bag that a kill or a full disk left unfinished", _add_bag, _repair),
-    Verb("stats", "show statistics of components, states, services", _add_bag_and_json, _stats),
-    Verb("export", "write a trace as a file for ui.perfetto.dev, or as CSV files", _add_export, _export),
+    Verb("info", "show the contents of a bag", _add_bag_and_json, _info),
+    Verb(
+        "check",
+        "check that a bag is complete, lost no record, and has no change with mixed releases",
+        _add_bag,
+        _check,
+    ),
+    Verb("repair", "complete a bag that a kill or a full disk left incomplete", _add_bag, _repair),
+    Verb("stats", "show times and counts of components, states and services", _add_bag_and_json, _stats),
+    Verb("export", "convert a trace for ui.perfetto.dev, or to CSV files", _add_export, _export),
 )

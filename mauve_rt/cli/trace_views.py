@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mauve_rt.cli.tables import number_table
+from mauve_rt.counts import counted
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.statistics import ComponentStatistics, Distribution
 from mauve_rt.trace.reading.trace import Trace
@@ -47,9 +48,9 @@ def info_view(values: Mapping[str, Any]) -> Group:
     """The same for people."""
     size = sum(file["bytes"] for file in values["files"])
     head = (
-        f"{values['records']:,} records of {len(values['components'])} components in "
+        f"{counted(values['records'], 'record')} of {counted(len(values['components']), 'component')} in "
         f"{values['duration_s']:.3f} s, {values['lost']:,} lost; recorded {values['recorded']}; "
-        f"{len(values['files'])} files, {size / 1e6:.1f} MB"
+        f"{counted(len(values['files']), 'file')}, {size / 1e6:.1f} MB"
     )
     damages = [f"{file['path']}: {file['damage']}" for file in values["files"] if file["damage"]]
     components = number_table(["component"], [], ["records", "lost"])

@@ -24,12 +24,18 @@ def _add_request(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_record(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--cause", default="", help="why, for the record")
+    parser.add_argument("--cause", default="", help="reason of the request, for the log and the bag")
     parser.add_argument(
-        "--request-id", default="", help="a repeated id returns the outcome of the first request"
+        "--request-id",
+        default="",
+        help="id of the request: a second request with it returns the first outcome",
     )
     parser.add_argument(
-        "--expected-revision", type=int, default=0, metavar="N", help="refuse at any other revision"
+        "--expected-revision",
+        type=int,
+        default=0,
+        metavar="N",
+        help="refuse unless the architecture has revision N (see mauve list)",
     )
 
 
@@ -40,7 +46,11 @@ def _add_timed_request(parser: argparse.ArgumentParser) -> None:
 
 def _add_timeout(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--timeout", type=float, default=0.0, metavar="S", help="seconds to wait for it (default 1)"
+        "--timeout",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="seconds until the request is refused (default 1)",
     )
 
 
@@ -48,7 +58,7 @@ def _add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
         action="store_true",
-        help="give up a component to be stopped, removed or changed whose state does not end in time",
+        help="give up a component whose state does not end in time: it becomes FAULTED",
     )
 
 
@@ -245,31 +255,38 @@ def _plugins(args: argparse.Namespace) -> int:
 
 def _add_recording(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(title="actions", metavar="start|stop", required=True)
-    start = actions.add_parser("start", help="record into a new bag")
-    stop = actions.add_parser("stop", help="end the recording: the bag is complete then")
+    start = actions.add_parser("start", help="start a recording into a new bag")
+    stop = actions.add_parser("stop", help="end the recording and complete the bag")
     start.set_defaults(starts=True)
     stop.set_defaults(starts=False)
     for action in (start, stop):
         _add_executor(action)
     start.add_argument(
-        "bag", nargs="?", default="", help="folder below the executor's parameter bags (default: by the time)"
+        "bag",
+        nargs="?",
+        default="",
+        help="folder of the bag, below the executor's parameter `bags` (default: named by the time)",
     )
     start.add_argument(
         "--topic",
         action="append",
         default=[],
         metavar="NAME[:TYPE[:QOS]]",
-        help="record this topic too; may be given again",
+        help="record this topic too; may be repeated",
     )
     start.add_argument(
-        "--split-s", type=float, default=0.0, metavar="S", help="a new file after so long (default 60)"
+        "--split-s",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="seconds until the bag goes on in a new file (default 60)",
     )
     start.add_argument(
         "--split-mb",
         type=float,
         default=0.0,
         metavar="MB",
-        help="or when one is so large (default: any size)",
+        help="size at which the bag goes on in a new file (default: no limit)",
     )
     for action in (start, stop):
         _add_record(action)
@@ -300,15 +317,18 @@ def _absolute(name: str) -> str:
 
 
 VERBS = (
-    Verb("list", "show an executor's components", _add_executor, _list),
+    Verb("list", "show the components of an executor", _add_executor, _list),
     Verb("stop", "stop a component", _add_stop, _stop),
     Verb("start", "start a stopped component", _add_request, _start),
     Verb(
-        "replace-core", "replace a component's core, in flight when it runs", _add_replace_core, _replace_core
+        "replace-core",
+        "replace the core of a component, also while the component runs",
+        _add_replace_core,
+        _replace_core,
     ),
     Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
-    Verb("events", "follow an executor's reconfigurations", _add_executor, _events),
-    Verb("nodes", "show the executors", _add_json, _nodes),
+    Verb("events", "show the reconfigurations of an executor as they happen", _add_executor, _events),
+    Verb("nodes", "list the executors that can be reached", _add_json, _nodes),
     Verb(
         "check",
         "check architecture, rules and steps files without starting anything",
@@ -317,18 +337,28 @@ VERBS = (
     ),
     Verb(
         "analyze",
-        "say whether each component of an architecture meets its deadline, and show the task model",
+        "prove that each component meets its deadline, or show which one does not",
         analyze_verb.add_arguments,
         analyze_verb.main,
     ),
-    Verb("record", "start or stop a recording of an executor's trace", _add_recording, _recording),
-    Verb("report", "write one page about a run, to look at", report_verb.add_arguments, report_verb.main),
+    Verb("record", "start or stop a recording of an executor", _add_recording, _recording),
+    Verb(
+        "report",
+        "write a report of a recorded run as one HTML page",
+        report_verb.add_arguments,
+        report_verb.main,
+    ),
     Verb(
         "rules",
-        "ask about rules before, while and after they matter",
+        "check, try, list, load, replay and explain rules",
         rules_verb.add_arguments,
         rules_verb.main,
     ),
-    Verb("trace", "work with recorded traces", trace_verb.add_arguments, trace_verb.main),
+    Verb(
+        "trace",
+        "check, repair, measure and export recorded traces",
+        trace_verb.add_arguments,
+        trace_verb.main,
+    ),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
 )

@@ -62,7 +62,7 @@ def report_lines(report: Sequence[Any]) -> list[str]:
             if step.missed_releases != none:
                 facts.append(f"missed releases {step.missed_releases}")
             else:
-                facts.append("next release still to come")
+                facts.append("the next release has not come yet")
         elif step.instant_ns != none and step.release_ns == none and step.remark:
             facts.append(step.remark)  # the component is late
         if step.phase_actual_ns != none:

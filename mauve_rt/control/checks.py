@@ -72,7 +72,7 @@ def check_revision(request: Request, runtime: Runtime) -> None:
     revision = runtime.revision
     if request.expected_revision not in (0, revision):
         text = f"the architecture is at revision {revision}, the request expected {request.expected_revision}"
-        raise RefusalError(Code.WRONG_REVISION, f"{text}; look at ~/state and decide again")
+        raise RefusalError(Code.WRONG_REVISION, f"{text}; read ~/state, then ask again")
 
 
 def _check_recording(order: RecordingOrder) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from mauve_rt._kernel import Committed, StepReport, TransactionReport, monotonic_ns
 from mauve_rt.control.requests import NOT_MEASURED, Outcome, Report
+from mauve_rt.counts import counted
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 
@@ -38,7 +39,7 @@ def message_of(steps: tuple[Step, ...], measured: TransactionReport) -> str:
 
 def _missed(report: StepReport) -> str:
     count = report.missed_releases
-    text = f"component '{report.component}' missed {count:,} release{'s' if count > 1 else ''}"
+    text = f"component '{report.component}' missed {counted(count, 'release')}"
     return f"{text} ({report.remark})" if report.remark else text
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-REMEDY = "start the executor anew, or install the new code under another name"
+REMEDY = "start the executor again, or install the new code under another name"
 
 
 class Stamp(NamedTuple):

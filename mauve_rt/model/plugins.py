@@ -35,7 +35,7 @@ KINDS: Mapping[str, str] = {
 }
 IN_PYTHON = ("shell", "core", "fsm", "resource")
 """Kinds that a Python class can be; types are written in C++, or are ROS messages, which nothing lists."""
-SOURCE_IT = "source its install/setup.bash"
+SOURCE_IT = "source its install/setup.bash, or add its prefix to AMENT_PREFIX_PATH"
 _FIELDS = 4
 
 
@@ -205,7 +205,10 @@ class PluginLoader:
     def _not_installed(self, kind: str, name: str) -> PluginError:
         if package := self.missing_package(name):
             return PluginError(f"{kind} '{name}': {package}", element=name, remedy=SOURCE_IT)
-        remedy = f"{did_you_mean(name, self.names(kind))} (`mauve plugins` lists what is installed)"
+        names = self.names(kind)
+        its_own = [each for each in names if each.partition("/")[0] == name.partition("/")[0]]
+        known = did_you_mean(name, names if nearest(name, names) or not its_own else its_own)
+        remedy = f"{known} (`mauve plugins` lists what is installed)"
         return PluginError(f"{kind} '{name}' is not installed", element=name, remedy=remedy)
 
     def missing_package(self, name: str) -> str:

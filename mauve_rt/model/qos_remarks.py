@@ -36,7 +36,7 @@ def qos_remarks(topic: TopicModel) -> Iterator[tuple[str, str, str]]:
 def remark_text(name: str, topic: TopicModel, remark: tuple[str, str, str]) -> str:
     """One line about a resource's topic."""
     key, whom, remedy = remark
-    return f"topic '{topic.name}' of resource '{name}' will not hear, by its {key}, {whom}; {remedy}"
+    return f"topic '{topic.name}' of resource '{name}' will not receive, by its {key}, {whom}; {remedy}"
 
 
 def file_warnings(model: ArchitectureModel) -> Iterator[Problem]:

@@ -83,7 +83,7 @@ STEP_KINDS: Mapping[str, StepKind] = {
     "start": StepKind(what="start the component at its next instant", leaves=("RUNNING",)),
     "stop": StepKind(what="stop the component", leaves=("STOPPED",)),
     "configure": StepKind(
-        what="configure the component anew, for example after a fault",
+        what="configure the component again, for example after a fault",
         leaves=("STOPPED", "RUNNING"),
         is_prepared=False,
     ),

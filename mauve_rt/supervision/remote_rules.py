@@ -109,7 +109,7 @@ class RemoteRules:
         before, self._view = self._view, view
         if restarted:
             if self._flight is not None:
-                self._fail("the executor was started anew meanwhile", now_ns, how="timed_out")
+                self._fail("the executor was started again before the reply", now_ns, how="timed_out")
             self._engine.forget()
             for each in self._watched:
                 each.forget()

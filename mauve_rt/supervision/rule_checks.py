@@ -105,7 +105,9 @@ def _oscillations(file: RulesFile) -> Iterator[Problem]:
         own = {name for leaf in rule.when.leaves() for name in _heard(leaf)} & touched(rule.do)
         if own:
             names = ", ".join(sorted(own))
-            what = f"rule '{rule.name}' changes what it looks at ({names}), and has no cooldown_s"
+            what = (
+                f"rule '{rule.name}' changes the input of its own condition ({names}), and has no cooldown_s"
+            )
             remedy = "give it a cooldown_s, or it does and undoes for ever"
             yield file.problem(("rules", index, "when"), what, remedy=remedy)
         elif rule.undo.for_s == 0 and rule.for_s == 0:

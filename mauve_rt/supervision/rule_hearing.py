@@ -20,7 +20,7 @@ def only_outside(file: RulesFile) -> Iterator[Problem]:
     for leaf in own_leaves(file):
         for signal in heard(leaf):
             if signal.kind in OUTSIDE:
-                what = f"an executor's own rules cannot hear of {OUTSIDE[signal.kind]} ({signal.target})"
+                what = f"an executor's own rules cannot receive {OUTSIDE[signal.kind]} ({signal.target})"
                 yield file.problem((*leaf.place, leaf.kind), what, remedy=REMEDY)
 
 

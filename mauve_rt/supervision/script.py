@@ -170,5 +170,5 @@ def load_script(path: Path, rules: Sequence[Rule]) -> Script:
 
 def _unobservable(file: YamlFile, index: int, told: Heard, signals: Sequence[SignalSpec]) -> Problem:
     known = {signal.target for signal in signals if signal.kind in _SIGNALS[told.what]}
-    what = f"no rule listens to {told.what} {told.of}"
+    what = f"no rule has a condition on {told.what} {told.of}"
     return file.problem(("heard", index, told.what), what, remedy=did_you_mean(told.of, known))

@@ -11,6 +11,7 @@ PAGES_OF_CLAIMS = (
     *(
         f"docs/concepts/{name}.md"
         for name in (
+            "basic_elements",
             "components",
             "deployment",
             "faults",
@@ -22,10 +23,7 @@ PAGES_OF_CLAIMS = (
             "traces",
         )
     ),
-    *(
-        f"docs/howto/{name}.md"
-        for name in ("install", "operate", "realtime_rights", "record_and_report", "write_a_core")
-    ),
+    *(f"docs/howto/{name}.md" for name in ("install", "operate", "record_and_report", "write_a_core")),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
 
@@ -339,14 +337,18 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_required_ports.py::test_a_required_port_stays_connected",
         "python/model/test_misfits.py::test_an_unconnected_call_port_is_refused",
     ),
-    "which is held against that one field by field": (
+    "Its fields are compared with the fields of the message": (
         "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
         "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
     ),
-    "The executor runs them itself (`-p rules:=FILE`), on native threads beside the components": (
+    "A plain struct declares once which message or service it represents": (
+        "python/model/test_misfits.py::test_a_struct_unlike_its_message_is_refused",
+        "python/model/test_misfits.py::test_a_services_response_is_held_against_the_service",
+    ),
+    "The executor runs them itself (`-p rules:=FILE`), on native threads next to the components": (
         "ros/executor/test_rules.py::test_acts_undoes_and_tells",
     ),
-    "what a rule does is prepared while the rule is armed": (
+    "The new parts of a rule are prepared while the rule is armed": (
         "bench: , later than 1 period + 1 ms",
         "RuleRunnerTest.PreparesNothingWhenItIsTime",
         "RuleRunnerTest.ActsWhileNothingCanBePrepared",
@@ -357,33 +359,33 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "RuleRunnerTest.ActsWhileAnothersComponentDoesNotComeToAWait",
         "RuleRunnerTest.PreparesWhileAnothersPartIsSlow",
     ),
-    "one whose own target hangs can stop that (`otherwise`)": (
+    "A rule whose own target hangs can stop that target (`otherwise`)": (
         "RuleRunnerTest.MakesOutputsSafeWhereItsComponentHangs",
         "RuleRunnerTest.StopsWhereWhatItDoesCannotBeMadeReady",
     ),
-    "`mauve rules list` shows how those of an executor fare": (
+    "shows the rules of an executor: armed, true, time until the next action": (
         "ros/executor/test_rules.py::test_the_command_lists_and_loads",
     ),
-    "so that it acts while a component keeps Python's interpreter": (
+    "So a rule acts while a component keeps Python's interpreter": (
         "ros/executor/test_rules.py::test_acts_while_a_component_in_python_keeps_the_interpreter",
     ),
     "and while its supervisor is stopped or dead": (
         "ros/executor/test_rules.py::test_acts_without_its_supervisor",
     ),
-    "Every decision is told on `~/decisions` and in the bag": (
+    "Every decision is published on `~/decisions` and recorded in the bag": (
         "ros/executor/test_rules.py::test_acts_undoes_and_tells",
         "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
     ),
-    "what can no longer be prepared is an ERROR in `/diagnostics` at once": (
+    "A part that can no longer be prepared is an ERROR in `/diagnostics` at once": (
         "ros/executor/test_rules.py::test_what_cannot_be_made_ready_is_an_error_at_once",
     ),
-    "`~/load_rules` puts the rules of a file in the place of the present ones, all or none": (
+    "`~/load_rules` replaces the present rules by the rules of a file, all or none": (
         "ros/executor/test_rules.py::test_rules_are_loaded_anew_whole_or_not_at_all",
     ),
     "it runs the rules that are `in: supervisor`, and those that the executor does not run": (
         "ros/supervisor/test_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
     ),
-    "who starts while something is in effect takes it as its own": (
+    "A supervisor that starts while an effect is already in place takes it over": (
         "ros/supervisor/test_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
         "ros/executor/test_rules.py::test_takes_up_what_is_in_effect",
     ),
@@ -392,22 +394,22 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/supervision/test_rule_trees.py::test_a_part_that_must_hold_without_a_break",
         "python/supervision/test_rule_trees.py::test_what_held_a_while_ago",
     ),
-    "of rules that want different things the one of the highest priority decides": (
+    "Of rules with different actions for one component, the rule of the highest priority decides": (
         "python/supervision/test_rule_trees.py::test_of_two_that_hold_the_higher_decides_and_the_lower_says_so_once",
     ),
-    "`mauve rules check FILE` finds rules that cannot be meant and says how long each may take at most": (
+    "finds errors in rules and says how long each may take at most": (
         "python/cli/test_rules.py::test_a_rule_that_can_never_hold",
         "python/cli/test_rules.py::test_two_that_want_different_things_at_once",
         "python/cli/test_rules_bounds.py::test_in_the_executor",
     ),
-    "plays a script to them in virtual time, tells what they decide and draws it": (
+    "plays a script to them in virtual time, shows and draws their decisions": (
         "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
     ),
-    "`mauve rules explain BAG` tells why they acted and why not": (
+    "shows why rules acted, or did not act": (
         "python/cli/test_rules_explain.py::test_the_story_has_each_decision_with_its_reason",
         "python/cli/test_rules_explain.py::test_why_a_rule_did_not_act",
     ),
-    "`mauve rules replay FILE BAG` what others would have done that day": (
+    "shows the actions that other rules would have taken in a recorded run": (
         "python/cli/test_rules_replay.py::test_other_rules_differ",
         "system/test_demo_mission.py::test_its_rules_replayed_do_what_they_did",
     ),
@@ -523,12 +525,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/project/test_readme_examples.py::test_the_report_is_written_from_python",
     ),
     # ---- concepts: components and time
-    "All three are replaceable parts (`package/Class`)": (
+    "all replaceable parts (`package/Class`)": (
         "Rule9Parts.AllThreePartsAndAnotherTwoBack",
         "python/control/test_control.py::test_all_parts_are_replaced_as_one",
     ),
     "which take no logical time": ("Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",),
-    "`wait(d)` adds d to the clock and sleeps until it": ("Rule1Clock.EachWaitAdvancesItByItsLength",),
+    "Only wait states advance the component's **logical clock**": (
+        "Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",
+    ),
+    "`wait(d)` adds d to the clock and sleeps until the real clock reaches it": (
+        "Rule1Clock.EachWaitAdvancesItByItsLength",
+    ),
     "so nothing drifts, however long execution takes": (
         "Rule2Instants.DoNotDriftOverTenThousandPeriodsWhateverExecutionTakes",
     ),
@@ -536,10 +543,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule3Period.IsTheGcdOfAllCyclesOfAnyMachine",
         "Rule3Grid.InitialStatesInstantsAreEpochAndOffsetAndMultiplesOfThePeriod",
     ),
-    "A loop without a wait is refused": ("Rule1Loops.ALoopWithoutAWaitIsRefusedByName",),
+    "Its **grid** is `epoch + offset + k * period`": (
+        "Rule3Period.IsTheGcdOfAllCyclesOfAnyMachine",
+        "Rule3Grid.InitialStatesInstantsAreEpochAndOffsetAndMultiplesOfThePeriod",
+    ),
+    "The architecture refuses an fsm with a loop without a wait": (
+        "Rule1Loops.ALoopWithoutAWaitIsRefusedByName",
+    ),
     "a write to the resource that one of its ports reads": ("Rule12Events.EveryKindOfResourceRaisesThem",),
+    "| `event` | a count of events, for `wait_event` |": ("Rule12Events.EveryKindOfResourceRaisesThem",),
     "`wait_event(port, timeout, min_interarrival)`": ("Rule12Events.AreKeptApartByTheMinimalInterarrival",),
-    "Its clock goes on to the event's time": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
+    "The clock is then set to the time of the event": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
     "is *sporadic*: it has no period": ("Rule12Events.AreNoPeriodNorPhase",),
     # ---- concepts: resources
     "under a priority-inheritance mutex": (
@@ -561,7 +575,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "of any installed message type": (
         "ros/bridge/test_topics.py::test_a_type_nobody_registered_is_received_and_written",
     ),
-    "the messages travel in C++, the interpreter has no part in them": (
+    "The messages travel in C++, the interpreter has no part in them": (
         "bench: CPU of an executor that sends ",
         "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
     ),
@@ -573,14 +587,14 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
         "python/model/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
     ),
-    "a file sets and checks it as a `ring_buffer`'s `capacity`": (
+    "a file sets and checks them as a `ring_buffer`'s `capacity`": (
         "python/model/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
         "python/model/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
     ),
     "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
         "ros/bridge/test_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
     ),
-    "counts what passed, what was refused": (
+    "counts received and sent messages, refused messages": (
         "ros/bridge/test_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
         "ros/bridge/test_topics.py::test_missed_deadlines_are_counted",
     ),
@@ -588,25 +602,30 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/bridge/test_topics.py::test_another_type_that_comes_to_the_topic_is_told",
         "ros/bridge/test_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
     ),
-    "A thread of its own sends them: real-time, at the lowest priority": (
+    "One thread sends all messages: real-time, at the lowest priority": (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
     ),
-    "Where a message must not wait for other components' work": (
+    "If a message must not wait for other components' work": (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
         "bench: the same, sent on the component's CPU, p",
     ),
-    "the calls of a `client` are answered by one": (
+    "a resource `client` calls a service": (
         "ros/bridge/test_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
         "ros/bridge/test_calls.py::test_a_resources_call_is_a_ros_service",
     ),
     "never blocks longer than `timeout_ms`": ("ClientCall.TimesOutAndIsNotAnsweredByALateReply",),
-    "a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
-    "bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
-    "What a transaction adds may be bound as well": (
+    "and a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
+    "Bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
+    "A transaction may add bound resources as well": (
         "ros/bridge/test_calls.py::test_topics_and_services_come_and_go_while_all_runs",
     ),
     # ---- concepts: deployment and change
-    "meets all of them at a barrier and only then publishes one epoch": (
+    "meets all of them at a barrier, and only then publishes one epoch": (
+        "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
+        "HygieneOfTheKernel.NoPageFaultAfterTheStart",
+        "system/test_figures.py::test_with_it_both_are_on_one_grid",
+    ),
+    "Each component runs from its first instant after the epoch on": (
         "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
         "HygieneOfTheKernel.NoPageFaultAfterTheStart",
         "system/test_figures.py::test_with_it_both_are_on_one_grid",
@@ -616,11 +635,20 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule6Simulated.StartsAtTheFirstInstantLaterThanTheMargin",
         "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
     ),
+    "`start(clock)` with a clock in the future enters at that clock": (
+        "Rule6Simulated.StartsAtTheFirstInstantLaterThanTheMargin",
+        "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
+    ),
     "Fig. 3, 5 and 6 drawn from traces": ("system/test_figures.py::test_the_drawings_are_whole",),
-    "its whole declared stack (512 KiB unless told) in memory": (
+    "its whole declared stack (512 KiB unless declared) in memory": (
         "Prefaulted.TheWholeDeclaredStackIsInMemory",
     ),
-    "What parts have allocated in their constructors and in configure is put into memory before they run": (
+    "The **deployer** turns each component into a thread": ("Prefaulted.TheWholeDeclaredStackIsInMemory",),
+    "Memory that parts allocated in their constructors and in `configure`": (
+        "Prefaulted.WhatANewCoreAllocatedIsInMemory",
+        "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
+    ),
+    "This holds for memory that they have not touched yet, too": (
         "Prefaulted.WhatANewCoreAllocatedIsInMemory",
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
     ),
@@ -634,27 +662,38 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "The commit happens on the component's own thread, inside a wait": (
         "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
     ),
-    "`adopt` may refuse, then everything goes on as before": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "The component goes on waiting for the instant that was pending all along": (
+        "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
+    ),
+    "`adopt` may refuse; then everything goes on as before": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "Its `take` moves the state over and cannot fail": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
     "So a replaced core misses no release": (
         "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
         "Rule9Parts.ACoreKeepsThePositionAndThePendingInstant",
         "bench: , releases missed",
     ),
-    "and nobody else is touched": ("bench: , releases missed by ",),
-    "A new fsm goes on in the wait of the same name": (
+    "and no other component is touched": ("bench: , releases missed by ",),
+    "has a wait of the same name, and the pending instant lies on its grid": (
         "Rule7Restart.AnFsmThatHasTheWaitGoesOnInItsPlace",
         "Rule7Restart.NoReleaseOfAnFsmWithSeveralWaitsIsLostInAnySwap",
         "Rule7RestartOnThreads.AnFsmWithSeveralWaitsKeepsItsPlace",
     ),
     "A new shell brings another instance of the fsm": ("SporadicChanges.AnotherShellLosesNoEventEither",),
-    "Else it begins in its initial state": (
+    "has its initial state on the pending instant": (
         "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
         "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
     ),
-    "A transition may carry a guard, a wait's too": ("ComponentLife.AWaitsGuardIsAskedWhenTheWaitHasEnded",),
+    "A transition may carry a guard": ("ComponentLife.AWaitsGuardIsAskedWhenTheWaitHasEnded",),
+    "The guard of a wait is evaluated when the wait has ended": (
+        "ComponentLife.AWaitsGuardIsAskedWhenTheWaitHasEnded",
+    ),
     "`wait(kForever)` lasts until the component is stopped": ("ComponentLife.AWaitForEverLastsUntilTheStop",),
     "A state may stop its own component": ("ComponentLife.AStateMayStopItsOwnComponent",),
     "`resynchronise` gives all components a new common epoch": (
+        "Resynchronise.AllGoOnOnTheGridsOfTheNewEpoch",
+        "ResynchroniseInVirtualTime.MovesEachInstantToTheFirstOfTheNewGrid",
+    ),
+    "All instants of a component move by the same time": (
         "Resynchronise.AllGoOnOnTheGridsOfTheNewEpoch",
         "ResynchroniseInVirtualTime.MovesEachInstantToTheFirstOfTheNewGrid",
     ),
@@ -670,7 +709,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "PreparedFuture.AnFsmSeesThemInDefine",
         "PreparedFuture.AShellSeesItsOwnFuture",
     ),
-    "what they write meanwhile goes nowhere": ("PreparedFuture.WhatIsWrittenInPreparationGoesNowhere",),
+    "Values that new parts write before the commit are dropped": (
+        "PreparedFuture.WhatIsWrittenInPreparationGoesNowhere",
+    ),
     "The time between the thread's `parked` and `armed` records is the **blackout**": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
@@ -679,11 +720,19 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule10Transaction.CoresAndPropertiesOfTwoComponentsChangeAtOnce",
         "bench: : architectures other than described",
     ),
-    "then each component agrees on its own thread, in a wait of its own": (
+    "Each component agrees on its own thread, in a wait of its own": (
+        "Rule10Transaction.WiresAreSwappedBetweenTwoRunningComponents",
+        "Rule10Commit.WhileAnAdoptLastsTheOthersGoOn",
+    ),
+    "All steps are prepared": (
         "Rule10Transaction.WiresAreSwappedBetweenTwoRunningComponents",
         "Rule10Commit.WhileAnAdoptLastsTheOthersGoOn",
     ),
     "With the last agreement the change has one logical instant T": (
+        "Cut.InstantIsTheClockAfterTheFrontier",
+        "ChangeModel.HoldsInEveryInterleaving",
+    ),
+    "Each component takes its change in its wait, at its first release at or after T": (
         "Cut.InstantIsTheClockAfterTheFrontier",
         "ChangeModel.HoldsInEveryInterleaving",
     ),
@@ -694,12 +743,16 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "commit time-out (`--timeout`) refuses the transaction": (
         "Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",
     ),
-    "A stop, a fault or a shutdown before T is fixed calls the commit off and waits for nobody": (
+    "A stop, a fault or a shutdown before T is fixed calls the commit off and waits for no component": (
         "Rule10Commit.AStopCallsACommitOffAndWaitsForNobody",
         "Rule10Commit.AFaultCallsTheCommitOff",
         "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
     "A component that is late at T takes its change at the end of its overrun": (
+        "ChangeModel.HoldsInEveryInterleaving",
+        "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
+    ),
+    "Until then the late component runs old parts while others already run new parts": (
         "ChangeModel.HoldsInEveryInterleaving",
         "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
     ),
@@ -719,7 +772,11 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "bring a new resource in the transaction and rewire both ends": (
         "Rule10Transaction.AnotherChainIsAddedAndWiredInAndTheOldOneRemoved",
     ),
-    "an adopt that takes longer refuses the change, after a longer adopt and take the component": (
+    "An `adopt` that takes longer refuses the change; after a longer `adopt`": (
+        "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
+        "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
+    ),
+    "A core may declare the time that `adopt` and `take` need together": (
         "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
         "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
     ),
@@ -732,14 +789,19 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule11Faults.AnExceptionParksItsComponentAndWritesItsOutputs",
         "ros/executor/test_process.py::test_fault_is_told_at_once_and_the_others_run_on",
     ),
-    "faults its component when it ends": ("Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",),
-    "and while it lasts by a real-time watchdog": (
+    "A state that runs longer faults its component when it ends": (
+        "Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",
+    ),
+    "A state may declare a bound (`max_execution`)": (
+        "Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",
+    ),
+    "While the state still runs, a real-time watchdog does the same": (
         "Rule11Faults.AStateOverItsDeclaredTimeIsCaughtByTheWatchdog",
     ),
-    "which sleeps until the next bound can be exceeded": (
+    "the watchdog sleeps until the next bound can be exceeded": (
         "Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",
     ),
-    "and waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheTimedOutOneHolds",),
+    "The watchdog waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheTimedOutOneHolds",),
     "repaired in place by a step `configure` or `replace_core`, then started": (
         "Rule11Repaired.AndStartedInOneTransaction",
         "Rule11Repaired.ByConfiguringItAnew",
@@ -747,15 +809,23 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "is removed and added anew, in one transaction": (
         "Rule11Watchdog.ATimedOutComponentIsReplacedWhileItsThreadRuns",
     ),
-    "the component's own thread puts that one in": (
+    "the component's own thread puts the fallback core in": (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
         "Rule11Fallback.StartsInTheInitialStateAtTheNextInstantOfTheGrid",
     ),
-    "equal seeds give equal traces, bit for bit": (
+    "Equal architectures, callbacks and seeds give equal traces, bit for bit": (
         "Rule13SimulationSeeds.EqualSeedsGiveEqualTracesBitForBit",
         "python/bindings/test_simulation.py::test_two_runs_leave_the_same_trace_byte_by_byte",
     ),
-    "save writing the usual": (
+    "Basic elements (`mauve_rt/kernel/elements/`) are parts that many robots need": (
+        "Elements.AFilterIsOneMethod",
+        "ElementsHygiene.NoAllocationOnAComponentThread",
+    ),
+    "| relay | copies its input to its output |": (
+        "Elements.AFilterIsOneMethod",
+        "ElementsHygiene.NoAllocationOnAComponentThread",
+    ),
+    "| `PeriodicFsm` | the paper's periodic state machine |": (
         "Elements.AFilterIsOneMethod",
         "ElementsHygiene.NoAllocationOnAComponentThread",
     ),
@@ -763,9 +833,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Elements.AFilterIsOneMethod",
         "python/parts/test_elements.py::test_a_core_in_python_needs_but_one_method",
     ),
-    "a multiplexer switched by a property in flight": (
-        "Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",
-    ),
+    "a property switches it while it runs": ("Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",),
     "passes the first input that is fresh": (
         "Elements.APriorityMultiplexerPassesTheFirstThatIsFresh",
         "python/parts/test_elements.py::test_a_person_s_command_goes_before_the_robot_s",
@@ -773,7 +841,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`mauve_rt/TwistPriorityMultiplexer`": (
         "python/parts/test_elements.py::test_what_is_listed_is_what_is_registered",
     ),
-    "*when* nothing was heard for so long, *do* this transaction, and *undo* it": (
+    "*when* a condition holds, *do* this transaction, and *undo* it": (
         "ros/supervisor/test_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
         "python/supervision/test_remote_rules.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
     ),
@@ -872,12 +940,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/cli/test_analyze.py::test_a_declared_time_of_the_file_or_of_the_code",
         "DeclaredStates.StandInThePlaceOfTheFsmsOwn",
     ),
-    "`mauve check FILE...` says what is wrong with architecture, rules and steps files": (
+    "`mauve check FILE...` reports errors in architecture, rules and steps files": (
         "python/cli/test_check.py::test_an_architecture_file",
         "python/cli/test_check.py::test_a_rules_file_by_itself",
         "python/cli/test_check.py::test_a_steps_file_by_itself",
     ),
-    "Beside an architecture file, rules and steps are tried on it": (
+    "Given an architecture file as well, it tries rules and steps on it": (
         "python/cli/test_check.py::test_steps_beside_an_architecture_are_tried_on_it",
         "python/cli/test_check.py::test_rules_beside_an_architecture_do_and_undo",
     ),
@@ -937,6 +1005,26 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "and fail if there was a gap": ("ctest: sensor_breaks", "ctest: gps_lost"),
     "A package of your own (`tests/downstream/` is a complete one)": (
         "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
+    ),
+    # ---- parts and values
+    "A bag has the values of each resource that is bound to a topic": (
+        "python/project/test_readme_examples.py::test_the_python_example_plots_a_value",
+        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    ),
+    "| `bool configure_hook()` |": (
+        "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
+        "Rule9Replace.RefusalsLeaveTheOldCoreRunning",
+    ),
+    "| `void cleanup_hook()` |": (
+        "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
+    ),
+    "| `bool adopt(const CoreBase& old)` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "| `void take(CoreBase& old) noexcept` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "An exception of `adopt` carries its reason to the requester": (
+        "HostConformance.ARefusalNamesItsComponentOnceAndItsReason",
+    ),
+    "A core that replaces another one derives from the class for which the fsm was written": (
+        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
     # ---- real time
     "Without the rights to it everything runs all the same": (
@@ -1135,17 +1223,44 @@ PROMISE_NOTHING = (
     "*The same run: both robots",
     "And the services are there for anyone:",
     "An executor of your own:",
+    "They save code:",
+    "| element | effect |",
+    "`mauve plugins` lists all of them",
+    "| part | content |",
+    "It creates the threads",
+    "Linux does this from 5.14 on",
+    "Single mappings over 1 GiB",
+    "`scripts/figures` draws them again",
+    "| the component | repair |",
+    "has the commands",
+    "**Retire.** An ordinary thread cleans up the old part",
+    "| the new fsm | goes on |",
+    "has the mission's rules",
+    "describes conditions, priorities and tools",
+    "| command | use |",
+    "`mauve_examples/architecture/robot.yaml` is the mission's",
+    "Bind a resource to see its values",
+    "The values of other resources are not recorded",
+    "`DIR_csv/topic.beat.csv`",
+    "While the robot runs, plot the topic with any ROS tool",
+    "A C++ core may override these functions",
+    "| function | runs | purpose |",
+    '`throw std::runtime_error("the map is empty")`',
+    "Functions that the new core changes have to be `virtual`",
     "A **component** is three things",
-    "The **shell** is what others see",
-    "The **core** is data and algorithms",
-    "The **fsm** says when",
+    "| **shell** |",
+    "| **core** |",
+    "| **fsm** |",
     "An fsm may also wait for an *event*",
+    "[Time and grids](time_and_grids.md) explains",
     "**Resources** hold data and offer services that ports connect to",
-    "[0]}}` says how urgently it runs",
+    "`executor: {sender: {priority: 70, cpus:",
+    "[0]}}`.",
+    "The kinds are:",
+    "| kind | content |",
     "T is an instant of the components' clocks",
-    "For the common ROS types architecture files name them directly",
-    "Architecture files are YAML",
-    "To grant the rights to a group `realtime`",
+    "Architecture files name the elements for common ROS types directly",
+    "**Architecture files** are YAML",
     "`scripts/bench --quick` on 2026-11-22",
     "Intel Xeon, 2 CPUs, a **virtual machine**",
     "Your machine will show others",
@@ -1165,5 +1280,5 @@ PROMISE_NOTHING = (
     "| `benchmarks/`",
     "Licence:",
     "From Python:",
-    "**Rules** (`mauve_examples/architecture/supervisor.yaml`) let a robot degrade gracefully:",
+    "A **rule** lets a robot degrade gracefully",
 )

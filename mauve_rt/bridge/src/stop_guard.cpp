@@ -49,9 +49,8 @@ std::optional<StopReply> refusal(const mauve_msgs__srv__Stop_Request& request) {
   if (!std::isfinite(request.timeout_s) || request.timeout_s < 0.0 || request.timeout_s > kLongestTimeout)
     return StopReply{"INVALID", "bad timeout: expected 0 (the default) to 10 s"};
   if (request.expected_revision == 0) return std::nullopt;
-  return StopReply{
-      "WRONG_REVISION",
-      std::string(kSilent) + ", and nobody else knows the revision; ask without expected_revision"};
+  return StopReply{"WRONG_REVISION",
+                   std::string(kSilent) + ", and the revision is unknown; ask without expected_revision"};
 }
 
 /// Of a transition: whether it ends with safe outputs. rclpy goes by the label where there is one.

@@ -73,7 +73,7 @@ void TopicEvents::add(Init init, void (*count)(const Status&, TopicTroubleCounts
   rcl_event_t event = rcl_get_zero_initialized_event();
   const rcl_ret_t outcome = init(event);
   if (outcome == RCL_RET_UNSUPPORTED) return rcl_reset_error();
-  check(outcome, "the topic's events cannot be heard", "event");
+  check(outcome, "the topic's events cannot be received", "event");
   events_.push_back(std::make_unique<Event<Status>>(event, count, counts_));
 }
 

@@ -168,7 +168,7 @@ void Architecture::set_host(Runner& host) {
   const std::lock_guard lock(host_mutex_);
   if (host_ != nullptr) {
     throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
-                {.expected = "an architecture that nobody runs", .remedy = "shut its host down first"});
+                {.expected = "an architecture without a host", .remedy = "shut its host down first"});
   }
   host_ = &host;
 }

@@ -64,7 +64,7 @@ std::uint16_t Architecture::give_number(const std::string& name) {
                  .expected = "at most " + std::to_string(kMostNumbers) +
                              " names, those of removed components included",
                  .found = "one more",
-                 .remedy = "add the component by a name that was used before, or start the executor anew"});
+                 .remedy = "add the component by a name that was used before, or start the executor again"});
   }
   names_.push_back(name);
   return static_cast<std::uint16_t>(names_.size() - 1);

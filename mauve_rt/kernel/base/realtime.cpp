@@ -74,7 +74,7 @@ void RealtimeProcess::check_fifo(int priority) {
                limit_text(limit.rlim_cur) +
                "): components run as SCHED_OTHER and can be late by milliseconds; to grant it add the line "
                "'@realtime - rtprio 98' to /etc/security/limits.d/mauve.conf, add the user to group "
-               "realtime, log in anew");
+               "realtime, log in again");
 }
 
 void RealtimeProcess::lock_memory() {
@@ -87,7 +87,7 @@ void RealtimeProcess::lock_memory() {
   status_.deny("locked memory (the memlock limit is " + limit_text(limit.rlim_cur) +
                " bytes): page faults can delay components; to grant it add the line '@realtime - memlock "
                "unlimited' to "
-               "/etc/security/limits.d/mauve.conf, add the user to group realtime, log in anew");
+               "/etc/security/limits.d/mauve.conf, add the user to group realtime, log in again");
 }
 
 void RealtimeProcess::hold_cpu_latency() {

@@ -65,7 +65,7 @@ void Draft::claim(const std::shared_ptr<Component>& component) {
   // A thread that was left behind takes no change any more: what comes now removes its component.
   if (mark.is_claimed() || (mark.is_unsettled() && !component->task().is_left_behind())) {
     throw Error(ErrorCode::wrong_revision, "an earlier change of the component is not completed yet",
-                {.component = component->name(), .remedy = "look at it again, then decide again"});
+                {.component = component->name(), .remedy = "read it again, then ask again"});
   }
   component->change_mark().claim();
   claimed_.push_back(component);

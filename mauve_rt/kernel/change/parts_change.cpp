@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Changes to a component: new parts, and property values.
 #include <map>
+#include <string>
+#include <string_view>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/component.hpp"
@@ -27,6 +29,17 @@ void copy_properties(const Shell& from, Shell& to) {
       continue;
     }
   }
+}
+
+constexpr std::string_view kOldPartsRunOn = "the old parts run on";
+
+/// Of a part that could not be prepared: component and part are named once, with the failure's own remedy.
+ErrorDetail preparation_detail(const Error& failure, const std::string& component, const std::string& what) {
+  ErrorDetail detail = failure.detail();
+  if (detail.component.empty()) detail.component = component;
+  if (detail.element.empty()) detail.element = what;
+  detail.remedy += (detail.remedy.empty() ? "" : "; ") + std::string(kOldPartsRunOn);
+  return detail;
 }
 
 }  // namespace
@@ -76,11 +89,16 @@ void PartsChange::prepare() {
   if (unready_) return;
   try {
     prepare_parts();
+  } catch (const Error& error) {
+    const Error failure = error;  // a copy: retire() may end what it is of
+    retire();
+    throw Error(ErrorCode::prepare_failed, failure.statement(),
+                preparation_detail(failure, component_.name(), what_));
   } catch (...) {
     const std::string failure = caught_text();
     retire();
     throw Error(ErrorCode::prepare_failed, failure,
-                {.component = component_.name(), .element = what_, .remedy = "the old parts go on"});
+                {.component = component_.name(), .element = what_, .remedy = std::string(kOldPartsRunOn)});
   }
 }
 

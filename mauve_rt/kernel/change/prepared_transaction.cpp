@@ -266,17 +266,17 @@ TransactionReport PreparedTransaction::complete() {
   if (outcome == PreparedOutcome::stale) {
     throw Error(ErrorCode::wrong_revision,
                 "what the change was prepared against has changed, or is being changed; nothing was changed",
-                {.remedy = "prepare it anew"});
+                {.remedy = "prepare it again"});
   }
   if (state.failure) std::rethrow_exception(state.failure);
   if (outcome == PreparedOutcome::committed) return state.work->report(state.phase_ns);
   if (outcome == PreparedOutcome::withdrawn && state.host.is_deployed()) {
     throw Error(ErrorCode::wrong_revision, "the change was called off before it began; nothing was changed",
-                {.remedy = "prepare it anew"});
+                {.remedy = "prepare it again"});
   }
   if (outcome == PreparedOutcome::withdrawn) {
-    throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
-                {.remedy = "deploy it, then prepare the change anew"});
+    throw Error(ErrorCode::not_configured, "the architecture was shut down before the change was made",
+                {.remedy = "deploy it, then prepare the change again"});
   }
   throw Error(ErrorCode::timeout, "another commit did not end in time; nothing was changed",
               {.remedy = "try again, or allow a longer commit timeout"});

@@ -44,7 +44,7 @@ void TransactionCommit::Work::begin_alone() {
                 {.element = "revision",
                  .expected = std::to_string(options_.expected_revision),
                  .found = std::to_string(revision),
-                 .remedy = "look at it again, then decide again"});
+                 .remedy = "read it again, then ask again"});
   }
   if (claimed_.structure) {
     const std::lock_guard structural(
@@ -165,7 +165,7 @@ void TransactionCommit::Work::settle_committed() { finish(); }
 /// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
 void TransactionCommit::Work::require_host_open() const {
   if (!deployed_ || host_->is_deployed()) return;
-  throw Error(ErrorCode::not_configured, "the architecture was shut down meanwhile",
+  throw Error(ErrorCode::not_configured, "the architecture was shut down before the change was made",
               {.remedy = "deploy it, then ask again"});
 }
 
@@ -309,8 +309,8 @@ void TransactionCommit::Work::carry_out_commit() {
 void TransactionCommit::Work::require_same_structure() const {
   if (architecture_.commit_gate().structure() == structure_) return;
   throw Error(ErrorCode::wrong_revision,
-              "a prepared change of what there is, or of its wiring, came meanwhile; nothing was changed",
-              {.remedy = "look at the architecture again, then decide again"});
+              "a prepared change added, removed or connected something first; nothing was changed",
+              {.remedy = "read the architecture, then ask again"});
 }
 
 void TransactionCommit::Work::throw_not_made() {
@@ -324,16 +324,17 @@ void TransactionCommit::Work::throw_not_made() {
   } catch (...) {
     throw_refused(caught_text());
   }
-  throw_refused("it refused the old core's state");
+  throw_refused("the adopt of the new core returned false");
 }
 
 void TransactionCommit::Work::throw_refused(const std::string& what) const {
   if (commit_->refused_by() == &guard_ && guard_.changed() != nullptr) {
-    throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
+    throw Error(ErrorCode::wrong_revision,
+                "the component was started or stopped, or it faulted, before the change was made",
                 {.component = guard_.changed()->name(),
                  .element = "state",
                  .found = std::string(to_string(guard_.changed()->state())),
-                 .remedy = "look at the architecture again, then decide again",
+                 .remedy = "read the architecture, then ask again",
                  .step = step_of(guard_.changed()->name()),
                  .step_name = text_of(step_of(guard_.changed()->name()))});
   }
@@ -343,7 +344,7 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
     const int step = draft.core_step != 0 ? draft.core_step : draft.first_step;
     throw Error(ErrorCode::adopt_refused, "adopt refused: " + what,
                 {.component = draft.name(),
-                 .remedy = "nothing was changed; all goes on as before",
+                 .remedy = "nothing was changed; an adopt that throws an exception gives its reason here",
                  .step = step,
                  .step_name = text_of(step)});
   }

@@ -18,7 +18,7 @@ constexpr time_ns_t kInOrder = ms_to_ns(50);
 void Host::require_deployable() const {
   if (is_deployed()) {
     throw Error(ErrorCode::already_running, "the architecture is deployed already",
-                {.remedy = "shut it down first, to deploy it anew"});
+                {.remedy = "shut it down first, to deploy it again"});
   }
   if (architecture_.is_configured()) return architecture_.require_ready_cores();
   throw Error(ErrorCode::not_configured, "the architecture is not configured",

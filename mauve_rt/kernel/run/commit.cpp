@@ -394,16 +394,16 @@ void Commit::throw_off() const {
                   {.remedy = "deploy it again first"});
     case Off::preempted:
       throw Error(ErrorCode::wrong_revision, "a prepared change came before this one; nothing was changed",
-                  {.remedy = "look at the architecture again, then decide again"});
+                  {.remedy = "read the architecture, then ask again"});
     case Off::withdrawn: {
       const Task* by = off_by_.load(std::memory_order_relaxed);
-      ErrorDetail detail{.element = "state", .remedy = "look at the architecture again, then decide again"};
+      ErrorDetail detail{.element = "state", .remedy = "read the architecture, then ask again"};
       if (by != nullptr) {
         detail.component = by->name();
         detail.found = std::string(to_string(by->state()));
       }
-      throw Error(ErrorCode::wrong_revision, "the component was started or stopped, or it faulted, meanwhile",
-                  detail);
+      throw Error(ErrorCode::wrong_revision,
+                  "the component was started or stopped, or it faulted, before the change was made", detail);
     }
     case Off::timed_out:
     case Off::not_yet:

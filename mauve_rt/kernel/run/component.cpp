@@ -266,7 +266,10 @@ CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const
   if (binding.is_bound()) return binding;
   throw Error(
       ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
-      {.component = name_, .element = core.description(), .expected = "a core for " + fsm.description()});
+      {.component = name_,
+       .element = core.description(),
+       .expected = "a core for " + fsm.description(),
+       .remedy = "derive the core from the class for which the fsm was written, or replace the fsm, too"});
 }
 
 void Component::require_ready_core() const {

@@ -12,6 +12,7 @@ from rclpy.qos import QoSPolicyKind
 
 from mauve_rt._bridge import TopicReport
 from mauve_rt.control.requests import Outcome, Request
+from mauve_rt.counts import counted
 from mauve_rt.errors import one_line
 
 REFUSED_EVERY_S = 10.0  # how often the refused messages of a topic are told, after the first
@@ -53,11 +54,6 @@ def log_request(console: RcutilsLogger, request: Request, outcome: Outcome) -> N
         console.warning(f"{asked}: refused, {outcome.code.name}: {_foreign(outcome.message)}")
 
 
-def number_of(things: Sequence[object], what: str) -> str:
-    """How many, in words: 1 component, 2 components."""
-    return f"{len(things)} {what}" + ("" if len(things) == 1 else "s")
-
-
 def _foreign(text: str) -> str:
     """Somebody else's text as a part of one line."""
     line = "".join(c if c.isprintable() else "?" for c in one_line(text))
@@ -81,8 +77,7 @@ class TopicWatch:
                 self._console.warning(f"{subject}: {what}")
             if more := self._refused_since(report):
                 why = report.refusal or "by the middleware"
-                messages = "1 message" if more == 1 else f"{more} messages"
-                self._console.warning(f"{subject}: {messages} refused: {why}")
+                self._console.warning(f"{subject}: {counted(more, 'message')} refused: {why}")
         present = {report.topic for report in reports}
         self._misfits = {misfit for misfit in self._misfits if misfit[0] in present}
         self._refused = {topic: told for topic, told in self._refused.items() if topic in present}

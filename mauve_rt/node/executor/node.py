@@ -14,9 +14,10 @@ from mauve_rt._kernel import STOP_TIMEOUT_NS
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.counts import counted
 from mauve_rt.errors import MauveError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
-from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch, number_of
+from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
@@ -220,8 +221,8 @@ class ExecutorNode(LifecycleNode):
         if bag:
             self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
         self._log_realtime()
-        parts = number_of(self._runtime.components(), "component")
-        resources = number_of(self._runtime.described_resources(), "resource")
+        parts = counted(len(self._runtime.components()), "component")
+        resources = counted(len(self._runtime.described_resources()), "resource")
         recorded = f", recording to {bag}" if bag else ""
         self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
 
@@ -233,7 +234,7 @@ class ExecutorNode(LifecycleNode):
             self._state.start(self._runtime.host)
             if self._node_watch is not None:  # else it is not open yet
                 NodeWatch.notify("READY=1")
-        self.get_logger().info(f"activated: {number_of(self._runtime.components(), 'component')}")
+        self.get_logger().info(f"activated: {counted(len(self._runtime.components()), 'component')}")
         self.get_logger().info(_SAFE_STOP)
 
     def _clean_up(self) -> None:

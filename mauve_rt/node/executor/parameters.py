@@ -20,9 +20,7 @@ _TYPES = {
 _Present = dict[str, tuple[PropertyDescription, ParameterDescriptor]]
 _INT64 = (-(2**63), 2**63 - 1)
 _PROTECTED = "protected (reconfigurable: false): to be set by the architecture file or at the start"
-_STRUCTURAL = (
-    "structural: read by {} when configured; to be set beside the replacement of {} in one ~/reconfigure"
-)
+_STRUCTURAL = "structural: read by {} when configured; set it in one ~/reconfigure with the replacement of {}"
 
 
 class Parameters:

@@ -22,39 +22,37 @@ _CONFIGURED: Any = "when configured"
 PARAMETERS: dict[str, Setting] = {
     "architecture": Setting("", "architecture file"),
     "bag": Setting(
-        "", "folder of the bag to record from the start, which must not exist yet; empty: none", _CONFIGURED
+        "", "folder of a bag to record from the start; must not exist yet; empty: no recording", _CONFIGURED
     ),
-    "bags": Setting("", "folder below which ~/start_recording makes bags; empty: the working directory"),
+    "bags": Setting("", "folder in which ~/start_recording creates bags; empty: the working directory"),
     "record_topics": Setting(
-        [], "topics to record too: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
+        [], "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
     ),
     "bag_split_s": Setting(
-        60.0, "a recording goes on in a new file after so long; 0: never", _CONFIGURED, minimum=0
+        60.0, "time after which a recording goes on in a new file, in s; 0: never", _CONFIGURED, minimum=0
     ),
     "bag_split_bytes": Setting(
-        0, "a recording goes on in a new file when one is so large; 0: never", _CONFIGURED, minimum=0
+        0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
-    "rules": Setting(
-        "", "rules file, whose rules `in: executor` this executor runs itself; empty: none", _CONFIGURED
-    ),
+    "rules": Setting("", "rules file; the executor runs its rules `in: executor`; empty: none", _CONFIGURED),
     "autostart": Setting(default=True, description="configure and activate at the start"),
     "require_realtime": Setting(default=False, description="refuse to start without real-time rights"),
-    "trace": Setting(default=True, description="component threads write traces"),
+    "trace": Setting(default=True, description="write trace records"),
     "report_phase_timeout_s": Setting(
         1.0,
-        "how long an event may wait to tell the next release after a commit",
+        "longest time for which ~/events waits for the release after a commit, in s",
         minimum=0,
         maximum=MAX_PHASE_TIMEOUT_S,
     ),
     "node_silent_after_s": Setting(
-        5.0, "the executor reports that its Python side has been silent for so long", minimum=2
+        5.0, "silence of the Python side after which the executor logs an error, in s", minimum=2
     ),
     "max_request_bytes": Setting(
-        _LIMITS.max_request_bytes, "size of one request, all its texts together", minimum=1
+        _LIMITS.max_request_bytes, "largest size of one request, all texts together, in bytes", minimum=1
     ),
     "max_requested_bytes": Setting(
         _LIMITS.max_requested_bytes,
-        "memory of all that requests added: stacks, traces, buffers",
+        "largest memory that requests may add: stacks, traces, buffers, in bytes",
         minimum=1,
     ),
     "max_requested_priority": Setting(
@@ -66,7 +64,7 @@ PARAMETERS: dict[str, Setting] = {
 }
 DEFAULTS: Mapping[str, Any] = MappingProxyType(values_of({}, PARAMETERS))
 # Not declared: without a value the file's peers count, which are no default that could be told.
-PEERS = Setting([], "the other robots' names; overrides the file's")
+PEERS = Setting([], "names of the other robots; overrides `peers` of the file")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +144,7 @@ def help_text() -> str:
     """What `executor --help` says."""
     more = [
         ("peers:=string_array", f"{PEERS.description} (default: as in the architecture file)"),
-        ("COMPONENT.PROPERTY:=VALUE", "a component's property (default: as in the architecture file)"),
+        ("COMPONENT.PROPERTY:=VALUE", "property of a component (default: as in the architecture file)"),
     ]
     return usage("ros2 run mauve_rt executor", PARAMETERS, more=more)
 

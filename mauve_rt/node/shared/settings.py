@@ -142,7 +142,7 @@ def refusal(name: str, setting: Setting, *, configured: bool) -> str:
     if setting.constraint:
         return f"parameter {name}: {setting.constraint}"
     if setting.is_fixed:
-        return f"parameter {name} is read once, at the start: start the node anew with -p {name}:=VALUE"
+        return f"parameter {name} is read once, at the start: start the node again with -p {name}:=VALUE"
     if configured:
         text = f"parameter {name} is read when the executor is configured"
         return f"{text}: clean it up first (ros2 lifecycle set NODE cleanup)"

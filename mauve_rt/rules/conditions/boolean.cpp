@@ -6,7 +6,7 @@ namespace mauve::rules {
 ConditionKind boolean_kind() {
   return {
       .name = "boolean",
-      .summary = "the last message of a topic said true, or false",
+      .summary = "the last message of a topic was true, or false",
       .parameters = {{.name = "topic", .type = "topic", .required = true},
                      {.name = "type", .type = "message_type", .initial = std::string("std_msgs/msg/Bool")},
                      {.name = "field", .type = "field", .initial = std::string("data")},

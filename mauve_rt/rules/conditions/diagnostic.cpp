@@ -14,7 +14,7 @@ double level_of(const std::string& name) {
 
 ConditionKind diagnostic_kind() {
   return {.name = "diagnostic",
-          .summary = "a status of /diagnostics has a level, or a worse one",
+          .summary = "a status of /diagnostics has this level or a worse one",
           .parameters = {{.name = "status", .type = "str", .required = true},
                          {.name = "level", .type = "WARN|ERROR|STALE", .initial = std::string("ERROR")}},
           .hears =

@@ -52,7 +52,7 @@ class NoRelease final : public Condition {
 
 ConditionKind no_release_kind() {
   return {.name = "no_release",
-          .summary = "a component was not released for longer than so many of its periods",
+          .summary = "a component was not released for longer than `periods` of its periods",
           .parameters = {kComponent, {.name = "periods", .type = "float", .minimum = 1, .initial = 3.0}},
           .hears =
               [](const Parameters& told) {

@@ -12,7 +12,7 @@ constexpr time_ns_t kPythonCalm = ms_to_ns(500);  // Python takes longer to go o
 ConditionKind node_silent_kind() {
   return {
       .name = "node_silent",
-      .summary = "the executor's Python side, which answers requests, has not worked for longer than a time",
+      .summary = "the executor's Python side, which answers requests, has not worked for `longer_than_s`",
       .parameters = {{.name = "longer_than_s", .type = "float", .unit = "s", .minimum = 2, .initial = 5.0}},
       .hears = [](const Parameters& /*told*/) { return std::vector{SignalSpec{SignalKind::node}}; },
       .make = [](const Parameters& parameters,

@@ -5,7 +5,7 @@ namespace mauve::rules {
 
 ConditionKind overruns_kind() {
   return {.name = "overruns",
-          .summary = "a component has overrun so often within a time",
+          .summary = "a component overran `at_least` times within `within_s`",
           .parameters = often_parameters(),
           .hears =
               [](const Parameters& told) {

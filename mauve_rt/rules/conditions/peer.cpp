@@ -16,21 +16,21 @@ PeerState state_of(const std::string& name) {
 }  // namespace
 
 ConditionKind peer_kind() {
-  return {
-      .name = "peer",
-      .summary =
-          "another executor is gone, was started anew, has a FAULTED component, is there, or was never heard",
-      .parameters = {{.name = "executor", .type = "executor", .required = true},
-                     {.name = "is",
-                      .type = "gone|another_instance|faulted|there|unheard",
-                      .initial = std::string("gone")}},
-      .hears =
-          [](const Parameters& told) {
-            return std::vector{SignalSpec{SignalKind::peer, text(told, "executor")}};
-          },
-      .make = [](const Parameters& told, std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
-        return std::make_unique<Equal>(*signals[0], static_cast<double>(state_of(text(told, "is"))));
-      }};
+  return {.name = "peer",
+          .summary =
+              "another executor is gone, was started again, has a FAULTED component, is there, or was never "
+              "received",
+          .parameters = {{.name = "executor", .type = "executor", .required = true},
+                         {.name = "is",
+                          .type = "gone|another_instance|faulted|there|unheard",
+                          .initial = std::string("gone")}},
+          .hears =
+              [](const Parameters& told) {
+                return std::vector{SignalSpec{SignalKind::peer, text(told, "executor")}};
+              },
+          .make = [](const Parameters& told, std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
+            return std::make_unique<Equal>(*signals[0], static_cast<double>(state_of(text(told, "is"))));
+          }};
 }
 
 }  // namespace mauve::rules

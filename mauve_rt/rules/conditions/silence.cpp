@@ -6,9 +6,8 @@ namespace mauve::rules {
 ConditionKind silence_kind() {
   return {.name = "silence",
           .summary =
-              "the last message of a topic, or the last write to a resource, is older than a time; before a "
-              "first one "
-              "that counts from arming on",
+              "the last message of a topic, or the last write to a resource, is older than `longer_than_s`; "
+              "before the first one, the time counts from arming",
           .parameters =
               {kTopic,
                kMessageType,

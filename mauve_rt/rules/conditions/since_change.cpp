@@ -6,9 +6,8 @@ namespace mauve::rules {
 ConditionKind since_change_kind() {
   return {.name = "since_change",
           .summary =
-              "a component, or with none named the architecture, was last changed longer ago than a time; "
-              "before a "
-              "first change that counts from arming on",
+              "the last change of a component, or of the architecture, is older than `longer_than_s`; "
+              "before the first change, the time counts from arming",
           .parameters =
               {{.name = "component", .type = "component"},
                {.name = "longer_than_s", .type = "float", .unit = "s", .minimum = 1e-9, .required = true}},

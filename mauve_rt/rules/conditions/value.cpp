@@ -25,8 +25,8 @@ ConditionKind value_kind() {
   return {
       .name = "value",
       .summary =
-          "a field of a message or of a resource's struct is above or below a bound, or is no number; with a "
-          "hysteresis, until it is so far on the other side of the bound",
+          "a field of a message or of a resource's struct is above or below a bound, or is no number; with "
+          "`hysteresis`, until the field is back by this much",
       .parameters = {kTopic,
                      kMessageType,
                      kResource,

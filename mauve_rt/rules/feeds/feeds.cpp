@@ -29,7 +29,7 @@ std::pair<Befalls, time_ns_t> late_of(const std::string& detail) {
 }
 
 [[noreturn]] void refuse(const std::string& what) {
-  throw Error(ErrorCode::invalid_argument, "an executor's own rules cannot hear " + what,
+  throw Error(ErrorCode::invalid_argument, "an executor's own rules cannot receive " + what,
               {.remedy = "give the rule `in: supervisor`"});
 }
 

@@ -25,6 +25,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from mauve_rt.counts import counted
 from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
@@ -155,7 +156,7 @@ class McapFile:
             self._disk.write(self._descriptor, (self._now.tail,), self._now.data_end, size=self.size)
         except OSError as error:
             return f"the old end could not be put back either ({error.strerror}): the file needs repair"
-        return f"the file is complete up to the flush before, {self.flushed.messages} messages"
+        return f"the file is complete up to the flush before, {counted(self.flushed.messages, 'message')}"
 
     def close(self) -> None:
         """Flush and close.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.counts import counted
 from mauve_rt.trace.bag.files import bag_files, is_sqlite
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
 from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
@@ -104,8 +105,8 @@ def repair_bag(state: BagState) -> None:
 def _damage(file: FileState) -> str:
     found = f"{file.path.name}: {'' if file.is_closed else 'no finished MCAP file: '}{file.damage}"
     if file.is_data_whole:
-        return f"{found}; all of its {file.counts.messages:,} messages are whole"
-    whole = f"its first {file.whole_bytes:,} bytes are whole, with {file.counts.messages:,} messages"
+        return f"{found}; all of its messages are whole ({file.counts.messages:,})"
+    whole = f"its first {file.whole_bytes:,} bytes are whole, with {counted(file.counts.messages, 'message')}"
     return f"{found}; {whole}, not the {file.left_out_bytes:,} bytes after them"
 
 

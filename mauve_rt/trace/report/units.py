@@ -1,5 +1,7 @@
 """Times and counts as a person reads them: three digits, a unit, no ambiguity."""
 
+from mauve_rt import counts
+
 _NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
 _MINUS = "\N{MINUS SIGN}"
 _UNITS = ((1, "ns"), (1_000, "\N{MICRO SIGN}s"), (1_000_000, "ms"), (1_000_000_000, "s"))
@@ -58,9 +60,7 @@ def share_text(share: float) -> str:
 
 def counted(count: int, what: str, plural: str = "") -> str:
     """Return e.g. 1 overrun, 2 overruns, no overrun."""
-    if count == 0:
-        return f"no {what}"
-    return f"1 {what}" if count == 1 else f"{count:,} {plural or what + 's'}"
+    return counts.counted(count, what, plural) if count else f"no {what}"
 
 
 def times(count: int) -> str:

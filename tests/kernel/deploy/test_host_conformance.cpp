@@ -184,6 +184,25 @@ TYPED_TEST(HostConformance, ACoreThatIsRefusedLeavesTheOldOneRunning) {
   EXPECT_GT(this->core(component).runs, runs);
 }
 
+TYPED_TEST(HostConformance, ARefusalNamesItsComponentOnceAndItsReason) {
+  this->add("c");
+  this->deploy();
+  const auto said_of = [&](const std::string& core) {
+    Transaction change;
+    change.replace_core("c", core);
+    return std::string(this->refused(change).what());
+  };
+  const std::string unready = said_of("t/Unready");
+  EXPECT_NE(std::string::npos, unready.find("component 'c'")) << unready;
+  EXPECT_EQ(unready.find("component 'c'"), unready.rfind("component 'c'")) << unready;
+  const std::string refusing = said_of("t/Refusing");
+  EXPECT_NE(std::string::npos, refusing.find("the adopt of the new core returned false")) << refusing;
+  EXPECT_NE(std::string::npos, refusing.find("an adopt that throws an exception gives its reason here"))
+      << refusing;
+  const std::string throwing = said_of("t/Throwing");
+  EXPECT_NE(std::string::npos, throwing.find("cannot read the old state")) << throwing;
+}
+
 TYPED_TEST(HostConformance, ReplaceFsmAndShell) {
   Component& component = this->add("c", 2);
   this->deploy();

@@ -291,7 +291,7 @@ TEST_F(Rule10Commit, AStopCallsACommitOffAndWaitsForNobody) {
   ASSERT_TRUE(error);
   EXPECT_EQ(ErrorCode::wrong_revision, error->code()) << error->what();
   EXPECT_EQ("fast", error->detail().component);
-  EXPECT_THAT(error->what(), HasSubstr("was started or stopped, or it faulted, meanwhile"));
+  EXPECT_THAT(error->what(), HasSubstr("was started or stopped, or it faulted, before the change was made"));
   EXPECT_EQ(1.0, slow->shell_as<TestShell>().gain.value()) << "nothing was changed";
   latch.open();
   expect_going_on(*slow);

@@ -59,7 +59,7 @@ def check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_an_architecture_file(check: Check) -> None:
-    good = "robot: 2 components, 1 resources, 1 connections: no error found"
+    good = "robot: 2 components, 1 resource, 1 connection: no error found"
     assert check(robot=ROBOT) == (0, [good], [])
     status, out, errors = check(
         robot=ROBOT.replace("CounterFsm", "CounterFms", 1).replace("core:", "kore:", 1)
@@ -79,7 +79,7 @@ def test_an_architecture_file(check: Check) -> None:
     ],
 )
 def test_a_rules_file_by_itself(check: Check, old: str, new: str, place: str, words: str) -> None:
-    assert check(rules=RULES) == (0, ["rules: 1 rules: no error found"], [])
+    assert check(rules=RULES) == (0, ["rules: 1 rule: no error found"], [])
     status, out, errors = check(rules=RULES.replace(old, new, 1))
     assert (status, out) == (2, [])
     assert any(line.startswith(f"rules:{place}: ") and words in line for line in errors), errors
@@ -137,7 +137,7 @@ def test_rules_beside_an_architecture_do_and_undo(
     check: Check, old: str, new: str, line: int, words: str
 ) -> None:
     status, out, errors = check(robot=ROBOT, rules=RULES)
-    assert (status, out[1:], errors) == (0, ["rules: 1 rules, tried on robot: no error found"], [])
+    assert (status, out[1:], errors) == (0, ["rules: 1 rule, tried on robot: no error found"], [])
     status, out, errors = check(robot=ROBOT, rules=RULES.replace(old, new, 1))
     assert (status, len(out)) == (2, 1)
     (error,) = errors
@@ -152,7 +152,7 @@ def test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning(check: C
     assert (status, len(out)) == (0, 1)
     (warning,) = errors
     assert warning.startswith(
-        "robot:8:103: warning: topic 'set' of resource 'set' will not hear, by its deadline_ms"
+        "robot:8:103: warning: topic 'set' of resource 'set' will not receive, by its deadline_ms"
     )
     assert "leave it out" in warning
 

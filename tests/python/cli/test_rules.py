@@ -133,7 +133,7 @@ def test_a_rule_that_changes_what_it_looks_at(check: Check) -> None:
     status, _, errors = check(rule(when=own))
     assert (status, len(errors)) == (1, 1)
     assert errors[0].startswith(
-        "rules:4:5: rule 'quiet' changes what it looks at (one), and has no cooldown_s"
+        "rules:4:5: rule 'quiet' changes the input of its own condition (one), and has no cooldown_s"
     )
     status, _, errors = check(rule(when=own, more="    cooldown_s: 5\n"), robot=ROBOT)
     assert (status, errors) == (0, [])

@@ -65,7 +65,7 @@ def test_what_the_executor_hears(check: Check, kind: str) -> None:
 def test_what_only_the_outside_can_see(check: Check, kind: str) -> None:
     for robot in (WIDE, ""):
         (error,) = checked(check, OUTSIDE[kind], robot=robot)
-        assert error.startswith(f"{place(OUTSIDE[kind])}an executor's own rules cannot hear of a")
+        assert error.startswith(f"{place(OUTSIDE[kind])}an executor's own rules cannot receive a")
         assert error.endswith("; give the rule `in: supervisor`")
     assert checked(check, OUTSIDE[kind], where="supervisor") == []
 

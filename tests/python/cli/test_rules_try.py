@@ -81,7 +81,7 @@ def test_what_is_about_more_than_cores_is_tried_too(play: Try) -> None:
             "{topic: radio/in, every_s: 0.1, until",
             "{state: one, is: FAULTED, until",
             "4:13",
-            "no rule listens to state one",
+            "no rule has a condition on state one",
         ),
         ("topic: radio/in, every_s: 0.1, until", "state: one, until", "4:5", "heard[0].is is missing"),
         (

@@ -127,7 +127,7 @@ def test_the_next_release_in_words() -> None:
     simulated = {"phase_actual_ns": 0, "instant_ns": 5, "release_ns": 2_005}
     assert _words_of(**simulated) == "step: next release due 2 us after the change, woken at its instant"
     awaited = {"blackout_ns": 5_000, "missed_releases": none, "instant_ns": 5}
-    assert _words_of(**awaited) == "step: blackout 5 us, next release still to come"
+    assert _words_of(**awaited) == "step: blackout 5 us, the next release has not come yet"
     assert _words_of(instant_ns=5, remark="it is late") == "step: it is late"
 
 

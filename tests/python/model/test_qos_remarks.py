@@ -72,7 +72,7 @@ def test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard(
     for remark in remarks:
         text = remark_text("laser", topic, remark)
         assert text.startswith(
-            f"topic 'scan' of resource 'laser' will not hear, by its {remark[0]}, a publisher"
+            f"topic 'scan' of resource 'laser' will not receive, by its {remark[0]}, a publisher"
         )
         assert "; " in text  # the remedy
 

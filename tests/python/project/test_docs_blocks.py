@@ -134,7 +134,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
             "python/cli/test_trace.py::test_stats",
             "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         ),
-        "import mauve_rt.trace": (f"{README}the_python_example_reads_a_bag",),
+        "all_statistics(trace)": (f"{README}the_python_example_reads_a_bag",),
+        "import matplotlib": (f"{README}the_python_example_plots_a_value",),
         "# writes DIR/report.html": (
             "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
         ),

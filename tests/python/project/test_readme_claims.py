@@ -21,7 +21,8 @@ def _sentences(page: str) -> Iterator[str]:
     commands = {line for block in blocks(page) if not block.is_fenced for line in block.lines}
     code = {line for block in blocks(page) for line in block.lines}
     paragraph: list[str] = []
-    for number, line in enumerate([*page.splitlines(), ""]):
+    for number, text in enumerate([*page.splitlines(), ""]):
+        line = re.sub(r"^\d+\. +", "", text)
         if number not in code and line.strip() and not line.startswith(("#", "![", "|", "<!--")):
             paragraph.append(line)
             continue

@@ -127,6 +127,14 @@ def test_the_python_example_reads_a_bag(bag: Path, capsys: pytest.CaptureFixture
     assert "control" in capsys.readouterr().out
 
 
+def test_the_python_example_plots_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    program = _fenced("python", "import matplotlib").replace("docs/sample", str(ROOT / "docs/sample"))
+    program = program.replace("beats.png", str(tmp_path / "beats.png"))
+    exec(compile(program, "record_and_report.md", "exec"), {})  # noqa: S102 - a reader would run it too
+    assert (tmp_path / "beats.png").stat().st_size > 1000
+
+
 def test_the_report_is_written_from_python(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

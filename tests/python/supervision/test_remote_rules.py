@@ -440,7 +440,7 @@ def test_what_only_the_executor_hears_is_not_taken_over():
     world = started(rule(when=late))
     world.run(2.0)
     assert world.said() == ["suppressed"]
-    assert "it is heard how late exploration is" in world.decisions[0].reason
+    assert "wake-ups and responses of exploration are known" in world.decisions[0].reason
     world.tell()
     assert world.said() == ["suppressed"], "once"
 

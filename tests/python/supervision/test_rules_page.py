@@ -43,7 +43,7 @@ def _meanings() -> Iterator[str]:
 
 
 def _parameters() -> Iterator[str]:
-    yield _row("condition", "told", "type", "unit", "range", "otherwise")
+    yield _row("condition", "parameter", "type", "unit", "range", "otherwise")
     yield _row(*["---"] * 6)
     for kind in conditions().values():
         for each in kind.parameters:

@@ -337,7 +337,7 @@ def test_when_the_metadata_does_not_fit_what_was_flushed_waits_again(
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", refuse)
-        with pytest.raises(TraceError, match=r"cannot be written \(No space left\); .* 1 messages"):
+        with pytest.raises(TraceError, match=r"cannot be written \(No space left\); .* 1 message"):
             bag.flush()
     assert len(read(tmp_path / "bag")) == 1
     bag.flush()  # room again

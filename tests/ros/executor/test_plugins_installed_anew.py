@@ -110,7 +110,7 @@ def test_a_library_that_was_rebuilt_is_told(
     refused = _replace(graph, "Backwards")
     assert (refused.success, refused.code) == (False, Code.PREPARE_FAILED)
     assert f"{installed.library} was changed since this process loaded it" in refused.message
-    assert refused.message.endswith("start the executor anew, or install the new code under another name")
+    assert refused.message.endswith("start the executor again, or install the new code under another name")
     assert _counter(graph).core == before.core == "executor_tests/Counter"
     installed.library.unlink()
     assert f"{installed.library} is gone since" in _replace(graph, "Backwards").message

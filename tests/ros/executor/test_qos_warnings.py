@@ -25,7 +25,7 @@ def test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody(
     ordinary = graph.node.create_publisher(Float64, "/robot_1/set", 10)
     graph.spin_until(lambda: graph.node.count_subscribers("/robot_1/set") > 0, "the other subscription")
     assert ordinary.get_subscription_count() == 0  # ... and not one with a deadline
-    executor.await_output("will not hear")
-    warnings = [line for line in executor.output.splitlines() if "will not hear" in line]
+    executor.await_output("will not receive")
+    warnings = [line for line in executor.output.splitlines() if "will not receive" in line]
     assert len(warnings) == 1
-    assert "topic 'set' of resource 'set' will not hear, by its deadline_ms" in warnings[0]
+    assert "topic 'set' of resource 'set' will not receive, by its deadline_ms" in warnings[0]

@@ -130,7 +130,7 @@ REFUSED = {
     "revision": (
         (Stop, "stop", {"component": "counter", "expected_revision": 4711}),
         Code.WRONG_REVISION,
-        "the request expected 4711; look at ~/state",
+        "the request expected 4711; read ~/state",
     ),
     "timeout": ((Stop, "stop", {"component": "counter", "timeout_s": -1.0}), Code.INVALID, "bad timeout"),
     "not a timeout": (

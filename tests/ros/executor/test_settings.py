@@ -96,7 +96,7 @@ def test_what_is_read_once_is_read_only(executor: ExecutorProcess, graph: Any) -
         assert not result.successful, name
         expected = {
             "use_sim_time": "components run by the monotonic clock",
-            **dict.fromkeys(FIXED, f"is read once, at the start: start the node anew with -p {name}:="),
+            **dict.fromkeys(FIXED, f"is read once, at the start: start the node again with -p {name}:="),
             **dict.fromkeys(CHANGEABLE, "is read when the executor is configured: clean it up first"),
         }.get(name, "is read once")
         assert expected in result.reason, name

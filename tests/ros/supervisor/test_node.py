@@ -249,7 +249,7 @@ def test_a_diagnostic(graph: Graph, rules: Path):
 def test_what_only_the_executor_hears_is_refused(graph: Graph, rules: Path):
     watching(rules, "{overruns: {component: exploration}}")
     with pytest.raises(
-        ArchitectureFileError, match=r":4:.*overruns of exploration are heard.*`in: executor`"
+        ArchitectureFileError, match=r":4:.*overruns of exploration are known.*`in: executor`"
     ):
         RulesFile(rules)
 

@@ -38,4 +38,12 @@ class Configurable {
   bool configured_{false};
 };
 
+/// A shell, core, fsm or resource. Override configure_hook() and cleanup_hook(). configure() and cleanup() are final: a part
+/// that overrides one of them by mistake does not compile.
+class ConfigurablePart : public Configurable {
+ public:
+  void configure() final { Configurable::configure(); }
+  void cleanup() final { Configurable::cleanup(); }
+};
+
 }  // namespace mauve

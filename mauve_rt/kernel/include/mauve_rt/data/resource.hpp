@@ -104,7 +104,7 @@ class EventListeners {
 enum class TopicBinding : std::uint8_t { none, publish, subscribe };
 
 /// Derive from this to offer services of your own; a service is a member registered by offer().
-class Resource : public Configurable {
+class Resource : public ConfigurablePart {
  public:
   /// `kind` and `type` as the architecture file names them.
   Resource(std::string kind, std::string type) : kind_(std::move(kind)), type_(std::move(type)) {}

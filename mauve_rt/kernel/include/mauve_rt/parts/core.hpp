@@ -13,7 +13,7 @@
 namespace mauve {
 
 /// A core seen without its shell's type.
-class CoreBase : public Configurable {
+class CoreBase : public ConfigurablePart {
  public:
   /// Binds the core to a shell; false when the shell is not of the type the core was written for. [setup]
   virtual bool bind_shell(Shell& shell) noexcept = 0;

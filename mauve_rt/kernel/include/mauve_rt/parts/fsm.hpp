@@ -134,7 +134,7 @@ struct DescribedState {
 };
 
 /// An fsm seen without its types.
-class FsmBase : public Configurable {
+class FsmBase : public ConfigurablePart {
  public:
   /// Binds to a shell; false when it is not of the fsm's type. [setup]
   virtual bool bind_shell(Shell& shell) noexcept = 0;

@@ -22,7 +22,7 @@ namespace mauve {
 ///   };
 ///
 /// Every port is to be connected before configure, unless declared so: read_port<Point>("goal").optional().
-class Shell : public Configurable {
+class Shell : public ConfigurablePart {
  public:
   /// [rt]
   const std::vector<std::unique_ptr<PortBase>>& ports() const MAUVE_RT { return ports_; }
