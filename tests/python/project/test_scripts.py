@@ -97,9 +97,7 @@ def test_an_unknown_option_is_refused_before_anything_is_built(name: str, tmp_pa
         [tmp_path / "clone" / "scripts" / name, "--nosuch=1"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout) == (2, "")
-    assert (
-        done.stderr == f"{name}: unknown option --nosuch=1. scripts/{name} --help lists the options.\n"
-    )
+    assert done.stderr == f"{name}: unknown option --nosuch=1. scripts/{name} --help lists the options.\n"
     assert [path.name for path in (tmp_path / "clone").iterdir()] == ["scripts"]
 
 
