@@ -98,14 +98,13 @@ def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from mauve_examples.mission.demo_errors import BadInputError  # noqa: PLC0415
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
-    from mauve_rt.node.shared.loopback import LoopbackError  # noqa: PLC0415
-    from mauve_rt.node.shared.ros_start import settle_ros_start  # noqa: PLC0415
+    from mauve_rt.node.shared.ros_start import RosStartError, settle_ros_start  # noqa: PLC0415
 
     interrupts.begin()
     with open_cable(options) as cable:
         try:
             start = settle_ros_start()
-        except LoopbackError as error:
+        except RosStartError as error:
             raise BadInputError(str(error)) from None
         rclpy.init(args=list(start.arguments), signal_handler_options=SignalHandlerOptions.NO)
         try:

@@ -8,9 +8,8 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr
 import sys
 
 from mauve_rt.node.shared.first_steps import take_first_steps
-from mauve_rt.node.shared.loopback import LoopbackError
 from mauve_rt.node.shared.process import BAD_INPUT, Stop, complain, run_until_signalled
-from mauve_rt.node.shared.ros_start import settle_ros_start
+from mauve_rt.node.shared.ros_start import RosStartError, settle_ros_start
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -18,7 +17,7 @@ def main(arguments: list[str] | None = None) -> int:
     take_first_steps("radio")
     try:
         start = settle_ros_start()
-    except LoopbackError as error:
+    except RosStartError as error:
         complain(f"radio: {error}")
         return BAD_INPUT
     words = [*(sys.argv if arguments is None else arguments), *start.arguments]

@@ -8,9 +8,8 @@ Exit status: 0 after SIGINT or SIGTERM, 2 where it cannot be kept to this machin
 import sys
 
 from mauve_rt.node.shared.first_steps import take_first_steps
-from mauve_rt.node.shared.loopback import LoopbackError
 from mauve_rt.node.shared.process import BAD_INPUT, Stop, complain, run_until_signalled
-from mauve_rt.node.shared.ros_start import RosStart, settle_ros_start
+from mauve_rt.node.shared.ros_start import RosStart, RosStartError, settle_ros_start
 
 
 def main() -> int:
@@ -18,7 +17,7 @@ def main() -> int:
     take_first_steps("world")
     try:
         start = settle_ros_start()
-    except LoopbackError as error:
+    except RosStartError as error:
         complain(f"world: {error}")
         return BAD_INPUT
     return run_until_signalled(lambda stop: _work(start, stop), program="world")

@@ -199,6 +199,29 @@ def test_too_few_open_files_are_refused_in_one_line(program: str) -> None:
     )
 
 
+@pytest.mark.parametrize("program", ["lib/mauve_rt/executor", "lib/mauve_rt/supervisor", "bin/mauve", "demo"])
+@pytest.mark.parametrize("number", ["abc", "500"])
+def test_a_domain_that_is_none_is_refused_in_one_line(program: str, number: str, tmp_path: Path) -> None:
+    (tmp_path / "rules.yaml").write_text(RULES, "utf-8")
+    words = {
+        "executor": [
+            "--ros-args",
+            "-p",
+            f"architecture:={share_folder('mauve_examples')}/architecture/metronome.yaml",
+        ],
+        "supervisor": ["--ros-args", "-p", f"rules:={tmp_path}/rules.yaml"],
+    }
+    command = [PREFIX / program, *words.get(Path(program).name, ["nodes"])]
+    if program == "demo":
+        command = [sys.executable, "-P", "-m", "mauve_examples.mission.demo", "--out", str(tmp_path / "out")]
+    given = {**os.environ, "ROS_DOMAIN_ID": number}
+    done = subprocess.run(command, env=given, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (BAD_INPUT, "")
+    (line,) = done.stderr.splitlines()
+    found = f"ROS_DOMAIN_ID: expected a number from 0 to 232, found {number}. Choose one from 0 to 101."
+    assert line == f"{Path(program).name}: {found}"
+
+
 def demo(
     domain: int, *words: str, wrapper: tuple[str, ...] = (), **environment: str
 ) -> subprocess.Popen[str]:

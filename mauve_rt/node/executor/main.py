@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from mauve_rt.node.shared.first_steps import take_first_steps
-from mauve_rt.node.shared.loopback import LoopbackError, Reach, reach, udp_sockets
+from mauve_rt.node.shared.loopback import Reach, reach, udp_sockets
 from mauve_rt.node.shared.process import (
     BAD_INPUT,
     FAILED,
@@ -26,7 +26,7 @@ from mauve_rt.node.shared.process import (
     leave_now,
     run_until_signalled,
 )
-from mauve_rt.node.shared.ros_start import RosStart, settle_ros_start
+from mauve_rt.node.shared.ros_start import RosStart, RosStartError, settle_ros_start
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
 _SPIN_S = 0.2  # how long a stop may go unnoticed
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         leave_now(0)
     try:
         start = settle_ros_start()
-    except LoopbackError as error:
+    except RosStartError as error:
         complain(f"executor: {error}")
         leave_now(BAD_INPUT)
     sys.setswitchinterval(SWITCH_INTERVAL_S)

@@ -3,13 +3,18 @@
 import resource
 from typing import NamedTuple
 
+from mauve_rt.node.shared.domain import domain_problem
 from mauve_rt.node.shared.failures import more_open_files
 from mauve_rt.node.shared.lean_start import leave_out_unused
 from mauve_rt.node.shared.log_folder import choose_log_folder
-from mauve_rt.node.shared.loopback import keep_to_this_machine
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
 from mauve_rt.node.shared.static_peers import resolve_static_peers, unresolved_text
 
 _FEW_FILES = 64  # enough for a small architecture only
+
+
+class RosStartError(Exception):
+    """ROS cannot start in this environment. str() is one line that says what to set."""
 
 
 class RosStart(NamedTuple):
@@ -26,10 +31,15 @@ def settle_ros_start() -> RosStart:
     Once, at the start of a program. No thread may be there that reads the environment while this runs.
 
     Raises:
-        LoopbackError: the middleware cannot be bound to loopback as asked.
+        RosStartError: a variable of the environment has a value that ROS cannot use.
     """
+    if problem := domain_problem():
+        raise RosStartError(problem)
     unresolved = resolve_static_peers()
-    keep_to_this_machine()
+    try:
+        keep_to_this_machine()
+    except LoopbackError as error:
+        raise RosStartError(str(error)) from None
     leave_out_unused()
     arguments, logs = choose_log_folder()
     peers = unresolved_text(unresolved) if unresolved else ""

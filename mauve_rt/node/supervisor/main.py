@@ -10,9 +10,8 @@ import sys
 from collections.abc import Sequence
 
 from mauve_rt.node.shared.first_steps import take_first_steps
-from mauve_rt.node.shared.loopback import LoopbackError
 from mauve_rt.node.shared.process import BAD_INPUT, Stop, asks_for_help, complain, run_until_signalled
-from mauve_rt.node.shared.ros_start import RosStart, settle_ros_start
+from mauve_rt.node.shared.ros_start import RosStart, RosStartError, settle_ros_start
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     try:
         start = settle_ros_start()
-    except LoopbackError as error:
+    except RosStartError as error:
         complain(f"supervisor: {error}")
         return BAD_INPUT
     return run_until_signalled(lambda stop: _work(words, start, stop), program="supervisor")
