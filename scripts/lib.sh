@@ -27,6 +27,21 @@ help_if_asked() {
   done
 }
 
+# refuse_unknown_options ARGUMENT...: end the script with status 2 for an option that the comment at its top does not list.
+# Before anything is built, and by the shell alone. The program behind the script checks values.
+refuse_unknown_options() {
+  local name=${0##*/} known=" " line argument
+  while IFS= read -r line; do
+    if [[ $line =~ ^\ +(--[a-z-]+) ]]; then known+="${BASH_REMATCH[1]} "; fi
+  done < <(usage)
+  for argument; do
+    if [[ $argument == --?* && $known != *" ${argument%%=*} "* ]]; then
+      echo "$name: unknown option $argument. scripts/$name --help lists the options." >&2
+      exit 2
+    fi
+  done
+}
+
 # mauve_ready [SETUP OPTION...]: build what is not built yet (silent when all is up to date) and load the environment.
 # Ends the script on failure.
 mauve_ready() {

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.process import leave_now
 
 SUCCESS, FAILURE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -45,6 +46,7 @@ class Interrupts:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo; returns its exit status."""
+    take_first_steps("demo")
     interrupts = Interrupts()
     # Imported here so that Ctrl-C while modules load is handled already.
     from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
@@ -64,14 +66,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str], interrupts: Interrupts) -> int:
     from mauve_examples.mission.architecture import load_world  # noqa: PLC0415
+    from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
     from mauve_examples.mission.demo_options import parse_options  # noqa: PLC0415
+    from mauve_rt.node.shared.failures import failure_text  # noqa: PLC0415
+    from mauve_rt.node.shared.writable_folder import unwritable  # noqa: PLC0415
 
     options = parse_options(arguments)
     world = load_world(options.map_file, options.names, seed=options.seed)
-    mission = (_simulate if options.simulated_time else _play)(options, world, interrupts)
-    if not mission.started:
-        return INTERRUPTED
-    return _report(options, world, mission, interrupts)
+    if problem := unwritable(options.out):
+        raise BadInputError(
+            f"results folder {options.out}: cannot be written ({problem}). Choose another: --out DIR."
+        )
+    try:
+        mission = (_simulate if options.simulated_time else _play)(options, world, interrupts)
+        if not mission.started:
+            return INTERRUPTED
+        return _report(options, world, mission, interrupts)
+    except BrokenPipeError:
+        raise  # nobody reads what the demo prints
+    except OSError as error:
+        raise MissionError(f"results folder {options.out}: {failure_text(error)}") from error
 
 
 def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
@@ -84,17 +98,19 @@ def _play(options: Any, world: Any, interrupts: Interrupts) -> Any:
     from mauve_examples.mission.demo_errors import BadInputError  # noqa: PLC0415
     from mauve_examples.mission.demo_run import MissionRun  # noqa: PLC0415
     from mauve_examples.mission.progress import open_progress  # noqa: PLC0415
-    from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine  # noqa: PLC0415
+    from mauve_rt.node.shared.ros_start import RosStartError, settle_ros_start  # noqa: PLC0415
 
     interrupts.begin()
     with open_cable(options) as cable:
         try:
-            keep_to_this_machine()
-        except LoopbackError as error:
+            start = settle_ros_start()
+        except RosStartError as error:
             raise BadInputError(str(error)) from None
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=list(start.arguments), signal_handler_options=SignalHandlerOptions.NO)
         try:
             with open_progress() as progress:
+                for remark in start.remarks:
+                    progress.say(f"Warning: {remark}")
                 mission = MissionRun(
                     options, world, progress=progress, interrupted=interrupts.asked, cable=cable
                 )

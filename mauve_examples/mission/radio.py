@@ -7,21 +7,24 @@ Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr
 
 import sys
 
-from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.process import BAD_INPUT, Stop, complain, run_until_signalled
+from mauve_rt.node.shared.ros_start import RosStartError, settle_ros_start
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
+    take_first_steps("radio")
     try:
-        keep_to_this_machine()
-    except LoopbackError as error:
+        start = settle_ros_start()
+    except RosStartError as error:
         complain(f"radio: {error}")
         return BAD_INPUT
-    return run_until_signalled(lambda stop: _work(arguments, stop))
+    words = [*(sys.argv if arguments is None else arguments), *start.arguments]
+    return run_until_signalled(lambda stop: _work(words, stop), program="radio")
 
 
-def _work(arguments: list[str] | None, stop: Stop) -> int:
+def _work(arguments: list[str], stop: Stop) -> int:
     # Imported here: a signal while modules load is handled already, and threads they start block signals too.
     from mauve_examples.mission.radio_node import run_node  # noqa: PLC0415
 

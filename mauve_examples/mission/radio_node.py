@@ -129,7 +129,7 @@ class Radio(Node):
         self._diagnostics.publish(array)
 
 
-def run_node(arguments: list[str] | None, stop: threading.Event) -> int:
+def run_node(arguments: list[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad parameters (one line on stderr)."""
     try:
         sockets = udp_sockets()

@@ -33,9 +33,9 @@ class WorldNode(Node):
             self.create_subscription(RobotBody, topic, bodies.publish, qos_profile_sensor_data, raw=True)
 
 
-def run_node(stop: threading.Event) -> int:
+def run_node(arguments: list[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0."""
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = WorldNode()
     executor = SingleThreadedExecutor()
     executor.add_node(node)

@@ -1,6 +1,7 @@
 """A short-lived ROS node that asks an executor."""
 
 import signal
+import sys
 import threading
 import time
 import uuid
@@ -16,6 +17,8 @@ from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
 from mauve_rt.cli.transport import accounts_in_the_way, by_fast_dds, by_udp
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.discovery import limit_discovery, stays_on_this_machine
+from mauve_rt.node.shared.domain import domain_problem
+from mauve_rt.node.shared.static_peers import resolve_static_peers, unresolved_text
 
 DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another machine
 STARTING_S = 3.0  # where there is no executor at all, one may be starting
@@ -179,7 +182,11 @@ def connected(*, first: bool = False) -> Iterator[Client]:
 
     With `first` - this process has had no ROS context before - it reaches executors of other accounts, too.
     """
+    if problem := domain_problem():
+        raise ParameterError(problem)
     limit_discovery()
+    if unresolved := resolve_static_peers():
+        print(f"mauve: {unresolved_text(unresolved)}", file=sys.stderr)
     is_local = stays_on_this_machine()
     with (
         _interrupts_between_spins(),

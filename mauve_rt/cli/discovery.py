@@ -7,6 +7,7 @@ every participant has a port of those that RTPS defines.
 """
 
 import os
+import resource
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -17,10 +18,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from mauve_rt.cli.transport import by_fast_dds
+from mauve_rt.node.shared.log_folder import NO_LOG_FILES
 
 ANNOUNCED_S = 3.5  # by then every participant has told of itself, to whomever missed it before
 _SPOKEN_S = 0.2  # after which one more participant speaks: an answer comes within 0.11 s
 _MAX_SPEAKERS = 8
+_FILES_OF_PROCESS, _FILES_OF_SPEAKER = 24, 10  # that are open, with some to spare
 _SETTLED_S = 0.15  # endpoints come in a few packets at once
 _FIRST_PORT, _DOMAIN_PORTS, _MAX_PARTICIPANTS = 7410, 250, 120  # of discovery by unicast, in RTPS
 _UDP = Path("/proc/net/udp")
@@ -41,6 +44,7 @@ class Discovery:
     def __init__(self, *, is_local: bool) -> None:
         """`is_local`: it reaches the participants of this machine, by its ports, and nobody else."""
         self.participants: list[Participant] = []
+        self._most_speakers = _most_speakers()
         self._spoken_s = 0.0
         self._seen: object = None
         self._seen_s = time.monotonic()
@@ -74,7 +78,7 @@ class Discovery:
     def hurry(self) -> None:
         """Speak anew, when it is time and somebody is there whom we do not know."""
         is_due = time.monotonic() >= self._spoken_s + _SPOKEN_S
-        if is_due and len(self.participants) < _MAX_SPEAKERS and len(self._known()) < self._count():
+        if is_due and len(self.participants) < self._most_speakers and len(self._known()) < self._count():
             self._speak()
 
     def close(self) -> None:
@@ -87,7 +91,7 @@ class Discovery:
 
     def _speak(self) -> None:
         context = Context()
-        rclpy.init(context=context, args=[])
+        rclpy.init(context=context, args=list(NO_LOG_FILES))  # a short life: nothing to look up later
         name = f"mauve_{os.getpid()}" + (f"_{len(self.participants)}" if self.participants else "")
         node = Node(name, context=context, enable_rosout=False, start_parameter_services=False)
         executor = SingleThreadedExecutor(context=context)
@@ -111,3 +115,11 @@ class Discovery:
         ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
         lines = _UDP.read_text("ascii").splitlines()[1:] if self._can_count else []
         return len({port for line in lines if (port := int(line.split()[1].rpartition(":")[2], 16)) in ports})
+
+
+def _most_speakers() -> int:
+    """As many as the process may open files for, and one at least."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limit == resource.RLIM_INFINITY:
+        return _MAX_SPEAKERS
+    return max(1, min(_MAX_SPEAKERS, (limit - _FILES_OF_PROCESS) // _FILES_OF_SPEAKER))

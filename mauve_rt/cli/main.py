@@ -19,11 +19,14 @@ import mauve_rt
 from mauve_rt.cli.pipe import piped
 from mauve_rt.cli.verb import run
 from mauve_rt.cli.verbs import VERBS
+from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.lean_start import leave_out_unused
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status."""
+    if arguments is None:  # a process of its own
+        take_first_steps("mauve")
     gc.disable()  # short-lived: looking for garbage in what is loaded is a tenth of the work
     leave_out_unused()
     parser = build_parser()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from mauve_rt.cli.pipe import PIPE_CLOSED, piped
 from mauve_rt.errors import MauveError, one_line
+from mauve_rt.node.shared.failures import report_failure
 from mauve_rt.trace.errors import TraceError
 
 OK, REFUSED, BAD_USAGE, NOT_PROVED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -38,11 +39,13 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
 def _run(verb: Verb, args: argparse.Namespace) -> int:
     try:
         return verb.main(args)
-    except MemoryError:
-        print("mauve: there is not enough memory for it", file=sys.stderr)
-        return BAD_USAGE
     except (MauveError, TraceError) as error:
         print(f"mauve: {one_line(str(error))}", file=sys.stderr)
         return BAD_USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
+    except (BrokenPipeError, ImportError):
+        raise  # the reader of the output is gone; the environment is not loaded: whoever called reports it
+    except Exception as error:  # noqa: BLE001 - no traceback reaches the user of a verb
+        report_failure("mauve", error)
+        return BAD_USAGE

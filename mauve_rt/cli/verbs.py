@@ -1,6 +1,7 @@
 """The verbs of `mauve`, each with `add_arguments(parser)` and `main(args) -> exit status`."""
 
 import argparse
+import re
 import sys
 import time
 from typing import Any
@@ -313,7 +314,10 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 
 
 def _absolute(name: str) -> str:
-    return "/" + name.strip("/")
+    absolute = "/" + name.strip("/")
+    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", absolute, re.ASCII):
+        raise argparse.ArgumentTypeError(f"expected a node's name such as /robot_1/executor, found {name}")
+    return absolute
 
 
 VERBS = (

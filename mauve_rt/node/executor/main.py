@@ -15,8 +15,8 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from mauve_rt.node.shared.lean_start import leave_out_unused
-from mauve_rt.node.shared.loopback import LoopbackError, Reach, keep_to_this_machine, reach, udp_sockets
+from mauve_rt.node.shared.first_steps import take_first_steps
+from mauve_rt.node.shared.loopback import Reach, reach, udp_sockets
 from mauve_rt.node.shared.process import (
     BAD_INPUT,
     FAILED,
@@ -26,6 +26,7 @@ from mauve_rt.node.shared.process import (
     leave_now,
     run_until_signalled,
 )
+from mauve_rt.node.shared.ros_start import RosStart, RosStartError, settle_ros_start
 
 SWITCH_INTERVAL_S = 1e-4  # Python components wait at most so long for the interpreter's lock
 _SPIN_S = 0.2  # how long a stop may go unnoticed
@@ -39,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     destroying objects while a component's state still executes is not safe, and libraries' exit handlers were
     seen to hang.
     """
+    take_first_steps("executor")
     words = list(sys.argv if arguments is None else arguments)
     if asks_for_help(words):
         from mauve_rt.node.executor.settings import help_text  # noqa: PLC0415 - takes its time to load
@@ -46,17 +48,16 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         sys.stdout.write(help_text())
         leave_now(0)
     try:
-        keep_to_this_machine()
-    except LoopbackError as error:
+        start = settle_ros_start()
+    except RosStartError as error:
         complain(f"executor: {error}")
         leave_now(BAD_INPUT)
-    leave_out_unused()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.disable()  # all that is loaded stays: looking for garbage in it is a tenth of the start's work
-    leave_now(run_until_signalled(lambda stop: _work(words, stop)))
+    leave_now(run_until_signalled(lambda stop: _work(words, start, stop), program="executor"))
 
 
-def _work(words: list[str], stop: Stop) -> int:
+def _work(words: list[str], start: RosStart, stop: Stop) -> int:
     # Imported here so that a signal while modules load is handled; what takes long comes before begin().
     import mauve_rt.node.executor.node  # noqa: F401, PLC0415
     from mauve_rt.errors import MauveError, error_code  # noqa: PLC0415
@@ -71,21 +72,22 @@ def _work(words: list[str], stop: Stop) -> int:
     except MauveError as error:
         complain(f"executor: {error}")
         return FAILED if error_code(error) == "realtime_denied" else BAD_INPUT
-    return 0 if stop.is_set() else _with_ros(words, runtime, settings, stop)
+    return 0 if stop.is_set() else _with_ros(words, runtime, settings, start, stop)
 
 
-def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Event) -> int:
+def _with_ros(words: list[str], runtime: Any, settings: Any, start: RosStart, stop: threading.Event) -> int:
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
     from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
     from mauve_rt.node.shared.background_console import init_logging_apart, last_lines  # noqa: PLC0415
+    from mauve_rt.node.shared.late_peers import LatePeers  # noqa: PLC0415
     from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
 
     node, discovery, opens_late = None, None, False
     addresses, sockets = usable_addresses(), udp_sockets()
     try:
-        init_logging_apart(words, signal_handler_options=SignalHandlerOptions.NO)
+        init_logging_apart([*words, *start.arguments], signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
         node = ExecutorNode(runtime, namespace=namespace, settings=settings.values)
         discovery = reach(sockets)
@@ -100,10 +102,11 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
         last_lines()
         try_shutdown()
         return BAD_INPUT
-    for remark in settings.remarks:
+    for remark in (*start.remarks, *settings.remarks):
         node.get_logger().warning(remark)
     status = FAILED
     interfaces = NetworkInterfaces(node, node.watch, before=addresses)
+    late_peers = LatePeers(node, node.watch, start.unresolved)
     try:
         if settings.autostart:
             status = _autostart(node, stop, discovery)
@@ -116,6 +119,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, stop: threading.Eve
             status = _spin(node, stop)
     finally:
         interfaces.close()
+        late_peers.close()
         node.close()
         last_lines()
         try_shutdown()

@@ -5,9 +5,10 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Callable, Iterable
 from typing import NoReturn
+
+from mauve_rt.node.shared.failures import report_failure
 
 _GRACE_S = 2.7  # after a signal; then the process ends where it stands, telling where that is
 _DUMP = signal.SIGRTMIN + 1  # shows where every thread is
@@ -36,8 +37,10 @@ class Stop(threading.Event):
         self.set()
 
 
-def run_until_signalled(work: Callable[[Stop], int]) -> int:
+def run_until_signalled(work: Callable[[Stop], int], *, program: str) -> int:
     """Run `work(stop)` on a thread of its own and return its exit status; a signal sets `stop`.
+
+    An exception of the work becomes one line on stderr, which begins with `program`, and status 1.
 
     Signals are SIGINT, SIGTERM, SIGQUIT, SIGUSR1, SIGUSR2 and, unless the parent process has it ignored (as
     nohup), SIGHUP. Every thread blocks them, and the main one waits for them in C++: none is lost or late,
@@ -62,8 +65,8 @@ def run_until_signalled(work: Callable[[Stop], int]) -> int:
             status = work(stop)
         except ImportError as error:
             missing = error
-        except BaseException:  # noqa: BLE001 - a SystemExit too, which would end the thread without a word
-            traceback.print_exc()
+        except BaseException as error:  # noqa: BLE001 - a SystemExit too, which would end the thread without a word
+            report_failure(program, error)
         finally:
             done.set()
             signal.pthread_kill(main_thread, signal.SIGTERM)

@@ -9,13 +9,14 @@ stderr).
 import sys
 from collections.abc import Sequence
 
-from mauve_rt.node.shared.lean_start import leave_out_unused
-from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.process import BAD_INPUT, Stop, asks_for_help, complain, run_until_signalled
+from mauve_rt.node.shared.ros_start import RosStart, RosStartError, settle_ros_start
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until signalled; returns the exit status."""
+    take_first_steps("supervisor")
     words = sys.argv if arguments is None else arguments
     if asks_for_help(words):
         from mauve_rt.node.supervisor.settings import help_text  # noqa: PLC0415 - takes its time to load
@@ -23,20 +24,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(help_text())
         return 0
     try:
-        keep_to_this_machine()
-    except LoopbackError as error:
+        start = settle_ros_start()
+    except RosStartError as error:
         complain(f"supervisor: {error}")
         return BAD_INPUT
-    leave_out_unused()
-    return run_until_signalled(lambda stop: _work(words, stop))
+    return run_until_signalled(lambda stop: _work(words, start, stop), program="supervisor")
 
 
-def _work(arguments: Sequence[str], stop: Stop) -> int:
+def _work(arguments: Sequence[str], start: RosStart, stop: Stop) -> int:
     # Imported here: a signal while modules load is handled already, and threads they start block signals too.
     from mauve_rt.node.supervisor.node import run_node  # noqa: PLC0415
 
     stop.begin()
-    return run_node(arguments, stop)
+    return run_node(arguments, start, stop)
 
 
 if __name__ == "__main__":

@@ -29,9 +29,11 @@ from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
 from mauve_rt.interfaces.outside_feeds import OutsideFeeds
 from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
+from mauve_rt.node.shared.late_peers import LatePeers
 from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses
 from mauve_rt.node.shared.process import BAD_INPUT, complain
+from mauve_rt.node.shared.ros_start import RosStart
 from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.node.supervisor.settings import PARAMETERS, settings_of
@@ -172,12 +174,12 @@ class Supervisor:
         self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
 
 
-def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
+def run_node(arguments: Sequence[str], start: RosStart, stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0, or 2 for bad input (one line on stderr)."""
     try:
         settings, remarks = settings_of(arguments)
         addresses, sockets = usable_addresses(), udp_sockets()
-        init_logging_apart(arguments, signal_handler_options=SignalHandlerOptions.NO)
+        init_logging_apart([*arguments, *start.arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = Node(NODE_NAME, parameter_overrides=list(NO_SIMULATED_TIME))
         declare_settings(node, PARAMETERS, settings)
         discovery = reach(sockets)
@@ -186,13 +188,14 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
         try_shutdown()
         return BAD_INPUT
     executor = SingleThreadedExecutor()
-    interfaces = None
+    interfaces = late_peers = None
     try:
         supervisor = Supervisor(node, RulesFile(settings["rules"]))
         interfaces = NetworkInterfaces(node, supervisor.watch, before=addresses)
+        late_peers = LatePeers(node, supervisor.watch, start.unresolved)
         executor.add_node(node)
         discovery.log(node.get_logger())
-        for remark in remarks:
+        for remark in (*start.remarks, *remarks):
             node.get_logger().warning(remark)
         while not stop.is_set():
             try:
@@ -208,6 +211,8 @@ def run_node(arguments: Sequence[str], stop: threading.Event) -> int:
     finally:
         if interfaces is not None:
             interfaces.close()
+        if late_peers is not None:
+            late_peers.close()
         executor.shutdown()
         node.destroy_node()
         last_lines()

@@ -26,6 +26,13 @@ def test_arguments_of_the_verbs() -> None:
         assert parser.parse_args(words).verb.name == words[0]
 
 
+@pytest.mark.parametrize("name", ["x-y", "robot//executor", "", "1st/executor"])
+def test_a_name_that_no_executor_can_have_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["list", name])
+    assert f"expected a node's name such as /robot_1/executor, found {name}\n" in capsys.readouterr().err
+
+
 def test_a_transaction_s_steps_are_read_from_yaml() -> None:
     text = """
     - {kind: add_resource, target: goal, value: {kind: shared_data, type: geometry_msgs/msg/Point}}

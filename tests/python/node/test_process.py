@@ -17,7 +17,7 @@ from mauve_rt.node.shared.process import leave_now, run_until_signalled
 def work(stop):
     {work}
 
-leave_now(run_until_signalled(work))
+leave_now(run_until_signalled(work, program="node"))
 """
 LOADS_FOR_GOOD = "print('ready', flush=True); threading.Event().wait()"
 ENDS_IN_ORDER = "stop.begin(); print('ready', flush=True); stop.wait(); print('sealed'); return 0"

@@ -90,6 +90,17 @@ def test_help_tells_every_option_of_the_program_behind(name: str, command: list[
         assert set(choices.split(",")) <= set(of_script.stdout.split())
 
 
+@pytest.mark.parametrize("name", ["demo", "figures", "bench"])
+def test_an_unknown_option_is_refused_before_anything_is_built(name: str, tmp_path: Path):
+    shutil.copytree(SCRIPTS, tmp_path / "clone" / "scripts", ignore=shutil.ignore_patterns("__pycache__"))
+    done = subprocess.run(
+        [tmp_path / "clone" / "scripts" / name, "--nosuch=1"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"{name}: unknown option --nosuch=1. scripts/{name} --help lists the options.\n"
+    assert [path.name for path in (tmp_path / "clone").iterdir()] == ["scripts"]
+
+
 # ---- system packages ------------------------------------------------------------------------------------
 
 
