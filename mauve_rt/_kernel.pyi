@@ -803,6 +803,9 @@ END_SIGNALS: set[int]
 STOP_TIMEOUT_NS: int
 """How long a state may go on after a stop of all components, before its component is given up."""
 
+def process_ends() -> bool:
+    """Whether one of END_SIGNALS came: nothing is deployed any more."""
+
 def wait_end_signal(*, grace_ns: int, dump_signal: int = 0) -> int:
     """Sleep until one of END_SIGNALS comes, which all threads have to block; returns it.
 

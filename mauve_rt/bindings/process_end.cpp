@@ -12,6 +12,7 @@ namespace mauve::bindings {
 void bind_process_end(py::module_& module) {
   module.attr("END_SIGNALS") = py::cast(std::set<int>(kEndSignals.begin(), kEndSignals.end()));
   module.attr("STOP_TIMEOUT_NS") = Deployer::kStopTimeout;
+  module.def("process_ends", &Deployer::all_ended, py::call_guard<py::gil_scoped_release>());
   module.def(
       "wait_end_signal",
       [](time_ns_t grace_ns, int dump_signal) {

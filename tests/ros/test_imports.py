@@ -46,6 +46,17 @@ FORBIDDEN = {
     ("stop", NODE, "counter"): HEAVY,
 }
 
+STARTED = "components are started"
+TELL_THE_START = f"""\
+import sys
+from mauve_rt._kernel import Deployer
+deploy = Deployer.deploy
+def deploy_and_tell(self):
+    deploy(self)
+    sys.stderr.write("{STARTED}\\n")
+Deployer.deploy = deploy_and_tell
+"""
+
 
 def modules(log: str) -> set[str]:
     """The modules in what `python -X importtime` wrote."""
@@ -61,8 +72,13 @@ def loaded(log: str) -> set[str]:
 
 
 @pytest.fixture
-def traced(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every Python started from here on tells what it loads."""
+def traced(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Every Python started from here on tells what it loads, and when components were started.
+
+    The executor's own log is written by a thread of its own, later than what it tells of.
+    """
+    (tmp_path / "sitecustomize.py").write_text(TELL_THE_START, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setenv("PYTHONPROFILEIMPORTTIME", "1")
 
 
@@ -74,7 +90,7 @@ def log_until_active(executor: Any, graph: Any) -> tuple[str, str]:
 
     graph.spin_until(lambda: state() == State.PRIMARY_STATE_ACTIVE, "active")
     assert executor.end(signal.SIGINT)[0] == 0
-    before, started, after = executor.output.partition("activated: ")
+    before, started, after = executor.output.partition(STARTED)
     assert started
     return before, after
 

@@ -144,6 +144,12 @@ void Deployer::end() noexcept {
   shut_down(true);
 }
 
+bool Deployer::all_ended() noexcept {
+  Living& all = living();
+  const std::lock_guard lock(all.mutex);
+  return all.has_ended;
+}
+
 void Deployer::end_all() noexcept {
   Living& all = living();
   const std::lock_guard lock(all.mutex);

@@ -10,7 +10,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mauve_rt._bridge import NodeWatch
-from mauve_rt._kernel import STOP_TIMEOUT_NS
+from mauve_rt._kernel import STOP_TIMEOUT_NS, process_ends
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
@@ -228,7 +228,12 @@ class ExecutorNode(LifecycleNode):
 
     def _activate(self) -> None:
         with self._starting_or_ending:
-            self._runtime.activate()
+            try:
+                self._runtime.activate()
+            except MauveError:
+                if not process_ends():
+                    raise
+                return  # a signal came in between: nothing runs, and the node closes next
             self._bound.start()
             self._rules.start()  # first, so that ~/state names them from the first time on
             self._state.start(self._runtime.host)

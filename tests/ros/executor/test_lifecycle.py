@@ -16,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from mauve_msgs.msg import ArchitectureState
 from mauve_msgs.srv import ListComponents
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.errors import PluginError
 from mauve_rt.model import ArchitectureModel, load_architecture
 from mauve_rt.node.executor.node import ExecutorNode
 
@@ -117,3 +118,20 @@ def test_a_cleanup_that_is_refused_closes_nothing(architecture: Path, graph: Any
         assert runtime.host.write_resource("set", NUMBER)  # what the state waits for
         graph.spin_until(lambda: not runtime.busy(), "its end")
         assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_signal_during_the_activation_is_no_error(
+    architecture: Path, ros: None, monkeypatch: pytest.MonkeyPatch, *, ends: bool
+) -> None:
+    def refuse(_self: Runtime) -> None:
+        raise PluginError("the process ends")  # any error of the kernel
+
+    monkeypatch.setattr(Runtime, "activate", refuse)
+    monkeypatch.setattr("mauve_rt.node.executor.node.process_ends", lambda: ends)
+    runtime = Runtime(lambda: load_architecture(architecture))
+    with contextlib.closing(ExecutorNode(runtime, namespace="/robot_1")) as node:
+        assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        expected = TransitionCallbackReturn.SUCCESS if ends else TransitionCallbackReturn.FAILURE
+        assert node.trigger_activate() == expected
+        assert node._state.error == ("" if ends else "the process ends")

@@ -39,6 +39,8 @@ class Deployer final : public Host {
   void end() noexcept;
   /// end() of every deployer of the process, those to come included. [non-rt]
   static void end_all() noexcept;
+  /// Whether end_all() was called: nothing is deployed any more. [non-rt]
+  static bool all_ended() noexcept;
 
   const RealtimeStatus& realtime_status() const noexcept override { return process_.status(); }
   const Clock& clock() const noexcept override { return MonotonicClock::instance(); }
