@@ -3,7 +3,7 @@
     ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office link_loss_at:=20 link_back_at:=45
 
 Arguments are the options of the demo (`scripts/demo --help`), which runs the same mission with an end, a
-report and a verdict. Robots start at once; times are seconds after the launch.
+report and a verdict. Robots start at once; times are seconds after all have met, as in the demo.
 """
 
 import json
@@ -11,11 +11,9 @@ import json
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import (
     DeclareLaunchArgument,
-    ExecuteProcess,
     GroupAction,
     IncludeLaunchDescription,
     OpaqueFunction,
-    TimerAction,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
@@ -71,10 +69,16 @@ def _mission(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     options = parse_options([f"--duration={_UNTIL_CTRL_C_S}", *words])
     world = load_world(options.map_file, options.names, seed=options.seed)
     setups = write_setups(world, options.out, seed=options.seed, supervisor=options.supervisor)
+    times = (
+        {}
+        if link_stays
+        else {"link_loss_at_s": options.link_loss_at_s, "link_back_at_s": options.link_back_at_s}
+    )
+    parameters = {"robots": options.names, "drop_share": options.drop_share, "seed": options.seed}
     radio = Node(
         package="mauve_examples",
         executable="radio",
-        parameters=[{"robots": options.names, "drop_share": options.drop_share, "seed": options.seed}],
+        parameters=[parameters | {name: float(at_s) for name, at_s in times.items() if at_s is not None}],
         output="screen",
     )
     robots = [
@@ -86,8 +90,7 @@ def _mission(context: LaunchContext) -> list[LaunchDescriptionEntity]:
         )
         for setup in setups
     ]
-    changes = () if link_stays else ((options.link_loss_at_s, "false"), (options.link_back_at_s, "true"))
-    return [radio, *robots, *(_set_link(at_s, up) for at_s, up in changes if at_s is not None)]
+    return [radio, *robots]
 
 
 def _robot(**arguments: str) -> LaunchDescriptionEntity:
@@ -95,9 +98,3 @@ def _robot(**arguments: str) -> LaunchDescriptionEntity:
     file = PathJoinSubstitution([FindPackageShare("mauve_rt"), "launch", "executor.launch.py"])
     source = PythonLaunchDescriptionSource(file)
     return GroupAction([IncludeLaunchDescription(source, launch_arguments=arguments.items())])
-
-
-def _set_link(at_s: float, up: str) -> LaunchDescriptionEntity:
-    service = ["/radio/set_link", "std_srvs/srv/SetBool", f"{{data: {up}}}"]
-    call = ExecuteProcess(cmd=["ros2", "service", "call", *service], output="log")
-    return TimerAction(period=at_s, actions=[call])

@@ -3,8 +3,9 @@
 It forwards /robot_i/radio/out to every other /robot_j/radio/in as the bytes they are. `~/set_link`
 (std_srvs/SetBool) cuts and restores the link, `~/link` (std_msgs/Bool, transient local) tells which; the
 parameter `drop_share` may be changed at any time, `seed` makes losses repeatable. `~/connected` (transient
-local) is true once every robot both speaks and listens here. What was forwarded and dropped is on
-/diagnostics, once a second.
+local) is true once every robot both speaks and listens here. From then on the parameters `link_loss_at_s`
+and `link_back_at_s` count: seconds after which the link is lost and back (0: never). What was forwarded and
+dropped is on /diagnostics, once a second.
 """
 
 import threading
@@ -28,7 +29,12 @@ from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 
 DEPTH = 50
+FIXED = ("robots", "seed", "link_loss_at_s", "link_back_at_s")
 CONNECTION_CHECK_S = 0.1
+PLANNED = (
+    ("link_loss_at_s", "seconds after all have met until the link is lost; 0: never", False),
+    ("link_back_at_s", "seconds after all have met until the link is back; 0: never", True),
+)
 SPIN_S = 0.2  # how long a stop may go unnoticed
 
 
@@ -52,6 +58,10 @@ class Radio(Node):
             ),
         ).value
         seed = self.declare_parameter("seed", 1).value
+        self._changes = [
+            (self.declare_parameter(name, 0.0, ParameterDescriptor(description=words)).value, up)
+            for name, words, up in PLANNED
+        ]
         if not robots or len(set(robots)) != len(robots):
             raise ValueError(
                 "parameter 'robots' must name every robot once: -p robots:=\"[robot_1,robot_2]\""
@@ -90,18 +100,35 @@ class Radio(Node):
         return forward
 
     def _set_link(self, request: Any, response: Any) -> Any:
-        self._medium.link_up = request.data
-        self._link.publish(Bool(data=request.data))
-        response.success = True
-        response.message = "link up" if request.data else "link down"
-        self.get_logger().info(f"{response.message}; {self._medium.counts}")
+        response.success, response.message = True, self._switch(up=request.data)
         return response
+
+    def _switch(self, *, up: bool) -> str:
+        self._medium.link_up = up
+        self._link.publish(Bool(data=up))
+        words = "link up" if up else "link down"
+        self.get_logger().info(f"{words}; {self._medium.counts}")
+        return words
+
+    def _plan_changes(self) -> None:
+        """All have met for the first time: the link changes so long after it."""
+        for at_s, up in self._changes:
+            if at_s > 0.0:
+                self._plan_change(at_s, up)
+        self._changes = []
+
+    def _plan_change(self, at_s: float, up: bool) -> None:  # noqa: FBT001 - one caller
+        def change() -> None:
+            timer.cancel()
+            self._switch(up=up)
+
+        timer = self.create_timer(at_s, change)
 
     def _set_parameters(self, parameters: list[Any]) -> Any:
         for parameter in parameters:
             if parameter.name == "drop_share":
                 self._medium.drop_share = float(parameter.value)
-            elif parameter.name in ("robots", "seed"):
+            elif parameter.name in FIXED:
                 return SetParametersResult(successful=False, reason=f"{parameter.name} is fixed once it runs")
         return SetParametersResult(successful=True)
 
@@ -115,6 +142,8 @@ class Radio(Node):
         if (listened and spoken) != self._was_connected:
             self._was_connected = listened and spoken
             self._connected.publish(Bool(data=self._was_connected))
+            if self._was_connected:
+                self._plan_changes()
 
     def _publish_counts(self) -> None:
         counts = self._medium.counts

@@ -69,7 +69,8 @@ def fault_problem(file: YamlFile, fault: Fault) -> Problem:
         return file.problem(location, what, expected=fault.limit, **facts)
     if fault.what == "missing":
         what = f"{_subject(location)} has no '{fault.limit}'"
-        return file.problem(location, what, remedy="add it", **facts)
+        remedy = "write `mauve: 1` at its top" if fault.limit == "mauve" else "add it"
+        return file.problem(location, what, remedy=remedy, **facts)
     if fault.what == "name":
         what = f"bad name '{name}'{within}"
         return file.key_problem(location, what, expected=expected(fault), **facts)

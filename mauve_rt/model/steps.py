@@ -143,7 +143,8 @@ def _problem(file: YamlFile, fault: Fault) -> Problem:
         remedy = did_you_mean(str(location[-1]), fault.known)
         return file.key_problem(location, f"{element} is no known condition", remedy=remedy)
     if fault.what == "missing":
-        return file.problem(location, f"{dotted((*location, fault.limit))} is missing")
+        remedy = "write `mauve: 1` at its top" if fault.limit == "mauve" else ""
+        return file.problem(location, f"{dotted((*location, fault.limit))} is missing", remedy=remedy)
     if fault.what == "unknown":
         remedy = did_you_mean(str(location[-1]), fault.known)
         return file.key_problem(location, f"{element} is no known key", remedy=remedy)

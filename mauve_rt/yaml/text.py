@@ -124,7 +124,10 @@ def _syntax_error(error: Any) -> YamlError:
     problem = error.problem or ""
     reasons = (error.context, problem) if problem.startswith("but ") else (problem,)
     reason = " ".join(reason for reason in reasons if reason) or "bad syntax"
-    return YamlError(f"not YAML: {reason}", (mark.line + 1, mark.column + 1) if mark else (1, 1))
+    remedy = "indent by spaces: YAML takes no tabs there" if "'\\t'" in reason else ""
+    return YamlError(
+        f"not YAML: {reason}", (mark.line + 1, mark.column + 1) if mark else (1, 1), remedy=remedy
+    )
 
 
 class _Composer:

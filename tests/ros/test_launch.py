@@ -5,7 +5,6 @@ tests/python/node/test_launch_files.py reads them anywhere.
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -174,8 +173,6 @@ def test_a_mission_that_cannot_be_starts_nothing(launch: Callable[..., Launched]
 def test_the_mission_loses_its_link_and_gets_it_back(
     launch: Callable[..., Launched], graph: Any, tmp_path: Path
 ) -> None:
-    if shutil.which("ros2") is None:
-        pytest.skip("`ros2`, which cuts the link, is not on PATH")
     arguments = ("map:=room", "link_loss_at:=2.0", "link_back_at:=2.5", f"out:={tmp_path / 'out'}")
     launched = launch("mauve_examples", "exploration.launch.py", *arguments)
     links = graph.hear(Bool, "/radio/link", LATCHED)

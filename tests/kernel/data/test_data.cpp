@@ -24,6 +24,14 @@ MAUVE_TYPE(mauve::testing::Outer, "test_msgs/msg/Outer", name, number, items, by
 namespace mauve::testing {
 namespace {
 
+TEST(Bounded, TextIsTakenAsStandardStringsTakeIt) {
+  BoundedVector<BoundedString<8>, 2> names;
+  EXPECT_TRUE(names.push_back("x"));
+  EXPECT_TRUE(names.push_back(std::string_view("y")));
+  EXPECT_EQ("x", names[0]);
+  EXPECT_EQ("y", names[1]);
+}
+
 TEST(Cdr, MatchesTheWireFormatByteForByte) {
   Outer outer;
   outer.name.assign("ab");

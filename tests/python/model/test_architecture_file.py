@@ -67,7 +67,11 @@ def test_all_problems_are_told_in_the_order_of_the_file(tmp_path: Path, plugin_p
         ("mauve: 1\n".encode("utf-16"), ":1:1: not text in UTF-8"),
         (b"mauve: 1\n\0", ":2:1: not YAML: the character U+0000 is not allowed"),
         (b"mauve: 1\n---\nmauve: 1\n", ":2:1: not YAML: expected a single document"),
-        (b"a: &a [*a]\n", "the file has no 'mauve'"),
+        (b"a: &a [*a]\n", "the file has no 'mauve'; write `mauve: 1` at its top"),
+        (
+            b"mauve: 1\ncomponents:\n\tx: {}\n",
+            ":3:1: not YAML: found character '\\t' that cannot start any token; indent",
+        ),
         (
             b"a: &a [1,1,1,1,1,1,1,1,1]\n"
             + b"".join(b"%c: &%c [%s]\n" % (c, c, b",".join([b"*%c" % (c - 1)] * 9)) for c in b"bcdefgh"),

@@ -55,6 +55,7 @@ class BoundedString {
  public:
   BoundedString() = default;
   BoundedString(std::string_view text) MAUVE_RT { assign(text); }  // NOLINT: implicit like std::string
+  BoundedString(const char* text) MAUVE_RT { assign(text); }       // NOLINT: likewise, where one is expected
   static constexpr std::size_t capacity() MAUVE_RT { return N; }
   /// Takes the text; false (and cut to N) when it is longer.
   bool assign(std::string_view text) MAUVE_RT {
