@@ -518,6 +518,8 @@ class Transaction:
         """
     def start(self, component: str, clock_ns: int | None = None) -> Transaction: ...
     def stop(self, component: str) -> Transaction: ...
+    def by(self, author: str) -> Transaction:
+        """Who makes the change, for Architecture.authors(); empty: the program itself."""
     def resynchronise(self) -> Transaction:
         """A new common epoch, 20 ms after the commit.
 
@@ -600,6 +602,13 @@ class Architecture:
         """Its address, for other native modules."""
     def describe(self) -> ArchitectureDescription:
         """Components, implementations, wiring, properties, states, grids and resources, as of one moment."""
+    def authors(self) -> list[tuple[str, str, str]]:
+        """(target, element, author) of what was changed since the file or program made it.
+
+        element: core, fsm, shell, state, "property NAME", "port NAME"; empty: the target itself.
+        """
+    def note_author(self, target: str, element: str, author: str) -> None:
+        """Of a change that was made without a transaction."""
     def revision(self) -> int:
         """Grows with every committed change and every start, stop and fault; never 0."""
     def threads_left_behind(self) -> int:
@@ -886,6 +895,7 @@ class RuleSpec:
         priority: int = 0,
         about: Sequence[str] = [],
         otherwise_after_ns: int | None = None,
+        takes_over: bool = False,
     ) -> None: ...
 
 @final
@@ -981,6 +991,8 @@ class RuleEngine:
         """Whether all that the rule is about is there and runs."""
     def set_in_place(self, rule: int, act: str, in_place: bool, now_ns: int) -> None:
         """Whether what the act would do is in effect."""
+    def set_own(self, rule: int, is_own: bool) -> None:
+        """Whether what its do would do is in effect by a rule; it is until the opposite is said."""
     def set_ready(self, rule: int, act: str, ready: bool) -> None:
         """Whether the act could begin at once."""
     def adopt(self, rule: int, now_ns: int) -> None:

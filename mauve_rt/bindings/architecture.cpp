@@ -141,6 +141,18 @@ void bind_architecture(py::module_& module) {
           Unlocked())
       .def(
           "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked())
+      .def("authors",
+           [](PyArchitecture& self) {
+             std::vector<std::tuple<std::string, std::string, std::string>> found;
+             for (const Authored& one : self.architecture.authors())
+               found.emplace_back(one.target, one.element, one.author);
+             return found;
+           })
+      .def(
+          "note_author",
+          [](PyArchitecture& self, const std::string& target, const std::string& element,
+             const std::string& author) { self.architecture.note_author(target, element, author); },
+          py::arg("target"), py::arg("element"), py::arg("author"))
       .def("revision", [](PyArchitecture& self) { return self.architecture.revision(); })
       .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
       .def("threads_left_behind",

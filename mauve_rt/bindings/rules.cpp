@@ -85,14 +85,16 @@ void bind_rules_of_an_engine(py::module_& module) {
   py::class_<rules::Rule>(module, "RuleSpec")
       .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes,
                        time_ns_t undo_for_ns, time_ns_t cooldown_ns, std::int64_t priority,
-                       std::vector<std::string> about, std::optional<time_ns_t> otherwise_after_ns) {
-             return rules::Rule{std::move(name), std::move(when),  for_ns,
-                                undoes,          undo_for_ns,      cooldown_ns,
-                                priority,        std::move(about), otherwise_after_ns};
+                       std::vector<std::string> about, std::optional<time_ns_t> otherwise_after_ns,
+                       bool takes_over) {
+             return rules::Rule{std::move(name),    std::move(when), for_ns,   undoes,
+                                undo_for_ns,        cooldown_ns,     priority, std::move(about),
+                                otherwise_after_ns, takes_over};
            }),
            py::arg("name"), py::arg("when"), py::kw_only(), py::arg("for_ns") = 0, py::arg("undoes") = false,
            py::arg("undo_for_ns") = 0, py::arg("cooldown_ns") = 0, py::arg("priority") = 0,
-           py::arg("about") = std::vector<std::string>{}, py::arg("otherwise_after_ns") = std::nullopt);
+           py::arg("about") = std::vector<std::string>{}, py::arg("otherwise_after_ns") = std::nullopt,
+           py::arg("takes_over") = false);
   py::class_<rules::SignalSpec>(module, "SignalSpec")
       .def_property_readonly(
           "kind",
@@ -167,6 +169,12 @@ void bind_engine(py::module_& module) {
             self.engine.set_in_place(self.rule(rule), act_of(act), in_place, now_ns);
           },
           py::arg("rule"), py::arg("act"), py::arg("in_place"), py::arg("now_ns"))
+      .def(
+          "set_own",
+          [](PyRuleEngine& self, std::size_t rule, bool is_own) {
+            self.engine.set_own(self.rule(rule), is_own);
+          },
+          py::arg("rule"), py::arg("is_own"))
       .def(
           "set_ready",
           [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool ready) {

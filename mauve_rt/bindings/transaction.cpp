@@ -128,7 +128,8 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
       .def("start", collected(&Transaction::start), py::arg("component"), py::arg("clock_ns") = std::nullopt)
       .def("stop", collected(&Transaction::stop), py::arg("component"))
       .def("configure", collected(&Transaction::configure), py::arg("component"))
-      .def("resynchronise", collected(&Transaction::resynchronise));
+      .def("resynchronise", collected(&Transaction::resynchronise))
+      .def("by", collected(&Transaction::by), py::arg("author"));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 """What `mauve list` prints: what runs, which cores, what is connected; three tables that 80 columns hold."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rich import box
@@ -18,11 +18,13 @@ _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_m
 
 
 def print_components(reply: Any, out: Console | None = None) -> None:
-    """A ListComponents reply: its tables, faults, states that last, and what is missing for real time."""
+    """A ListComponents reply: tables, authors of changes, faults, states that last, what real time lacks."""
     out = out or console()
     for table in (_components(reply), _cores(reply), _connections(reply)):
         if table.row_count:
             out.print(table)
+    for name, element, author in _authors(reply):
+        out.print(f"[bold]{name}[/]: {escape(element)} by {escape(author)}", soft_wrap=True)
     for component in reply.components:
         if component.fault:
             out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
@@ -37,6 +39,17 @@ def print_components(reply: Any, out: Console | None = None) -> None:
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")
+
+
+def _authors(reply: Any) -> Iterator[tuple[str, str, str]]:
+    """(component or resource, element, author) of what was changed since the file."""
+    for component in reply.components:
+        for text in component.authors:
+            element, _, author = text.partition("=")
+            yield component.name, element, author
+    for resource in reply.resources:
+        if resource.author:
+            yield resource.name, "resource", resource.author
 
 
 def _components(reply: Any) -> Table:

@@ -205,6 +205,7 @@ class Control:
 
     def _commit(self, plan: Plan, request: Request, *, kernel_revision: int) -> Committed:
         try:
+            plan.transaction.by(request.author)
             return self._runtime.host.make(
                 plan.transaction,
                 dry_run=request.dry_run,
@@ -264,6 +265,7 @@ class Control:
         else:
             self._runtime.host.start(step.target, request.clock_ns or None)
             message = f"component '{step.target}' is started"
+        self._runtime.architecture.note_author(step.target, "state", request.author)
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 
 

@@ -60,6 +60,9 @@ class RefusalError(Exception):
         self.code = code
 
 
+BY_RULE = "rule "  # how the author begins of what a rule does
+
+
 @dataclass(frozen=True, kw_only=True)
 class RecordingOrder:
     """Start to record, or stop; as mauve_msgs/srv/StartRecording."""
@@ -85,6 +88,7 @@ class Request:
     expected_revision: int = 0
     requested_by: str = ""
     cause: str = ""
+    rule: str = ""  # whose action it is
     dry_run: bool = False
     timeout_s: float = 0.0  # 0: the default
     force: bool = (
@@ -103,9 +107,17 @@ class Request:
         """Whether it is carried out without a transaction, beside whatever else there is."""
         return len(self.steps) == 1 and self.steps[0].kind in ("start", "stop") and not self.dry_run
 
+    @property
+    def author(self) -> str:
+        """Who makes the change, for `mauve list` and for rules that look whether they did it."""
+        if self.rule:
+            return f"{BY_RULE}{self.rule}"
+        who = self.requested_by or "a request"
+        return cut(f"{who}: {self.cause}" if self.cause else who, SHOWN_STEP)
+
     def texts(self) -> Iterator[str]:
         """All that is of no fixed size."""
-        yield from (self.request_id, self.requested_by, self.cause)
+        yield from (self.request_id, self.requested_by, self.cause, self.rule)
         for step in self.steps:
             yield from (step.kind, step.target, step.name, step.value)
         if self.recording is not None:

@@ -269,6 +269,14 @@ class Runtime:
         architecture = self._architecture
         return architecture.resources() if architecture is not None else []
 
+    def authors(self) -> dict[str, dict[str, str]]:
+        """Who changed what since the file, by target and element. From any thread."""
+        architecture = self._architecture
+        found: dict[str, dict[str, str]] = {}
+        for target, element, author in architecture.authors() if architecture is not None else ():
+            found.setdefault(target, {})[element] = author
+        return found
+
     def kernel_revision(self) -> int:
         """The kernel's own count of changes, by which a commit tells whether there was one meanwhile."""
         architecture = self._architecture

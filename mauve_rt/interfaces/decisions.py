@@ -19,10 +19,18 @@ STATES = {
 def architecture_view(state: Any) -> ArchitectureView:
     """Of a mauve_msgs/msg/ArchitectureState."""
     components = {
-        status.name: ComponentView(STATES.get(status.state, str(status.state)), status.core)
+        status.name: ComponentView(
+            STATES.get(status.state, str(status.state)), status.core, _authors(status.authors)
+        )
         for status in state.components
     }
     return ArchitectureView(state.instance_id, state.revision, components, frozenset(state.rules))
+
+
+def _authors(told: Iterable[str]) -> dict[str, str]:
+    """By element, of the texts ELEMENT=AUTHOR."""
+    parts = (text.partition("=") for text in told)
+    return {"" if element == "component" else element: author for element, _, author in parts}
 
 
 def outcome_of(reply: Any) -> Outcome:

@@ -1,6 +1,6 @@
 """The executor's values as messages of mauve_msgs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mauve_msgs.msg import (
@@ -26,8 +26,10 @@ _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.
 _MAX_PRIORITY = 255
 
 
-def component_info(component: ComponentDescription, *, alternatives: list[str]) -> Any:
-    """ComponentInfo; `alternatives` are the cores it takes beside the present one."""
+def component_info(
+    component: ComponentDescription, *, alternatives: list[str], authors: Mapping[str, str]
+) -> Any:
+    """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element."""
     return ComponentInfo(
         name=component.name,
         shell=component.shell,
@@ -53,7 +55,12 @@ def component_info(component: ComponentDescription, *, alternatives: list[str]) 
         deadline_ns=component.deadline_ns,
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
+        authors=_authored(authors),
     )
+
+
+def _authored(authors: Mapping[str, str]) -> list[str]:
+    return [f"{element or 'component'}={author}" for element, author in authors.items()]
 
 
 def _state_info(state: DescribedState) -> Any:
@@ -74,14 +81,27 @@ def _state_age(component: ComponentDescription) -> dict[str, Any]:
 
 def component_infos(runtime: Runtime) -> list[Any]:
     """ComponentInfo of every component."""
-    return [component_info(part, alternatives=runtime.cores_of(part)) for part in runtime.components()]
+    return _component_infos(runtime, runtime.components())
+
+
+def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription]) -> list[Any]:
+    authors = runtime.authors()
+    return [
+        component_info(part, alternatives=runtime.cores_of(part), authors=authors.get(part.name, {}))
+        for part in components
+    ]
 
 
 def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, str]]) -> list[Any]:
     """ResourceInfo of every resource; `bindings`: ROS names by resource and field."""
+    authors = runtime.authors()
     return [
         ResourceInfo(
-            name=resource.name, kind=resource.kind, type=resource.type, **bindings.get(resource.name, {})
+            name=resource.name,
+            kind=resource.kind,
+            type=resource.type,
+            author=authors.get(resource.name, {}).get("", ""),
+            **bindings.get(resource.name, {}),
         )
         for resource in runtime.described_resources()
     ]
@@ -91,9 +111,7 @@ def trace_architecture(runtime: Runtime, observed: Observed) -> Any:
     """TraceArchitecture as it was observed."""
     return TraceArchitecture(
         epoch_ns=runtime.deployment_epoch_ns(),
-        components=[
-            component_info(part, alternatives=runtime.cores_of(part)) for part in observed.components
-        ],
+        components=_component_infos(runtime, observed.components),
     )
 
 
@@ -112,6 +130,7 @@ def architecture_state(
 
     `error`: why the last lifecycle transition failed; `rules`: that the executor runs.
     """
+    authors = runtime.authors()
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
@@ -123,6 +142,7 @@ def architecture_state(
                 state=getattr(ComponentInfo, component.state),
                 core=component.core,
                 fault=component.fault,
+                authors=_authored(authors.get(component.name, {})),
                 **_state_age(component),
             )
             for component in observed.components

@@ -37,6 +37,12 @@ class StepKind:
         """Whether it adds, removes or wires something: such changes are committed one after the other."""
         return self.removes or self.target.startswith("new") or self.name in ("shell", "port")
 
+    def element(self, name: str) -> str:
+        """What of its target a step with that name sets, as in Architecture.authors()."""
+        if self.name:
+            return f"{self.name} {name}" if self.name in ("property", "port") else self.name
+        return "state" if self.leaves else ""
+
     @property
     def is_about_resource(self) -> bool:
         """Whether its target is a resource."""

@@ -10,6 +10,8 @@ namespace mauve::rules {
 
 namespace {
 
+constexpr std::string_view kByRule = "rule ";
+
 Ended how_ended(ErrorCode code) noexcept {
   switch (code) {
     case ErrorCode::wrong_revision:
@@ -45,8 +47,8 @@ bool can_be_prepared(const ActionSteps& steps) {
 
 /// Their transaction, prepared; nullptr: they cannot be, and were tried. Throws Error: they would be refused.
 std::unique_ptr<PreparedTransaction> try_steps(const ActionSteps& steps, TransactionOptions options,
-                                               Host& host) {
-  if (can_be_prepared(steps)) return host.prepare(make_transaction(steps), options);
+                                               Host& host, const std::string& rule) {
+  if (can_be_prepared(steps)) return host.prepare(make_transaction(steps, rule), options);
   options.dry_run = true;
   host.make(make_transaction(steps), options);
   return nullptr;
@@ -54,15 +56,31 @@ std::unique_ptr<PreparedTransaction> try_steps(const ActionSteps& steps, Transac
 
 }  // namespace
 
-Transaction make_transaction(const ActionSteps& steps) {
+std::string rule_author(const std::string& rule) { return rule.empty() ? "" : std::string(kByRule) + rule; }
+
+bool is_by_rules(const ActionSteps& steps, const std::vector<Authored>& authors) {
+  const Transaction transaction = make_transaction(steps);
+  return std::all_of(transaction.steps().begin(), transaction.steps().end(), [&](const auto& step) {
+    return step->is_for_all() || std::any_of(authors.begin(), authors.end(), [&](const Authored& one) {
+             return one.target == step->target && one.element == step->element() &&
+                    one.author.starts_with(kByRule);
+           });
+  });
+}
+
+Transaction make_transaction(const ActionSteps& steps, const std::string& rule) {
   Transaction transaction;
+  transaction.by(rule_author(rule));
   for (const ActionStep& step : steps)
     transaction.add(step.kind, step.target, step.name, step.value ? StepValue(*step.value) : StepValue());
   return transaction;
 }
 
-Action::Action(ActionSteps steps, const TransactionOptions& options)
-    : steps_(std::move(steps)), options_(options), is_preparable_(can_be_prepared(steps_)) {}
+Action::Action(ActionSteps steps, const TransactionOptions& options, std::string rule)
+    : steps_(std::move(steps)),
+      options_(options),
+      rule_(std::move(rule)),
+      is_preparable_(can_be_prepared(steps_)) {}
 
 // ---- the preparation thread
 
@@ -79,7 +97,7 @@ bool Action::prepare(Host& host, std::uint64_t revision) {
   tried_at_ = revision;
   try {
     problem_.clear();
-    prepared_ = try_steps(steps_, options_, host);
+    prepared_ = try_steps(steps_, options_, host, rule_);
     stage_.store(Stage::ready, std::memory_order_release);
     return true;
   } catch (const std::exception& failure) {
@@ -93,7 +111,7 @@ void Action::try_after(const ActionSteps& before, Host& host) {
   both.insert(both.end(), steps_.begin(), steps_.end());
   try {
     problem_.clear();
-    try_steps(both, options_, host);
+    try_steps(both, options_, host, rule_);
   } catch (const std::exception& failure) {
     problem_ = failure.what();
   }
@@ -137,7 +155,7 @@ void Action::carry_out(Host& host) {
   report_.emplace();
   how_ = Ended::refused;
   try {
-    committed_ = host.make(make_transaction(steps_), options_);
+    committed_ = host.make(make_transaction(steps_, rule_), options_);
     how_ = Ended::done;
   } catch (const Error& failure) {
     how_ = how_ended(failure.code());

@@ -48,12 +48,13 @@ struct Engine::Life {
   bool armed{false};
   bool in_effect{false};
   bool changed_by_another{false};
-  std::optional<Act> under_way{};                     // do or undo
-  Look begun{};                                       // the condition, as the last action began
-  bool gives_way{false};                              // that is to be called off
-  bool acts_soon{false};                              // `do` is due, and what keeps it from it passes
-  bool otherwise_begun{false};                        // since the condition has held
-  std::optional<time_ns_t> waits_since_ns{};          // since when `do` may be done and is not in effect
+  bool is_own{true};                          // what its `do` would do is there by a rule, if it is there
+  std::optional<Act> under_way{};             // do or undo
+  Look begun{};                               // the condition, as the last action began
+  bool gives_way{false};                      // that is to be called off
+  bool acts_soon{false};                      // `do` is due, and what keeps it from it passes
+  bool otherwise_begun{false};                // since the condition has held
+  std::optional<time_ns_t> waits_since_ns{};  // since when `do` may be done and is not in effect
   std::array<std::optional<bool>, kActs> in_place{};  // by Act; empty: nobody knows
   std::array<bool, kActs> ready{true, true, true};
   time_ns_t not_before_ns{INT64_MIN};
@@ -65,6 +66,8 @@ struct Engine::Life {
   time_ns_t due_ns() const noexcept {
     return later_by(last.since_ns, last.holds ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
   }
+  /// Whether what is in effect already is its own to undo.
+  bool is_undone_by_it() const noexcept { return is_own || rule.takes_over; }
 };
 
 Engine::Engine(std::vector<Rule> rules) {
@@ -141,13 +144,15 @@ void Engine::set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t no
   suppress(life, Act::do_, Why::changed_by_another, now_ns);
 }
 
+void Engine::set_own(std::size_t rule, bool is_own) noexcept { lives_[rule]->is_own = is_own; }
+
 void Engine::set_ready(std::size_t rule, Act act, bool ready) noexcept {
   lives_[rule]->ready[index_of(act)] = ready;
 }
 
 void Engine::adopt(std::size_t rule, time_ns_t now_ns) noexcept {
   Life& life = *lives_[rule];
-  if (life.in_effect) return;
+  if (life.in_effect || !life.is_undone_by_it()) return;
   life.in_effect = true;
   life.in_place = {true, false};
   life.condition->assume();
@@ -165,6 +170,7 @@ void Engine::forget(std::size_t rule) noexcept {
   life.otherwise_begun = false;
   life.under_way.reset();
   life.in_place = {};
+  life.is_own = true;
   life.ready = {true, true, true};
   life.not_before_ns = INT64_MIN;
   life.failures = 0;
@@ -251,7 +257,12 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   }
   if (life.in_place[index_of(act)].value_or(false)) {
     suppress(life, act, Why::already, now_ns);
-    settle(life, act, now_ns);
+    if (act == Act::do_ && !life.is_undone_by_it()) {
+      life.changed_by_another = true;
+      life.waits_since_ns.reset();
+    } else {
+      settle(life, act, now_ns);
+    }
     return;
   }
   const bool is_late_enough = now_ns >= life.not_before_ns;

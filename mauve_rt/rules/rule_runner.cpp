@@ -18,10 +18,11 @@ constexpr int kPriority = 97;  // above components, below who conducts changes a
 constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 
 // What the follower found of a rule.
-constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
-constexpr std::uint64_t kKnown = 2;    // from here on one for each act: whether it is known ...
-constexpr std::uint64_t kInPlace = 8;  // ... that what it asks for is so
-constexpr unsigned kEndsAt = 5;
+constexpr std::uint64_t kPresent = 1;   // all that it is about is there and runs
+constexpr std::uint64_t kKnown = 2;     // from here on one for each act: whether it is known ...
+constexpr std::uint64_t kInPlace = 8;   // ... that what it asks for is so
+constexpr std::uint64_t kByRules = 32;  // what its `do` asks for is so by rules
+constexpr unsigned kEndsAt = 6;
 
 constexpr std::array kPrepared{Act::do_, Act::undo};
 
@@ -47,8 +48,8 @@ RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::ve
     make_transaction(each.do_steps);  // its kinds are checked here
     make_transaction(each.undo_steps);
     const mauve::rules::Rule& rule = engine_->rule(rules_.size());
-    rules_.push_back(
-        std::make_unique<Rule>(each, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()));
+    rules_.push_back(std::make_unique<Rule>(
+        each, rule.name, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()));
     rules_.back()->applied = UINT64_MAX;
     rules_.back()->name = TraceNames::intern(rule.name);
   }
@@ -240,6 +241,7 @@ void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
     const bool is_so = (found & (kInPlace << index_of(act))) != 0;
     return is_known ? std::optional(is_so) : std::nullopt;
   };
+  engine_->set_own(index, (found & kByRules) != 0);
   const bool is_first = !std::exchange(rule.was_present, true);
   if (is_first && engine_->rule(index).undoes && in_place(Act::do_) == true && in_place(Act::undo) == false)
     engine_->adopt(index, now_ns);
@@ -389,6 +391,7 @@ bool RuleRunner::look_around() {
   }
   const std::uint64_t revision = host_.architecture().revision();
   const ArchitectureDescription description = host_.describe();
+  const std::vector<Authored> authors = host_.architecture().authors();
   bool changed = false;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     if (!ends[i]) continue;
@@ -400,6 +403,7 @@ bool RuleRunner::look_around() {
       if (is_so) found |= kKnown << index_of(act);
       if (is_so == true) found |= kInPlace << index_of(act);
     }
+    if (is_by_rules(rule.action(Act::do_).steps(), authors)) found |= kByRules;
     changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
   }
   if (std::exchange(followed_, revision) != revision) {

@@ -184,6 +184,7 @@ class RemoteRules:
         self._tell()
         if not was_armed:
             self._arming.begin(each, now_ns)
+        self._engine.set_own(each.number, view.is_by_rules(each.rule.do))
         for act in ACTS:
             is_so = view.shows(each.rule.steps(act))
             if is_so is not None:
@@ -205,6 +206,7 @@ class RemoteRules:
             steps=tuple(each.rule.steps(pending.act)),
             expected_revision=self._revision(),
             cause=cause,
+            rule=each.rule.name,
         )
         each.untouched = False
         self._flight = _Flight(each, pending.act, request, now_ns + ANSWER_TIMEOUT_NS)

@@ -1,8 +1,10 @@
 """What somebody outside of an executor knows of it, and of how its rules stand with it."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from mauve_rt.control.requests import BY_RULE
+from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.rules import Rule
 
@@ -15,6 +17,7 @@ class ComponentView:
 
     state: str
     core: str
+    authors: Mapping[str, str] = field(default_factory=dict)  # of what was changed, by element
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,15 @@ class ArchitectureView:
         """Its state, in words."""
         found = self.components.get(component)
         return found.state if found is not None else NOT_THERE
+
+    def is_by_rules(self, steps: Iterable[Step]) -> bool:
+        """Whether rules did what the steps ask for, as far as ~/state tells: it has no resources."""
+        told = [step for step in steps if step.target in self.components]
+        return all(self._author_of(step).startswith(BY_RULE) for step in told)
+
+    def _author_of(self, step: Step) -> str:
+        element = STEP_KINDS[step.kind].element(step.name)
+        return self.components[step.target].authors.get(element, "")
 
     def shows(self, steps: Iterable[Step]) -> bool | None:
         """Whether the steps' effect is in place; None: ~/state does not tell of all of them."""

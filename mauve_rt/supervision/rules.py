@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Literal
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Faults, ListOf, Real, Whole
+from mauve_rt.model.kinds import Choice, Faults, Flag, ListOf, Real, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
@@ -71,6 +71,12 @@ class Rule(Section):
     )
     otherwise_after_s: float = setting(
         _SECONDS, "time from the instant at which `do` is due to the reserve action", default=0.1
+    )
+
+    takes_over: bool = setting(
+        Flag(),
+        "whether the rule undoes what its action does also where somebody else did it",
+        default=False,
     )
 
     def steps(self, act: str) -> list[Step]:

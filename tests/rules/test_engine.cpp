@@ -645,6 +645,32 @@ TEST(Rules, WhoStartsWhileItIsInEffectUndoesIt) {
   EXPECT_EQ("100 r done", tried.words.back());
 }
 
+TEST(Rules, WhatSomebodyElseDidIsNotUndone) {
+  Rule undoing = rule("r", silence(1.0));
+  for (const bool takes_over : {false, true}) {
+    SCOPED_TRACE(takes_over);
+    undoing.takes_over = takes_over;
+    for (const bool is_before : {false, true}) {
+      SCOPED_TRACE(is_before);
+      Tried tried({undoing});
+      tried.engine.set_own(0, false);
+      tried.engine.set_in_place(0, Act::do_, true, 0);
+      if (is_before) tried.engine.adopt(0, tried.now_ns);  // as who arms the rule would
+      tried.run_to(ms(1500));
+      EXPECT_EQ(takes_over, tried.engine.status(0).in_effect);
+      tried.tell(0);
+      tried.run_to(ms(1600));
+      const auto undone = std::count_if(tried.decisions.begin(), tried.decisions.end(), [](const Decision& one) {
+        return one.decided == Decided::undo;
+      });
+      EXPECT_EQ(takes_over ? 1 : 0, undone);
+      tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);  // and the other one takes it back
+      tried.run_to(ms(3500));
+      EXPECT_TRUE(tried.engine.status(0).in_effect) << "the next time it acts again";
+    }
+  }
+}
+
 TEST(Rules, WhatIsNotReadyIsNotWishedAndSaysSo) {
   Tried tried({rule("r", silence(1.0))});
   tried.engine.set_ready(0, Act::do_, false);

@@ -472,6 +472,45 @@ TYPED_TEST(RuleRunnerTest, TakesWhatIsInEffectAsItsOwn) {
   EXPECT_EQ("t/Core", this->present());
 }
 
+/// An operator put in by hand what the rule does, and the rules are loaded anew.
+TYPED_TEST(RuleRunnerTest, LeavesAloneWhatAnotherHandDid) {
+  for (const bool takes_over : {false, true}) {
+    SCOPED_TRACE(takes_over);
+    if (this->rules.empty()) {
+      this->add_rule(silent(0.1));
+      this->deploy();
+    }
+    this->rules.back().takes_over = takes_over;
+    this->beat.write.write({}, 1);
+    Transaction by_hand;
+    by_hand.replace_core("c", "t/Counting").by("operator");
+    this->host().commit(std::move(by_hand), {});
+    this->begin();
+    for (int i = 0; i < 6; ++i) {  // the condition is false all along
+      this->beat.write.write({}, 1);
+      this->live(ms_to_ns(20));
+    }
+    EXPECT_EQ(takes_over ? "t/Core" : "t/Counting", this->present());
+    const auto adopted = std::count(this->words.begin(), this->words.end(), "adopted");
+    EXPECT_EQ(takes_over ? 1 : 0, adopted);
+    this->runner->stop();
+    this->runner.reset();
+    this->words.clear();
+    this->from = 0;
+  }
+}
+
+TYPED_TEST(RuleRunnerTest, IsTheAuthorOfWhatItDoes) {
+  this->add_rule(silent());
+  this->deploy();
+  this->begin();
+  this->see("done");
+  EXPECT_THAT(this->architecture.authors(),
+              ElementsAre(Authored{.target = "c", .element = "core", .author = "rule rule0"}));
+  this->host().replace_core("c", "t/Counting");
+  EXPECT_TRUE(this->architecture.authors().empty()) << "the program itself, now";
+}
+
 TYPED_TEST(RuleRunnerTest, LeavesAloneWhatAnotherHandChanges) {
   this->add_rule(silent());
   this->deploy();

@@ -93,6 +93,30 @@ ArchitectureDescription Architecture::describe() const {
   return description;
 }
 
+std::vector<Authored> Architecture::authors() const {
+  std::vector<Authored> found = authors_.all();
+  const std::lock_guard lock(list_mutex_);
+  for (const auto& component : components_) {
+    if (!component->task().has_fallen_back()) continue;
+    std::erase_if(
+        found, [&](const Authored& one) { return one.target == component->name() && one.element == "core"; });
+    found.push_back({.target = component->name(), .element = "core", .author = "fallback"});
+  }
+  return found;
+}
+
+void Architecture::note_author(const std::string& target, const std::string& element,
+                               const std::string& author) {
+  authors_.note(target, element, author);
+}
+
+void Architecture::note_authors(const Transaction& transaction) {
+  for (const auto& step : transaction.steps()) {
+    if (step->removes()) authors_.forget(step->target);
+    if (!step->is_for_all()) authors_.note(step->target, step->element(), transaction.author());
+  }
+}
+
 std::string to_string(const ArchitectureDescription& description) {
   std::string text;
   for (const ComponentFacts& component : description.components) text += text_of(component);

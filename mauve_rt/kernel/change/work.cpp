@@ -80,6 +80,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
 }
 
 void TransactionCommit::Work::finish() {
+  architecture_.note_authors(transaction_);  // first: who sees the new revision sees who made it
   publish();
   architecture_.drop_stale_prepared();  // they refer to what goes now
   settle_with_host();

@@ -216,7 +216,7 @@ def _replace_core(ros: Any) -> Request:
 
 def _reconfigure(ros: Any) -> Request:
     steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
-    return Request(steps=steps, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
+    return Request(steps=steps, dry_run=ros.dry_run, rule=ros.rule, **_commit(ros), **_common(ros))
 
 
 def _start_recording(ros: Any) -> Request:

@@ -146,6 +146,7 @@ class Supervisor:
                 for step in request.steps
             ],
             dry_run=request.dry_run,
+            rule=request.rule,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
         self._call(client, message).add_done_callback(lambda future: on_reply(request.request_id, future))

@@ -16,6 +16,7 @@ from mauve_rt.control.control import Control
 from mauve_rt.control.reports import message_of, reports_of
 from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Request, Step
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model import load_architecture
 from mauve_rt.trace.format.records import Kind
 
@@ -503,3 +504,51 @@ def test_what_is_stopped_while_a_request_is_planned_is_another_revision(
     assert f"is at revision {runtime.revision}, the request expected {revision};" in refused.message
     assert _ask(control, Step("start", "free")).success
     assert _ask(control, *steps).success, "who names no revision is concerned by its own components only"
+
+
+def test_the_author_of_each_change_is_known(runtime: Runtime, control: Control) -> None:
+    assert runtime.authors() == {}, "all is from the file"
+    steps = (
+        Step("replace_core", "counter", "executor_tests/Backwards"),
+        Step("set_property", "counter", "step", "3"),
+        Step("connect", "counter", "set", "count.read"),
+    )
+    for request in (
+        Request(steps=steps, requested_by="mauve", cause="slower, please"),
+        Request(steps=ADD, rule="second_sight", requested_by="/supervisor", cause="nobody reads this"),
+        Request(steps=(Step("stop", "free"),), requested_by="console"),
+        Request(steps=(Step("replace_core", "free", "executor_tests/Backwards"),), dry_run=True),
+    ):
+        outcome = control.handle(request)
+        assert outcome.success, outcome.message
+    by_mauve = "mauve: slower, please"
+    assert runtime.authors() == {
+        "counter": {"core": by_mauve, "port set": by_mauve, "property step": by_mauve},
+        "second": {
+            "": "rule second_sight",
+            "port count": "rule second_sight",
+            "port set": "rule second_sight",
+            "state": "rule second_sight",
+        },
+        "sum": {"": "rule second_sight"},
+        "free": {"state": "console"},
+    }
+    (info,) = (part for part in component_infos(runtime) if part.name == "counter")
+    assert info.authors == [
+        f"core={by_mauve}",
+        f"port set={by_mauve}",
+        f"property step={by_mauve}",
+    ]
+    assert control.handle(Request(steps=REMOVE, requested_by="mauve")).success
+    assert {target: runtime.authors()[target] for target in ("second", "sum")} == {
+        "second": {"": "mauve"},
+        "sum": {"": "mauve"},
+    }
+
+
+def test_the_author_of_a_core_that_took_over_is_the_fallback(runtime: Runtime, control: Control) -> None:
+    assert _ask(control, Step("replace_core", "brave", "executor_tests/Counter")).success
+    assert runtime.authors() == {"brave": {"core": "a request"}}
+    runtime.host.write_resource("poison", POISON)
+    _wait(lambda: _part(runtime, "brave").fell_back)
+    assert runtime.authors() == {"brave": {"core": "fallback"}}

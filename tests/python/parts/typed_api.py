@@ -45,9 +45,11 @@ from mauve_rt.api import (
     event_port,
     monotonic_ns,
     ms_to_ns,
+    open_architecture,
     parameter,
     property,  # noqa: A004
     read_port,
+    read_resource,
     s_to_ns,
     service,
     us_to_ns,
@@ -255,3 +257,11 @@ def run(registry: PluginRegistry) -> StepReport:
     assert_type(report.phase_actual_ns != NOT_MEASURED, bool)
     assert_type(monotonic_ns(), int)
     return report
+
+
+def test_a_file() -> None:
+    """As a test of a package does."""
+    architecture = assert_type(open_architecture("robot.yaml"), Architecture)
+    host = Deployer(architecture)
+    assert_type(read_resource(host, "pose", Pose), Sample[Pose])
+    read_resource(host, "pose", "geometry_msgs/msg/Pose")  # type: ignore[arg-type]

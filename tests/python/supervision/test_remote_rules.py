@@ -181,9 +181,10 @@ def test_a_wrong_revision_is_tried_again_soon_but_with_the_new_state_only():
     assert world.requests[1].expected_revision == 7
 
 
-def test_what_is_done_already_is_not_done_again_but_undone():
+@pytest.mark.parametrize("author", ["rule another", "operator"])
+def test_what_is_done_already_is_not_done_again_and_undone_where_a_rule_did_it(author: str):
     world = started()
-    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    world.tell({"exploration": ComponentView("RUNNING", LOCAL, {"core": author})})
     world.talking = False
     world.run(2.0)
     assert world.requests == []
@@ -191,7 +192,7 @@ def test_what_is_done_already_is_not_done_again_but_undone():
     assert "already" in world.decisions[-1].reason
     world.talking = True
     world.run(4.0)
-    assert world.cores() == [USUAL]
+    assert world.cores() == ([USUAL] if author == "rule another" else [])
 
 
 def test_a_person_who_swaps_back_by_hand_is_left_alone_until_the_condition_ends():
@@ -277,12 +278,31 @@ def test_an_executor_that_dies_with_an_action_in_flight():
     assert world.said()[-1] == "done"
 
 
-def after_a_restart(*rules: Rule, **world: object) -> World:
-    """A supervisor that starts when an executor runs the other core already."""
+def after_a_restart(*rules: Rule, author: str = "rule link_lost", **world: object) -> World:
+    """A supervisor that starts when an executor runs the other core already, put in by `author`."""
     later = World(list(rules) or [rule()], **world)  # type: ignore[arg-type]
     later.talking = False
-    later.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    authors = dict.fromkeys(("core", "property gain"), author) if author else {}
+    later.tell({"exploration": ComponentView("RUNNING", LOCAL, authors)})
     return later
+
+
+@pytest.mark.parametrize("author", ["operator: faster", "", "fallback"])
+@pytest.mark.parametrize("takes_over", [True, False])
+def test_what_an_operator_did_is_undone_only_where_the_rule_takes_it_over(author: str, *, takes_over: bool):
+    world = after_a_restart(rule(takes_over=takes_over), author=author)
+    world.talking = True  # the condition is false all along
+    world.run(8.0)
+    assert world.cores() == ([USUAL] if takes_over else [])
+    assert ("adopted" in world.said()) == takes_over
+
+
+def test_what_a_rule_asks_for_names_the_rule():
+    world = started()
+    world.talking = False
+    world.run(2.0)
+    assert [request.rule for request in world.requests] == ["link_lost"]
+    assert world.requests[0].author == "rule link_lost"
 
 
 def test_what_a_supervisor_before_did_is_adopted_and_undone_when_the_link_has_been_back_long_enough():

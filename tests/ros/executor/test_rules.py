@@ -19,7 +19,7 @@ from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import ListRules, LoadRules, Reconfigure, ReplaceCore
+from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore
 from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
@@ -240,6 +240,30 @@ def test_takes_up_what_is_in_effect(start: Start, graph: Any, files: tuple[Path,
     robot.await_said("adopted")
     robot.voice.on()
     robot.await_core(USUAL)
+
+
+def test_leaves_alone_what_an_operator_put_in(start: Start, graph: Any, files: tuple[Path, Path]):
+    """The condition is false all along, and the rules are loaded anew: what the rule would do is another's."""
+    robot = start()
+    robot.await_said("armed")
+    by_hand = {"component": "counter", "core": SAFE, "requested_by": "operator", "cause": "by hand"}
+    assert graph.ask(ReplaceCore, f"{NODE}/replace_core", **by_hand).success
+    robot.await_core(SAFE)
+    (authors,) = (part.authors for part in robot.states[-1].components if part.name == "counter")
+    assert authors == ["core=operator: by hand"]
+    (listed,) = (
+        part
+        for part in graph.ask(ListComponents, f"{NODE}/list_components").components
+        if part.name == "counter"
+    )
+    assert listed.authors == authors
+    assert graph.ask(LoadRules, f"{NODE}/load_rules", path="").success
+    robot.await_said("armed", 2)
+    until_s = time.monotonic() + 4 * UNDO_S
+    graph.spin_until(lambda: time.monotonic() > until_s, "the time after which it would undo that")
+    assert "adopted" not in robot.said()
+    assert "undo" not in robot.said()
+    assert robot.core() == SAFE
 
 
 def test_rules_are_loaded_anew_whole_or_not_at_all(start: Start, graph: Any, files: tuple[Path, Path]):

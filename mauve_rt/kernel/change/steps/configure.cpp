@@ -21,8 +21,9 @@ void configure_component(Draft& draft, const std::string& name) {
 
 }  // namespace
 
-constexpr StepKind steps::configure{.name = "configure", .draft = [](Draft& draft, TransactionStep& step) {
-                                      configure_component(draft, step.target);
-                                    }};
+constexpr StepKind steps::configure{
+    .name = "configure", .element = "state", .draft = [](Draft& draft, TransactionStep& step) {
+      configure_component(draft, step.target);
+    }};
 
 }  // namespace mauve

@@ -32,6 +32,7 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
 
 constexpr StepKind steps::connect{
     .name = "connect",
+    .element = "port",
     .is_structural = true,
     .words = element_words,
     .draft = [](Draft& draft, TransactionStep& step) {

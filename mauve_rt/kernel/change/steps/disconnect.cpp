@@ -7,6 +7,7 @@ namespace mauve {
 
 constexpr StepKind steps::disconnect{
     .name = "disconnect",
+    .element = "port",
     .is_structural = true,
     .words = element_words,
     .draft = [](Draft& draft, TransactionStep& step) {

@@ -5,7 +5,10 @@
 namespace mauve {
 
 constexpr StepKind steps::place_core{
-    .name = "place_core", .words = part_words<CoreBase>, .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "place_core",
+    .element = "core",
+    .words = part_words<CoreBase>,
+    .draft = [](Draft& draft, TransactionStep& step) {
       std::unique_ptr<CoreBase> core = take(value_of<std::unique_ptr<CoreBase>>(step));
       DraftComponent& changed = draft.touch(step.target);
       changed.component->check_reconfigurable();

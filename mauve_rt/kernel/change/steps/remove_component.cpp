@@ -5,8 +5,9 @@
 namespace mauve {
 
 constexpr StepKind steps::remove_component{
-    .name = "remove_component", .is_structural = true, .draft = [](Draft& draft, TransactionStep& step) {
-      draft.remove_component(step.target);
-    }};
+    .name = "remove_component",
+    .removes = true,
+    .is_structural = true,
+    .draft = [](Draft& draft, TransactionStep& step) { draft.remove_component(step.target); }};
 
 }  // namespace mauve

@@ -6,6 +6,7 @@ namespace mauve {
 
 constexpr StepKind steps::remove_resource{
     .name = "remove_resource",
+    .removes = true,
     .target = StepTarget::resource,
     .is_structural = true,
     .draft = [](Draft& draft, TransactionStep& step) { draft.remove_resource(step.target); }};

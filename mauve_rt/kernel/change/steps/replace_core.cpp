@@ -19,17 +19,21 @@ void allow_first_core(DraftComponent& added, const CoreBase& core) {
 
 }  // namespace
 
-constexpr StepKind steps::replace_core{
-    .name = "replace_core", .words = part_words<CoreBase>, .draft = [](Draft& draft, TransactionStep& step) {
-      const bool by_name = !brings<CoreBase>(step);
-      std::unique_ptr<CoreBase> core =
-          by_name ? draft.registry().make_core(step.name) : take(value_of<std::unique_ptr<CoreBase>>(step));
-      DraftComponent& changed = replacing(draft, step.target);
-      if (by_name && !changed.is_added) changed.component->check_allowed(core->implementation());
-      if (changed.is_added) allow_first_core(changed, *core);
-      changed.fresh.core = std::move(core);
-      changed.core_step = draft.step();
-      changed.core_unready = false;
-    }};
+constexpr StepKind steps::replace_core{.name = "replace_core",
+                                       .element = "core",
+                                       .words = part_words<CoreBase>,
+                                       .draft = [](Draft& draft, TransactionStep& step) {
+                                         const bool by_name = !brings<CoreBase>(step);
+                                         std::unique_ptr<CoreBase> core =
+                                             by_name ? draft.registry().make_core(step.name)
+                                                     : take(value_of<std::unique_ptr<CoreBase>>(step));
+                                         DraftComponent& changed = replacing(draft, step.target);
+                                         if (by_name && !changed.is_added)
+                                           changed.component->check_allowed(core->implementation());
+                                         if (changed.is_added) allow_first_core(changed, *core);
+                                         changed.fresh.core = std::move(core);
+                                         changed.core_step = draft.step();
+                                         changed.core_unready = false;
+                                       }};
 
 }  // namespace mauve

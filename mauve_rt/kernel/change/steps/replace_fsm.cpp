@@ -5,7 +5,10 @@
 namespace mauve {
 
 constexpr StepKind steps::replace_fsm{
-    .name = "replace_fsm", .words = part_words<FsmBase>, .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "replace_fsm",
+    .element = "fsm",
+    .words = part_words<FsmBase>,
+    .draft = [](Draft& draft, TransactionStep& step) {
       const bool by_name = !brings<FsmBase>(step);
       std::unique_ptr<FsmBase> fsm =
           by_name ? draft.registry().make_fsm(step.name) : take(value_of<std::unique_ptr<FsmBase>>(step));

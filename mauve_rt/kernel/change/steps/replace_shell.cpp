@@ -6,6 +6,7 @@ namespace mauve {
 
 constexpr StepKind steps::replace_shell{
     .name = "replace_shell",
+    .element = "shell",
     .is_structural = true,
     .words = part_words<Shell>,
     .draft = [](Draft& draft, TransactionStep& step) {

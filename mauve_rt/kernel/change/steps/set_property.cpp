@@ -4,9 +4,12 @@
 
 namespace mauve {
 
-constexpr StepKind steps::set_property{
-    .name = "set_property", .words = element_words, .draft = [](Draft& draft, TransactionStep& step) {
-      draft.set_property(draft.change(step.target), step.name, value_of<PropertyValue>(step));
-    }};
+constexpr StepKind steps::set_property{.name = "set_property",
+                                       .element = "property",
+                                       .words = element_words,
+                                       .draft = [](Draft& draft, TransactionStep& step) {
+                                         draft.set_property(draft.change(step.target), step.name,
+                                                            value_of<PropertyValue>(step));
+                                       }};
 
 }  // namespace mauve

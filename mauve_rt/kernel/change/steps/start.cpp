@@ -37,7 +37,7 @@ void start_component(Draft& draft, const std::string& name, std::optional<time_n
 }  // namespace
 
 constexpr StepKind steps::start{
-    .name = "start", .draft = [](Draft& draft, TransactionStep& step) {
+    .name = "start", .element = "state", .draft = [](Draft& draft, TransactionStep& step) {
       const bool has_clock = !std::holds_alternative<std::monostate>(step.value);
       start_component(draft, step.target,
                       has_clock ? std::optional(plain_value_of<std::int64_t>(step)) : std::nullopt);

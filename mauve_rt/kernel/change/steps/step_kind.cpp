@@ -44,6 +44,13 @@ bool TransactionStep::is_for_all() const noexcept { return kind_.target == StepT
 
 bool TransactionStep::is_structural() const noexcept { return kind_.is_structural; }
 
+std::string TransactionStep::element() const {
+  const std::string kind(kind_.element);
+  return kind == "property" || kind == "port" ? kind + " " + name : kind;
+}
+
+bool TransactionStep::removes() const noexcept { return kind_.removes; }
+
 void TransactionStep::draft(Draft& draft) { kind_.draft(draft, *this); }
 
 Transaction& Transaction::add(const StepKind& kind, std::string target, std::string name, StepValue value) {
@@ -54,6 +61,11 @@ Transaction& Transaction::add(const StepKind& kind, std::string target, std::str
 
 Transaction& Transaction::add(std::string_view kind, std::string target, std::string name, StepValue value) {
   return add(kind_of(kind), std::move(target), std::move(name), std::move(value));
+}
+
+Transaction& Transaction::by(std::string author) {
+  author_ = std::move(author);
+  return *this;
 }
 
 void throw_other_value(const TransactionStep& step) {

@@ -19,6 +19,9 @@ enum class StepTarget : std::uint8_t { component, resource, all };
 /// What a step of this kind says and does.
 struct StepKind {
   std::string_view name;
+  /// What of its target it sets: core, state, "property" and "port" with the step's name; empty: the target itself.
+  std::string_view element{};
+  bool removes{false};
   StepTarget target{StepTarget::component};
   /// Whether it may make a draft structural: Draft::is_structural().
   bool is_structural{false};

@@ -19,6 +19,8 @@ void stop_component(Draft& draft, const std::string& name) {
 }  // namespace
 
 constexpr StepKind steps::stop{
-    .name = "stop", .draft = [](Draft& draft, TransactionStep& step) { stop_component(draft, step.target); }};
+    .name = "stop", .element = "state", .draft = [](Draft& draft, TransactionStep& step) {
+      stop_component(draft, step.target);
+    }};
 
 }  // namespace mauve

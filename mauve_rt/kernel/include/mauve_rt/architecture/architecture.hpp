@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/architecture/authors.hpp"
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/rt.hpp"
@@ -166,6 +167,12 @@ class Architecture final : public Configurable {
   std::size_t threads_left_behind() const;
 
   ChangeSignal& changes() noexcept { return changes_; }
+  /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback". [non-rt]
+  std::vector<Authored> authors() const;
+  /// Notes the author of a change that was made without a transaction. [non-rt]
+  void note_author(const std::string& target, const std::string& element, const std::string& author);
+  /// Notes the author of each step of a transaction that is in force. [non-rt]
+  void note_authors(const Transaction& transaction);
   /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
   std::uint64_t revision() const noexcept {
     return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
@@ -292,6 +299,7 @@ class Architecture final : public Configurable {
   mutable std::mutex host_mutex_;
   Runner* host_{nullptr};
   ChangeSignal changes_;
+  Authors authors_;
   Notifier publications_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable std::mutex list_mutex_;

@@ -70,6 +70,10 @@ class TransactionStep {
   bool is_for_all() const noexcept;
   /// Whether it adds or removes something, wires a port, or replaces a shell.
   bool is_structural() const noexcept;
+  /// Which element of its target it sets, as Authored::element.
+  std::string element() const;
+  /// Whether its target is gone with it.
+  bool removes() const noexcept;
   /// Enters its effect into the draft; uses up the parts it was given. Throws Error.
   void draft(Draft& draft);
 
@@ -147,10 +151,15 @@ class Transaction {
   /// alone. The stopped ones take the epoch when they start. Not for an architecture that is not deployed.
   Transaction& resynchronise();
 
+  /// Who makes the change, for Architecture::authors(): "rule link_lost". Empty: the program itself.
+  Transaction& by(std::string author);
+  const std::string& author() const noexcept { return author_; }
+
   const std::vector<std::unique_ptr<TransactionStep>>& steps() const noexcept { return steps_; }
 
  private:
   std::vector<std::unique_ptr<TransactionStep>> steps_;
+  std::string author_;
 };
 
 struct TransactionOptions {

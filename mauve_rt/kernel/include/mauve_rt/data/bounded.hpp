@@ -66,6 +66,7 @@ class BoundedString {
   std::string_view view() const MAUVE_RT { return {text_.data(), size_}; }
   bool operator==(const BoundedString& other) const MAUVE_RT { return view() == other.view(); }
   bool operator==(std::string_view other) const MAUVE_RT { return view() == other; }
+  bool operator==(const char* other) const MAUVE_RT { return view() == other; }
 
  private:
   std::uint32_t size_{0};

@@ -26,8 +26,12 @@ struct ActionStep {
 };
 using ActionSteps = std::vector<ActionStep>;
 
-/// The transaction of such steps. [non-rt] Throws Error: there is no such kind.
-Transaction make_transaction(const ActionSteps& steps);
+/// The transaction of such steps, by a rule of that name. [non-rt] Throws Error: there is no such kind.
+Transaction make_transaction(const ActionSteps& steps, const std::string& rule = {});
+/// The author of what a rule does: Authored::author. [non-rt]
+std::string rule_author(const std::string& rule);
+/// Whether all that the steps ask for was done by rules. [non-rt]
+bool is_by_rules(const ActionSteps& steps, const std::vector<Authored>& authors);
 /// Whether the components of which they replace or set something are there and run. [non-rt]
 bool can_begin(const ActionSteps& steps, const ArchitectureDescription& description);
 /// Whether all that the steps ask for is so; nothing: they leave nothing behind that a description tells. [non-rt]
@@ -53,7 +57,7 @@ struct ActionReport {
 class Action {
  public:
   /// No steps: the rule has no such action. [setup]
-  explicit Action(ActionSteps steps = {}, const TransactionOptions& options = {});
+  explicit Action(ActionSteps steps = {}, const TransactionOptions& options = {}, std::string rule = {});
   Action(const Action&) = delete;
   Action& operator=(const Action&) = delete;
 
@@ -108,6 +112,7 @@ class Action {
 
   const ActionSteps steps_;
   const TransactionOptions options_;
+  const std::string rule_;
   const bool is_preparable_;
   std::unique_ptr<PreparedTransaction> prepared_;
   std::unique_ptr<TransactionCommit> committed_;

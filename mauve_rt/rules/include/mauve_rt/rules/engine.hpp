@@ -30,6 +30,7 @@ struct Rule {
   std::vector<std::string> about{};  // components that it changes
   std::optional<time_ns_t>
       otherwise_after_ns{};  // so long after `do` is due, and not in effect: its reserve action
+  bool takes_over{false};    // what it does counts as its own, and is undone, also where somebody else did it
 };
 
 /// What the engine wants done now.
@@ -102,9 +103,13 @@ class Engine {
   void arm(time_ns_t now_ns) MAUVE_RT;
   /// Whether what the act would do is in effect now. [rt]
   void set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) MAUVE_RT;
+  /// Whether what its `do` would do is in effect by a rule; it is until the opposite is said. What somebody else did is not
+  /// undone, unless the rule takes it over. [rt]
+  void set_own(std::size_t rule, bool is_own) MAUVE_RT;
   /// Whether the act could begin at once; it can until the opposite is said. [rt]
   void set_ready(std::size_t rule, Act act, bool ready) MAUVE_RT;
-  /// What the rule does is in effect already, by who was there before: it is undone when it is time. [rt]
+  /// What the rule does is in effect already, by a rule before: it is undone when it is time. [rt] Nothing happens
+  /// where somebody else did it, and the rule does not take over.
   void adopt(std::size_t rule, time_ns_t now_ns) MAUVE_RT;
   /// The architecture is another one: nothing of before counts. [rt]
   void forget() MAUVE_RT;

@@ -112,9 +112,9 @@ class RuleRunner {
     bool operator==(const Kept&) const = default;
   };
   struct Rule {
-    Rule(const RuleActions& actions, std::vector<std::string> about)
-        : acts{Action(actions.do_steps, actions.do_options),
-               Action(actions.undo_steps, actions.undo_options)},
+    Rule(const RuleActions& actions, const std::string& name_of_it, std::vector<std::string> about)
+        : acts{Action(actions.do_steps, actions.do_options, name_of_it),
+               Action(actions.undo_steps, actions.undo_options, name_of_it)},
           reserve(actions.reserve, std::move(about)) {}
     Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
 

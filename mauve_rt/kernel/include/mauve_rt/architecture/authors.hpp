@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Who made each element of an architecture what it is.
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace mauve {
+
+/// An element that was changed since its file or program made it, and by whom.
+struct Authored {
+  std::string target;  // a component or resource
+  std::string
+      element;  // core, fsm, shell, state, property NAME, port NAME; empty: the target itself, there or removed
+  std::string author;  // as Transaction::by() says
+  bool operator==(const Authored&) const = default;
+};
+
+/// The authors of changes, by element. For ordinary threads; all functions [non-rt].
+///
+/// | member    | written by            | guarded by |
+/// | --------- | --------------------- | ---------- |
+/// | `by_`     | who commits a change  | `mutex_`   |
+class Authors {
+ public:
+  /// Of the last change of an element; an empty author is the file or program, of which nothing is kept.
+  void note(const std::string& target, const std::string& element, const std::string& author);
+  /// Of a target that is gone, with all its elements.
+  void forget(const std::string& target);
+  /// Empty: the file or program.
+  std::string of(const std::string& target, const std::string& element) const;
+  /// Sorted by target and element.
+  std::vector<Authored> all() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::pair<std::string, std::string>, std::string> by_;
+};
+
+}  // namespace mauve
