@@ -197,6 +197,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
     "takes any map of the ROS map server": (
         "system/test_demo_mission.py::test_maps_of_others_work_as_they_are",
+        "system/test_demo_mission.py::test_a_turned_bmp_in_mode_scale_works",
         "system/test_demo_bad_input.py::test_bad_maps",
     ),
     "in virtual time on one thread": (
