@@ -25,7 +25,7 @@ class GridMap:
     def origin_y_m(self) -> float: ...
     @property
     def cells(self) -> npt.NDArray[np.int8]:
-        """A read-only view, (height, width), row 0 has the lowest y: -1 unknown, 0 free, 1 to 100 how occupied."""
+        """A read-only view, (height, width), row 0 has the lowest y: -1 unknown, 0 free, to 100 occupied."""
 
 def load_map(path: str) -> GridMap:
     """Read the YAML file of a map and the image it names.
