@@ -11,7 +11,7 @@ class MapError(ValueError):
 
 @final
 class GridMap:
-    """A map as the ROS map server reads it, in trinary mode."""
+    """A map as the ROS map server reads it, turned upright."""
 
     @property
     def width(self) -> int: ...
@@ -25,7 +25,7 @@ class GridMap:
     def origin_y_m(self) -> float: ...
     @property
     def cells(self) -> npt.NDArray[np.int8]:
-        """A read-only view, (height, width), row 0 has the lowest y: -1 unknown, 0 free, 100 occupied."""
+        """A read-only view, (height, width), row 0 has the lowest y: -1 unknown, 0 free, to 100 occupied."""
 
 def load_map(path: str) -> GridMap:
     """Read the YAML file of a map and the image it names.

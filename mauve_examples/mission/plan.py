@@ -14,7 +14,6 @@ MOST_COLUMNS, MOST_ROWS = 72, 28
 """In pixels: a character has two, one above the other."""
 UNKNOWN, WALL, SHARED = "grey19", "grey70", "green4"
 _COLOURS = ("dodger_blue2", "orange3", "magenta3", "yellow4", "cyan3", "red3", "purple", "deep_pink4")
-_OCCUPIED = 50  # from there on a cell is a wall
 _WALL_FROM = 3  # a pixel is one, where a third of what is known of it is
 
 
@@ -28,7 +27,7 @@ class Plan:
     """The true map, and which of its cells each robot knows. Grids: (height, width), the lowest y first."""
 
     cells: npt.NDArray[np.int8]
-    """-1 unknown, 0 free, 100 occupied"""
+    """-1 unknown, 0 free, 1 to 100 how occupied: a wall to the robots"""
     known: Mapping[str, BoolGrid]
 
     def drawn(self) -> Text:
@@ -51,7 +50,7 @@ class Plan:
         size = max(1, -(-width // MOST_COLUMNS), -(-height // MOST_ROWS))
         known = np.array([_counts(each[mapped], size) for each in self.known.values()])
         anyhow = np.any([each[mapped] for each in self.known.values()], axis=0)
-        walls = _counts(anyhow & (cells >= _OCCUPIED), size)
+        walls = _counts(anyhow & (cells > 0), size)
         found = np.full(walls.shape, UNKNOWN, "<U20")
         for index, count in enumerate(known):
             found[count > 0] = colour(index)

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_examples/map_file.hpp"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,164 +8,13 @@
 #include <string>
 
 #include "grey_image.hpp"
-#include "utf8.hpp"
+#include "map_description.hpp"
 
 namespace mauve_examples {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// What the YAML file says.
-struct MapDescription {
-  fs::path image;
-  double resolution_m{0.0};
-  double origin_x_m{0.0};
-  double origin_y_m{0.0};
-  bool negate{false};
-  double occupied_threshold{0.65};
-  double free_threshold{0.25};
-};
-
-constexpr std::size_t kMaxMapFileBytes = 1'000'000;
-
-/// The text of a map file. yaml-cpp takes any bytes for text. Throws MapError.
-std::string read_text(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text(kMaxMapFileBytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMaxMapFileBytes) {
-    throw MapError({"map file is too large", path.string(),
-                    "at most " + std::to_string(kMaxMapFileBytes) + " bytes", "more",
-                    "give the map's .yaml file, not its image"});
-  }
-  const std::size_t wrong = std::min(first_no_utf8(text), text.find('\0'));
-  if (wrong < text.size()) {
-    const std::size_t line_begin = wrong == 0 ? std::string::npos : text.rfind('\n', wrong - 1);
-    const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(wrong), '\n') + 1;
-    const std::size_t column = line_begin == std::string::npos ? wrong + 1 : wrong - line_begin;
-    throw MapError({"map file is no text",
-                    path.string() + ":" + std::to_string(line) + ":" + std::to_string(column),
-                    "text in UTF-8", "byte " + std::to_string(static_cast<unsigned char>(text[wrong])),
-                    "give the map's .yaml file, not its image, saved as UTF-8"});
-  }
-  return text;
-}
-
-/// Reads the values of one map file; every complaint names the file, the line and the key.
-class MapYaml {
- public:
-  explicit MapYaml(const fs::path& path) : path_(path) {
-    const std::string content = read_text(path);
-    try {
-      root_ = YAML::Load(content);
-    } catch (const YAML::Exception& error) {
-      throw MapError({"map file is no valid YAML", where(error.mark), "YAML as the ROS map server reads it",
-                      error.msg, "give the map's .yaml file, not its image"});
-    }
-    if (!root_.IsMap()) {
-      throw MapError({"map file holds no map description", where(root_.Mark()),
-                      "keys image, resolution, origin", "no keys at all",
-                      "give the .yaml file that map_saver wrote beside the image"});
-    }
-  }
-
-  MapDescription read() const {
-    MapDescription map;
-    const std::string mode = optional("mode") ? text(root_["mode"], "mode") : "trinary";
-    if (mode != "trinary") {
-      refuse("mode is not supported", root_["mode"], "mode: trinary", mode, "convert the map to trinary");
-    }
-    map.image = path_.parent_path() / text(required("image"), "image");
-    const YAML::Node resolution = required("resolution");
-    map.resolution_m = number(resolution, "resolution");
-    if (map.resolution_m < 0.001 || map.resolution_m > 10.0) {
-      refuse("resolution is out of range", resolution, "0.001 to 10 metres per cell", resolution.Scalar(),
-             "set the size of a cell, e.g. 0.05");
-    }
-    read_origin(map);
-    if (optional("negate")) map.negate = flag(root_["negate"]);
-    read_thresholds(map);
-    return map;
-  }
-
- private:
-  void read_origin(MapDescription& map) const {
-    const YAML::Node origin = required("origin");
-    if (!origin.IsSequence() || origin.size() < 2 || origin.size() > 3) {
-      refuse("origin is no pose", origin, "[x, y, yaw] in m, m, rad", "something else",
-             "write e.g. [-10.0, -10.0, 0]");
-    }
-    map.origin_x_m = number(origin[0], "origin x");
-    map.origin_y_m = number(origin[1], "origin y");
-    const double yaw_rad = origin.size() == 3 ? number(origin[2], "origin yaw") : 0.0;
-    if (yaw_rad != 0.0) {
-      refuse("a turned map is not supported", origin, "origin yaw 0", origin[2].Scalar(),
-             "turn the image and set the yaw to 0");
-    }
-  }
-
-  void read_thresholds(MapDescription& map) const {
-    if (optional("occupied_thresh"))
-      map.occupied_threshold = number(root_["occupied_thresh"], "occupied_thresh");
-    if (optional("free_thresh")) map.free_threshold = number(root_["free_thresh"], "free_thresh");
-    if (!(0.0 <= map.free_threshold && map.free_threshold < map.occupied_threshold &&
-          map.occupied_threshold <= 1.0)) {
-      const YAML::Node at = optional("free_thresh") ? root_["free_thresh"] : root_["occupied_thresh"];
-      refuse("thresholds are out of order", at, "0 <= free_thresh < occupied_thresh <= 1",
-             "free_thresh " + std::to_string(map.free_threshold) + ", occupied_thresh " +
-                 std::to_string(map.occupied_threshold),
-             "usual values are 0.25 and 0.65");
-    }
-  }
-
-  bool optional(const char* key) const { return root_[key].IsDefined(); }
-
-  YAML::Node required(const char* key) const {
-    if (!root_[key].IsDefined()) {
-      refuse("map file is incomplete", root_, std::string("key ") + key, "none", "add it");
-    }
-    return root_[key];
-  }
-
-  std::string text(const YAML::Node& node, const char* key) const {
-    if (!node.IsScalar() || node.Scalar().empty()) {
-      refuse(std::string(key) + " is no text", node, "one word or path", "something else",
-             "correct the value");
-    }
-    return node.Scalar();
-  }
-
-  double number(const YAML::Node& node, const char* key) const {
-    double value = 0.0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
-      refuse(std::string(key) + " is no number", node, "a finite number",
-             node.IsScalar() ? "'" + node.Scalar() + "'" : "something else", "correct the value");
-    }
-    return value;
-  }
-
-  bool flag(const YAML::Node& node) const {
-    const std::string word = node.IsScalar() ? node.Scalar() : "something else";
-    if (word == "0" || word == "false") return false;
-    if (word == "1" || word == "true") return true;
-    refuse("negate is no switch", node, "0 or 1", word, "correct the value");
-  }
-
-  std::string where(const YAML::Mark& mark) const {
-    return mark.is_null() ? path_.string() : path_.string() + ":" + std::to_string(mark.line + 1);
-  }
-
-  [[noreturn]] void refuse(const std::string& what, const YAML::Node& at, const std::string& expected,
-                           const std::string& found, const std::string& remedy) const {
-    throw MapError(
-        {what, where(at.IsDefined() ? at.Mark() : YAML::Mark::null_mark()), expected, found, remedy});
-  }
-
-  fs::path path_;
-  YAML::Node root_;
-};
 
 void require_file(const fs::path& path, const char* what) {
   std::error_code error;
@@ -187,25 +34,29 @@ GreyImage read_image(const fs::path& path) {
   std::ifstream(path, std::ios::binary).read(magic.data(), magic.size());
   if (magic[0] == 'P' && (magic[1] == '2' || magic[1] == '5')) return read_pgm(path);
   if (std::equal(magic.begin(), magic.begin() + 4, "\x89PNG")) return read_png(path);
-  throw MapError({"map image has another format", path.string(), "PGM (P2 or P5) or PNG",
-                  "neither's first bytes", "convert the image to PGM or PNG"});
+  if (magic[0] == 'B' && magic[1] == 'M') return read_bmp(path);
+  throw MapError({"map image has another format", path.string(), "PGM (P2 or P5), PNG or BMP",
+                  "other first bytes", "convert the image to PGM or PNG"});
 }
 
-}  // namespace
-
-void check_image_size(const fs::path& path, unsigned long long width, unsigned long long height) {
-  if (width == 0 || height == 0 || width > kMaxMapCells || height > kMaxMapCells ||
-      width * height > kMaxMapCells) {
-    throw MapError(
-        {"map image has an unusable size", path.string(), "1 to " + std::to_string(kMaxMapCells) + " cells",
-         std::to_string(width) + " x " + std::to_string(height), "crop the map or lower its resolution"});
-  }
+/// The map server's rule for one pixel. The server computes in float, and the cells are to be equal.
+std::int8_t cell_of(std::uint8_t grey, const MapDescription& map) {
+  if (map.mode == MapMode::raw) return grey <= kOccupied ? static_cast<std::int8_t>(grey) : kUnknown;
+  const float bright = static_cast<float>(grey) / 255.0F;
+  const float occupancy = map.negate ? bright : 1.0F - bright;
+  const auto free = static_cast<float>(map.free_threshold);
+  const auto occupied = static_cast<float>(map.occupied_threshold);
+  if (occupancy <= free) return kFree;
+  if (occupancy >= occupied) return kOccupied;
+  if (map.mode == MapMode::trinary) return kUnknown;
+  const auto span = static_cast<float>(map.occupied_threshold - map.free_threshold);
+  return static_cast<std::int8_t>(std::round((occupancy - free) / span * 100.0F));
 }
 
-GridMap load_map(const fs::path& yaml_path) {
-  require_file(yaml_path, "map file");
-  const MapDescription description = MapYaml(yaml_path).read();
-  const GreyImage image = read_image(description.image);
+GridMap cells_of_image(const GreyImage& image, const MapDescription& description) {
+  std::array<std::int8_t, 256> cell_of_grey{};
+  for (std::size_t grey = 0; grey < cell_of_grey.size(); ++grey)
+    cell_of_grey[grey] = cell_of(static_cast<std::uint8_t>(grey), description);
 
   GridMap map;
   map.width = image.width;
@@ -214,22 +65,67 @@ GridMap load_map(const fs::path& yaml_path) {
   map.origin_x_m = description.origin_x_m;
   map.origin_y_m = description.origin_y_m;
   map.cells.resize(map.cell_count(), kUnknown);
-  for (std::size_t i = 0; i < image.shades.size(); ++i) {
-    const double occupancy = description.negate ? image.shades[i] : 1.0 - image.shades[i];
+  for (std::size_t i = 0; i < image.greys.size(); ++i) {
+    if (description.mode != MapMode::raw && !image.alphas.empty() && image.alphas[i] < 255) continue;
     const Cell from_top = map.cell(i);
-    const std::size_t flipped = map.index({from_top.column, map.height - 1 - from_top.row});
-    if (occupancy > description.occupied_threshold) {
-      map.cells[flipped] = kOccupied;
-    } else if (occupancy < description.free_threshold) {
-      map.cells[flipped] = kFree;
-    }
-  }
-  if (std::find(map.cells.begin(), map.cells.end(), kFree) == map.cells.end()) {
-    throw MapError({"map has no free space", description.image.string(),
-                    "pixels brighter than free_thresh allows", "none",
-                    "check free_thresh and negate in " + yaml_path.string()});
+    map.cells[map.index({from_top.column, map.height - 1 - from_top.row})] = cell_of_grey[image.greys[i]];
   }
   return map;
+}
+
+/// The map turned by the yaw about its origin: each cell of an upright grid takes the cell below its centre.
+GridMap turned(const GridMap& map, double yaw_rad, const fs::path& path) {
+  constexpr double kSliver = 0.01;  // of a cell: thinner parts, from a rounded yaw, get no column or row
+  const double cosine = std::cos(yaw_rad);
+  const double sine = std::sin(yaw_rad);
+  // The corners of the turned map, in cells from the origin.
+  const auto [left, right] =
+      std::minmax({0.0, cosine * map.width, -sine * map.height, cosine * map.width - sine * map.height});
+  const auto [low, high] =
+      std::minmax({0.0, sine * map.width, cosine * map.height, sine * map.width + cosine * map.height});
+  const double columns = std::max(1.0, std::ceil(right - left - kSliver));
+  const double rows = std::max(1.0, std::ceil(high - low - kSliver));
+  check_image_size(path, static_cast<unsigned long long>(columns), static_cast<unsigned long long>(rows));
+
+  GridMap upright;
+  upright.width = static_cast<int>(columns);
+  upright.height = static_cast<int>(rows);
+  upright.resolution_m = map.resolution_m;
+  upright.origin_x_m = map.origin_x_m + left * map.resolution_m;
+  upright.origin_y_m = map.origin_y_m + low * map.resolution_m;
+  upright.cells.resize(upright.cell_count(), kUnknown);
+  for (std::size_t i = 0; i < upright.cells.size(); ++i) {
+    const Cell cell = upright.cell(i);
+    const double x = left + cell.column + 0.5;
+    const double y = low + cell.row + 0.5;
+    const Cell source{static_cast<int>(std::floor(cosine * x + sine * y)),
+                      static_cast<int>(std::floor(cosine * y - sine * x))};
+    if (map.contains(source)) upright.cells[i] = map.at(source);
+  }
+  return upright;
+}
+
+}  // namespace
+
+void check_image_size(const fs::path& path, unsigned long long width, unsigned long long height) {
+  if (width == 0 || height == 0 || width > kMaxMapCells || height > kMaxMapCells ||
+      width * height > kMaxMapCells) {
+    throw MapError({"map has an unusable size", path.string(),
+                    "1 to " + std::to_string(kMaxMapCells) + " cells, as robots plan in locked memory",
+                    std::to_string(width) + " x " + std::to_string(height),
+                    "crop the map or lower its resolution"});
+  }
+}
+
+GridMap load_map(const fs::path& yaml_path) {
+  require_file(yaml_path, "map file");
+  const MapDescription description = read_map_description(yaml_path);
+  GridMap map = cells_of_image(read_image(description.image), description);
+  if (std::ranges::find(map.cells, kFree) == map.cells.end()) {
+    throw MapError({"map has no free space", description.image.string(), "an opaque pixel of a free cell",
+                    "none", "check mode, free_thresh and negate in " + yaml_path.string()});
+  }
+  return description.yaw_rad == 0.0 ? map : turned(map, description.yaw_rad, yaml_path);
 }
 
 }  // namespace mauve_examples

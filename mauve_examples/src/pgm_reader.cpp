@@ -67,7 +67,7 @@ class PgmWords {
   [[noreturn]] void refuse(const std::string& what, const std::string& expected,
                            const std::string& found) const {
     throw MapError({"map image is no valid PGM", path_.string(), what + " to be " + expected, found,
-                    "save the image as an 8 bit PGM or as a PNG"});
+                    "save the image again as PGM or PNG"});
   }
 
   const std::filesystem::path& path_;
@@ -86,28 +86,36 @@ GreyImage read_pgm(const std::filesystem::path& path) {
   const auto height = words.number("height", 1'000'000);
   check_image_size(path, width, height);
   const auto white = words.number("maximum value", 65'535);
-  if (white == 0 || white > 255) {
-    throw MapError({"map image has another depth", path.string(), "a maximum value of 1 to 255",
-                    std::to_string(white), "save the image with 8 bits a pixel"});
+  if (white == 0) {
+    throw MapError({"map image has another depth", path.string(), "a maximum value of 1 to 65535", "0",
+                    "save the image again"});
   }
 
-  GreyImage image{static_cast<int>(width), static_cast<int>(height), {}};
+  GreyImage image{static_cast<int>(width), static_cast<int>(height)};
   const std::size_t pixels = width * height;
-  image.shades.reserve(pixels);
+  const std::size_t bytes_per_pixel = white > 255 ? 2 : 1;
+  image.greys.reserve(pixels);
   if (raw) {
     words.end_header();
-    if (bytes.size() - words.position() < pixels)
-      words.truncated(std::to_string(pixels) + " bytes of pixels");
+    if (bytes.size() - words.position() < pixels * bytes_per_pixel)
+      words.truncated(std::to_string(pixels * bytes_per_pixel) + " bytes of pixels");
   }
+  const auto byte = [&](std::size_t at) {
+    return std::uint32_t{static_cast<unsigned char>(bytes[words.position() + at])};
+  };
   for (std::size_t i = 0; i < pixels; ++i) {
-    const auto value = raw ? static_cast<unsigned char>(bytes[words.position() + i])
-                           : words.number("pixel " + std::to_string(i), white);
+    unsigned long long value = 0;
+    if (!raw) {
+      value = words.number("pixel " + std::to_string(i), white);
+    } else {
+      value = bytes_per_pixel == 1 ? byte(i) : byte(2 * i) << 8U | byte(2 * i + 1);
+    }
     if (value > white) {
       throw MapError({"map image is no valid PGM", path.string(),
                       "pixels of at most " + std::to_string(white), std::to_string(value),
                       "save the image again"});
     }
-    image.shades.push_back(static_cast<double>(value) / static_cast<double>(white));
+    image.greys.push_back(to_8_bits(static_cast<std::uint32_t>((value * 65'535 + white / 2) / white)));
   }
   return image;
 }

@@ -79,6 +79,13 @@ TEST(DiscCollision, CountsUnknownCellsAndTheMapsEnd) {
   EXPECT_FALSE(disc_collides(map, 0.5, 1.5, 0.2));
 }
 
+TEST(DiscCollision, CountsCellsThatAreNotFree) {
+  GridMap map = testing::drawn({".."});
+  EXPECT_FALSE(disc_collides(map, 0.9, 0.5, 0.2));
+  map.cells[1] = 1;  // of a map in mode scale or raw
+  EXPECT_TRUE(disc_collides(map, 0.9, 0.5, 0.2));
+}
+
 TEST(PointController, ArrivesFromEverySideWithoutOvershooting) {
   for (const double heading_rad : {0.0, 1.0, kPi / 2.0, 2.5, kPi, -2.0}) {
     Unicycle robot;

@@ -1,7 +1,7 @@
 """What proves a claim or runs a block: whether there is such a test, program or row of a benchmark.
 
-Tests are `stage/room/test_file.py::test_name` below tests/ or mauve_examples/tests/, or `Suite.Name` of the
-kernel; programs that ctest runs are `ctest: NAME`, rows of scripts/bench `bench: WORDS`.
+Tests are `stage/room/test_file.py::test_name` below tests/ or mauve_examples/tests/, or `Suite.Name` in
+C++; programs that ctest runs are `ctest: NAME`, rows of scripts/bench `bench: WORDS`.
 """
 
 import ast
@@ -19,11 +19,12 @@ def _tests_of(file: Path) -> frozenset[str]:
 
 
 @cache
-def _kernel_cases() -> frozenset[str]:
+def _cpp_cases() -> frozenset[str]:
     pattern = re.compile(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),\s*(\w+)\)", re.MULTILINE)
     tests = ROOT / "tests"
     alone = [file for folder in ("rules", "models") for file in (tests / folder).glob("test_*.cpp")]
-    sources = [*(tests / "kernel").glob("*/test_*.cpp"), *alone]
+    mission = (ROOT / "mauve_examples" / "tests").glob("test_*.cpp")
+    sources = [*(tests / "kernel").glob("*/test_*.cpp"), *alone, *mission]
     return frozenset(
         ".".join(found) for file in sources for found in pattern.findall(file.read_text("utf-8"))
     )
@@ -56,4 +57,4 @@ def is_there(proof: str) -> bool:
     if is_python:
         paths = (ROOT / "tests" / file, ROOT / "mauve_examples" / "tests" / file)
         return any(path.is_file() and name in _tests_of(path) for path in paths)
-    return proof in _kernel_cases()
+    return proof in _cpp_cases()

@@ -1,7 +1,7 @@
 """What README and the pages of docs/ claim, and what fails when a claim is false.
 
 A claim is quoted in the page's own words. Its proofs are tests, `stage/room/test_file.py::test_name` below
-tests/ or mauve_examples/tests/, or `Suite.Name` of the kernel; programs that ctest runs, `ctest: NAME`; rows
+tests/ or mauve_examples/tests/, or `Suite.Name` in C++; programs that ctest runs, `ctest: NAME`; rows
 of scripts/bench, `bench: WORDS`.
 test_readme_claims.py holds this table to the pages and to what there is, and these pages to this table.
 """
@@ -197,8 +197,39 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
     "takes any map of the ROS map server": (
         "system/test_demo_mission.py::test_maps_of_others_work_as_they_are",
+        "system/test_demo_mission.py::test_a_turned_bmp_in_mode_scale_works",
         "system/test_demo_bad_input.py::test_bad_maps",
     ),
+    "The modes trinary, scale and raw give the cells that Nav2's map server for Jazzy publishes": (
+        "MapServerRule.EveryGreyBecomesTheMapServersCell",
+        "MapServerRule.SixteenBitsLoseTheLowerOnes",
+        "MapServerRule.TheGammaOfAPngHasNoEffect",
+        "MapServerRule.ColoursBecomeTheirLuma",
+        "MapServerRule.WhatIsNotOpaqueIsUnknownSaveInModeRaw",
+    ),
+    "The mission drives on cells of value 0": ("DiscCollision.CountsCellsThatAreNotFree",),
+    "A map whose origin has a yaw is turned upright, each cell by the nearest cell of the file": (
+        "TurnedMaps.AQuarterTurnMovesEveryCellExactly",
+        "TurnedMaps.EachCellHasTheStateBelowItsCentre",
+    ),
+    "The demo refuses, in one line with the remedy": ("system/test_demo_bad_input.py::test_bad_maps",),
+    "images other than PGM, PNG, and BMP without compression": (
+        "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
+        "BmpMaps.PalettesOfOneFourAndEightBits",
+        "BmpMaps.ColoursOf32Bits",
+        "MapFile.RefusesImagesThatCannotBeUsed",
+    ),
+    "more than 4194304 cells (2048 x 2048)": (
+        "MapFile.RefusesImagesThatCannotBeUsed",
+        "TurnedMaps.MayNotExceedTheLimitEither",
+    ),
+    "cells smaller than 1 mm or larger than 10 m": ("MapFile.RefusesWithOneLineThatNamesWhatIsWrong",),
+    "thresholds other than `0 <= free_thresh <= occupied_thresh <= 1`, and maps without a free cell": (
+        "MapFile.RefusesWithOneLineThatNamesWhatIsWrong",
+        "MapFile.RefusesImagesThatCannotBeUsed",
+    ),
+    "are read as their formats say": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
+    "Nav2 before 1.3.7 averaged colours and alpha": ("MapServerRule.ColoursBecomeTheirLuma",),
     "in virtual time on one thread": (
         "system/test_demo_simulated.py::test_it_succeeds_without_any_process_of_its_own",
         "system/test_demo_simulated.py::test_it_says_how_fast_it_was",
@@ -1181,6 +1212,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "Three kinds of maps may give other cells than a map server",
     "Before you build anything, download",
     "*From the trace of a demo on 2026-11-26",
     "Each tick is a release",

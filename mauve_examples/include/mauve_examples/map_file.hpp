@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Maps of the ROS map server: a YAML file that names a PGM or PNG image, read in trinary mode.
+// Maps of the ROS map server: a YAML file that names a PGM, PNG or BMP image, in mode trinary, scale or raw.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace mauve_examples {
 
-/// A world known cell by cell: -1 unknown, 0 free, 100 occupied; row 0 has the lowest y.
+/// A world known cell by cell: -1 unknown, 0 free, 1 to 100 how occupied; row 0 has the lowest y.
 struct GridMap : GridGeometry {
   std::vector<std::int8_t> cells;
 
@@ -24,9 +24,17 @@ struct GridMap : GridGeometry {
 /// 100 m at 5 cm.
 inline constexpr std::size_t kMaxMapCells = std::size_t{4} << 20;
 
-/// Reads a map as nav2_map_server does in trinary mode; an image path is relative to the YAML file. [non-rt]
-/// Throws MapError when a file is missing, truncated or of another format, when a value is out of its range,
-/// when the origin is turned, when the mode is not trinary and when no cell is free.
+/// Reads a map with the cells that nav2_map_server of Jazzy (since 1.3.7) publishes. [non-rt]
+/// An image path is relative to the YAML file. A map whose origin has a yaw becomes an upright grid of equal
+/// resolution: each cell takes the cell of the file below its centre, or is unknown. More is optional than for the
+/// map server: negate (0), occupied_thresh (0.65), free_thresh (0.25) and the yaw (0).
+/// Throws MapError for
+/// - a file that is missing, truncated or no map, or a value out of its range;
+/// - images other than PGM (P2, P5), PNG, and BMP without compression of 1, 4, 8, 24 or 32 bits a pixel;
+/// - more than kMaxMapCells cells, a turned map's corners included;
+/// - cells smaller than 1 mm or larger than 10 m;
+/// - thresholds other than 0 <= free_thresh <= occupied_thresh <= 1;
+/// - a map without a free cell.
 GridMap load_map(const std::filesystem::path& yaml_path);
 
 }  // namespace mauve_examples

@@ -74,7 +74,7 @@ def test_what_is_nothing_to_those_who_look_is_left_out():
 
 def test_each_robot_s_knowledge_is_in_its_colour():
     cells = np.zeros((4, 6), np.int8)
-    cells[0] = 100
+    cells[0] = 1  # of a map in mode scale: not free, so robots keep away from there
     known = {name: np.zeros((4, 6), np.bool_) for name in ("one", "two")}
     known["one"][:, :3] = True
     known["two"][:, 2:4] = True

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -181,6 +182,27 @@ def shared_map(name: str) -> Path:
 @pytest.mark.parametrize("name", ["depot.yaml", "tb3_sandbox.yaml"])
 def test_maps_of_others_work_as_they_are(start: Starter, name: str):
     demo = start("--simulated-time", "--map", str(shared_map(name)), *SHORT)
+    assert demo.finish() == 0, demo.lines[-8:]
+
+
+def write_turned_bmp(folder: Path) -> Path:
+    """The project's room as a BMP of 8 bits, in mode scale and with a yaw."""
+    room = Path(__file__).resolve().parents[2] / "maps" / "room.pgm"
+    _, _, size, _, pixels = room.read_bytes().split(b"\n", 4)
+    width, height = map(int, size.split())
+    rows = [pixels[row * width : (row + 1) * width] + bytes(-width % 4) for row in range(height)]
+    palette = b"".join(bytes((grey, grey, grey, 0)) for grey in range(256))
+    info = struct.pack("<IiiHHIIiiII", 40, width, -height, 1, 8, 0, 0, 0, 0, 256, 0)
+    content = info + palette + b"".join(rows)
+    start = 14 + len(info) + len(palette)
+    (folder / "m.bmp").write_bytes(b"BM" + struct.pack("<IHHI", 14 + len(content), 0, 0, start) + content)
+    text = "image: m.bmp\nmode: Scale\nresolution: 0.05\norigin: [-6.0, -4.0, 0.4]\nnegate: False\n"
+    (folder / "m.yaml").write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.196\n", encoding="utf-8")
+    return folder / "m.yaml"
+
+
+def test_a_turned_bmp_in_mode_scale_works(start: Starter):
+    demo = start("--simulated-time", "--map", str(write_turned_bmp(start.folder)), *SHORT)
     assert demo.finish() == 0, demo.lines[-8:]
 
 
