@@ -178,13 +178,13 @@ class RemoteRules:
             self._tell()
             return
         was_armed = self.status(each.number).armed
+        self._engine.set_own(each.number, view.is_by_rules(each.rule.do))
         running = ", ".join(f"{name} is RUNNING" for name in sorted(each.rule.targets()))
         each.standing = running or "the executor is there"
         self._engine.set_present(each.number, True, now_ns)
         self._tell()
         if not was_armed:
             self._arming.begin(each, now_ns)
-        self._engine.set_own(each.number, view.is_by_rules(each.rule.do))
         for act in ACTS:
             is_so = view.shows(each.rule.steps(act))
             if is_so is not None:

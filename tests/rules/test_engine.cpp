@@ -660,9 +660,8 @@ TEST(Rules, WhatSomebodyElseDidIsNotUndone) {
       EXPECT_EQ(takes_over, tried.engine.status(0).in_effect);
       tried.tell(0);
       tried.run_to(ms(1600));
-      const auto undone = std::count_if(tried.decisions.begin(), tried.decisions.end(), [](const Decision& one) {
-        return one.decided == Decided::undo;
-      });
+      const auto undone = std::count_if(tried.decisions.begin(), tried.decisions.end(),
+                                        [](const Decision& one) { return one.decided == Decided::undo; });
       EXPECT_EQ(takes_over ? 1 : 0, undone);
       tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);  // and the other one takes it back
       tried.run_to(ms(3500));

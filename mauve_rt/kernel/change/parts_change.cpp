@@ -90,7 +90,8 @@ void PartsChange::prepare() {
   try {
     prepare_parts();
   } catch (const Error& error) {
-    const Error failure = error;  // a copy: retire() may end what it is of
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): retire() may end what the error is of
+    const Error failure = error;
     retire();
     throw Error(ErrorCode::prepare_failed, failure.statement(),
                 preparation_detail(failure, component_.name(), what_));

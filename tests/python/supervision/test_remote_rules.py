@@ -446,7 +446,10 @@ def test_a_rule_that_the_executor_runs_is_left_to_it_and_taken_over_when_it_does
     assert "left to it" in world.decisions[0].reason
     assert world.requests == []
     world.own_rules = frozenset()
-    world.components = {name: type(view)(view.state, LOCAL) for name, view in world.components.items()}
+    world.components = {
+        name: type(view)(view.state, LOCAL, {"core": "rule link_lost"})
+        for name, view in world.components.items()
+    }
     world.tell()
     world.run(0.5)
     assert [each.decision for each in world.decisions][1:] == ["armed", "adopted", "condition_true"]

@@ -73,7 +73,10 @@ def test_what_held_a_while_ago():
 
 def test_a_tree_that_did_before_a_restart_holds_until_it_is_heard_otherwise():
     world = World([rule(when={"any": [silence("a"), silence("b")]}, undo_for_s=0.5)])
-    world.components = {name: type(view)(view.state, LOCAL) for name, view in world.components.items()}
+    world.components = {
+        name: type(view)(view.state, LOCAL, {"core": "rule link_lost"})
+        for name, view in world.components.items()
+    }
     world.talking = False
     world.tell()
     world.run(3.0)

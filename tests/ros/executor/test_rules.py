@@ -242,8 +242,8 @@ def test_takes_up_what_is_in_effect(start: Start, graph: Any, files: tuple[Path,
     robot.await_core(USUAL)
 
 
-def test_leaves_alone_what_an_operator_put_in(start: Start, graph: Any, files: tuple[Path, Path]):
-    """The condition is false all along, and the rules are loaded anew: what the rule would do is another's."""
+def test_leaves_alone_what_an_operator_did(start: Start, graph: Any, files: tuple[Path, Path]):
+    """The condition is false all along; the rules are loaded anew. What the rule would do is another's."""
     robot = start()
     robot.await_said("armed")
     by_hand = {"component": "counter", "core": SAFE, "requested_by": "operator", "cause": "by hand"}
@@ -251,11 +251,8 @@ def test_leaves_alone_what_an_operator_put_in(start: Start, graph: Any, files: t
     robot.await_core(SAFE)
     (authors,) = (part.authors for part in robot.states[-1].components if part.name == "counter")
     assert authors == ["core=operator: by hand"]
-    (listed,) = (
-        part
-        for part in graph.ask(ListComponents, f"{NODE}/list_components").components
-        if part.name == "counter"
-    )
+    components = graph.ask(ListComponents, f"{NODE}/list_components").components
+    (listed,) = (part for part in components if part.name == "counter")
     assert listed.authors == authors
     assert graph.ask(LoadRules, f"{NODE}/load_rules", path="").success
     robot.await_said("armed", 2)

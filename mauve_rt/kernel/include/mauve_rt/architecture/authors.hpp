@@ -19,20 +19,20 @@ struct Authored {
   bool operator==(const Authored&) const = default;
 };
 
-/// The authors of changes, by element. For ordinary threads; all functions [non-rt].
+/// The authors of changes, by element.
 ///
 /// | member    | written by            | guarded by |
 /// | --------- | --------------------- | ---------- |
 /// | `by_`     | who commits a change  | `mutex_`   |
 class Authors {
  public:
-  /// Of the last change of an element; an empty author is the file or program, of which nothing is kept.
+  /// Of the last change of an element; an empty author is the file or program, of which nothing is kept. [non-rt]
   void note(const std::string& target, const std::string& element, const std::string& author);
-  /// Of a target that is gone, with all its elements.
+  /// Of a target that is gone, with all its elements. [non-rt]
   void forget(const std::string& target);
-  /// Empty: the file or program.
+  /// Empty: the file or program. [non-rt]
   std::string of(const std::string& target, const std::string& element) const;
-  /// Sorted by target and element.
+  /// Sorted by target and element. [non-rt]
   std::vector<Authored> all() const;
 
  private:

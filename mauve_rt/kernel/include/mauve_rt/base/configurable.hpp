@@ -42,6 +42,7 @@ class Configurable {
 /// that overrides one of them by mistake does not compile.
 class ConfigurablePart : public Configurable {
  public:
+  /// As of the base. [non-rt]
   void configure() final { Configurable::configure(); }
   void cleanup() final { Configurable::cleanup(); }
 };
