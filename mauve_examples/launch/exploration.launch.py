@@ -69,16 +69,19 @@ def _mission(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     options = parse_options([f"--duration={_UNTIL_CTRL_C_S}", *words])
     world = load_world(options.map_file, options.names, seed=options.seed)
     setups = write_setups(world, options.out, seed=options.seed, supervisor=options.supervisor)
-    times = (
-        {}
-        if link_stays
-        else {"link_loss_at_s": options.link_loss_at_s, "link_back_at_s": options.link_back_at_s}
-    )
-    parameters = {"robots": options.names, "drop_share": options.drop_share, "seed": options.seed}
+    loss_s, back_s = (0.0, 0.0) if link_stays else (options.link_loss_at_s, options.link_back_at_s)
     radio = Node(
         package="mauve_examples",
         executable="radio",
-        parameters=[parameters | {name: float(at_s) for name, at_s in times.items() if at_s is not None}],
+        parameters=[
+            {
+                "robots": options.names,
+                "drop_share": options.drop_share,
+                "seed": options.seed,
+                "link_loss_at_s": float(loss_s or 0.0),
+                "link_back_at_s": float(back_s or 0.0),
+            }
+        ],
         output="screen",
     )
     robots = [

@@ -1,6 +1,7 @@
 """The radio process of a mission.
 
     ros2 run mauve_examples radio --ros-args -p robots:="[robot_1,robot_2]" [-p drop_share:=0.1] [-p seed:=1]
+        [-p link_loss_at_s:=20.0] [-p link_back_at_s:=45.0]
 
 Exit status: 0 after SIGINT or SIGTERM, 2 for bad parameters (one line on stderr).
 """

@@ -21,6 +21,7 @@ rules:
   - name: quiet
     when: WHEN
     do: [{kind: replace_core, target: metronome, name: mauve_examples/DO}]
+    takes_over: OVER
     undo: {for_s: 0.5, do: [{kind: replace_core, target: metronome, name: mauve_examples/UNDO}]}
 """
 SILENCE = "{silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}"
@@ -30,11 +31,14 @@ VALUE = "{value: {topic: peer, type: std_msgs/msg/Float64, field: data, above: 1
 class Stage:
     """The metronome and its supervisor."""
 
-    def __init__(self, folder: Path, *, do: str, undo: str, when: str = SILENCE) -> None:
+    def __init__(
+        self, folder: Path, *, do: str, undo: str, when: str = SILENCE, takes_over: str = "false"
+    ) -> None:
         share = share_folder("mauve_examples")
         assert share is not None
         rules = folder / "rules.yaml"
         text = RULES.replace("UNDO", undo).replace("DO", do).replace("WHEN", when)
+        text = text.replace("OVER", takes_over)
         rules.write_text(text, encoding="utf-8")
         self.time = Simulation()
         self.topics = SimulatedTopics()
@@ -73,14 +77,26 @@ def stage(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.Mo
     stage.time.shutdown()
 
 
-@pytest.mark.parametrize("stage", [{"do": "Metronome", "undo": "Accelerando"}], indirect=True)
-def test_what_is_in_effect_when_it_is_armed_is_adopted_and_undone(stage: Stage):
+OF_THE_FILE = {"do": "Metronome", "undo": "Accelerando"}  # what the rule does is in effect from the start
+
+
+@pytest.mark.parametrize("stage", [OF_THE_FILE | {"takes_over": "true"}], indirect=True)
+def test_what_the_file_put_in_is_taken_over_and_undone_where_the_rule_says_so(stage: Stage):
     stage.run(5.0)
     assert stage.said() == ["armed", "adopted", "condition_true"]
     assert stage.core() == "Metronome"
     stage.run(1.0, playing=True)
     assert stage.said()[3:] == ["condition_false", "undo", "done"]
     assert stage.core() == "Accelerando"
+
+
+@pytest.mark.parametrize("stage", [OF_THE_FILE], indirect=True)
+def test_what_the_file_put_in_is_not_undone(stage: Stage):
+    stage.run(5.0)
+    assert stage.said() == ["armed", "condition_true", "suppressed"]
+    stage.run(2.0, playing=True)
+    assert stage.said()[3:] == ["condition_false"]
+    assert stage.core() == "Metronome"
 
 
 @pytest.mark.parametrize("stage", [{"do": "NoSuchCore", "undo": "Metronome"}], indirect=True)
