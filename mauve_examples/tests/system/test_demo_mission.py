@@ -65,7 +65,7 @@ def test_the_summary_tells_of_both_swaps_of_every_robot(summary: dict[str, Any])
         there, back = swaps
         assert there["cause"].startswith(f"link_lost: nothing on /{robot}/radio/in for ")
         assert there["silence_ms"] > 1000.0
-        assert back["silence_ms"] < 1000.0
+        assert back["silence_ms"] is None, "the silence is over"
         for swap in swaps:
             assert swap["decided_by"] == f"/{robot}/executor"
             assert swap["took_ms"] > 0.0
@@ -216,4 +216,4 @@ def test_its_rules_replayed_do_what_they_did(mission: Demo, tmp_path: Path):
     other.write_text(rules.read_text(encoding="utf-8").replace("longer_than_s: 1.75", "longer_than_s: 2.45"))
     differing = subprocess.run([*replay, other, bag], capture_output=True, text=True, check=False)
     assert differing.returncode == 1
-    assert re.search(r"link_lost  do .* \+0\.700  differs$", differing.stdout, re.MULTILINE)
+    assert re.search(r"link_lost  do .* \+0\.(69|70)\d  differs$", differing.stdout, re.MULTILINE)

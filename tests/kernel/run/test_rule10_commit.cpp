@@ -499,11 +499,12 @@ TYPED_TEST(Rule10Floor, WhatALateOneWritesToAnEndThatHasMovedIsDropped) {
   }();
   TypeParam& moved = *owned;
   this->architecture.add_resource("moved", std::move(owned));
-  std::atomic<bool> has_written{false};
+  // Shared: the component runs on after the test's body.
+  const auto has_written = std::make_shared<std::atomic<bool>>(false);
   this->prepare = [&] { this->architecture.connect("slow", "output", "moved", "write"); };
-  this->at_the_end_of_slow = [&] {
+  this->at_the_end_of_slow = [this, has_written] {
     this->core(*this->slow).exposed_shell().output.write({.value = -1});
-    has_written = true;
+    *has_written = true;
   };
   this->deploy_two();
   auto fresh = this->core_that_waits();
@@ -524,7 +525,7 @@ TYPED_TEST(Rule10Floor, WhatALateOneWritesToAnEndThatHasMovedIsDropped) {
   };
   newest();
   this->latch.open();
-  wait_until([&] { return has_written.load(); }, "the late one to write");
+  wait_until([&] { return has_written->load(); }, "the late one to write");
   EXPECT_GE(newest(), 0);
   this->wait_ended();
   EXPECT_FALSE(this->error) << this->error->what();
