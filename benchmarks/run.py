@@ -16,6 +16,7 @@ from pathlib import Path
 import machine
 from analysis import analysis_rows
 from command import command_rows
+from document import write_docs
 from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from mission import mission_rows
@@ -83,13 +84,15 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Return the exit status: 0 when everything could be measured, whatever the verdicts; else 1."""
+    """Return the exit status: 1 where something could not be measured, or by --gate missed its target."""
     parser = _parser()
     given = parser.parse_args(arguments)
     if given.rounds is not None and given.rounds < 1:
         parser.error(f"--rounds: expected at least 1, found {given.rounds}")
     if given.json is not None and not given.json.parent.is_dir():
         parser.error(f"--json: there is no folder {given.json.parent}")
+    if given.write_docs and given.only:
+        parser.error("--write-docs: the figures are those of one run of all benchmarks; leave out --only")
     settings = FULL if given.full else QUICK
     if given.rounds is not None:
         settings = replace(settings, rounds=given.rounds)
@@ -98,15 +101,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(markdown(rows))
     print(f"\n{described.line()}")
     print(f"{settings.mode}, {settings.rounds} rounds; steal time {steal.percent():.2f} %")
+    result = {
+        "mode": settings.mode,
+        "machine": described.as_json(),
+        "machine_line": described.line(),
+        "steal_percent": steal.percent(),
+        "rows": [row.as_json() for row in rows],
+    }
     if given.json is not None:
-        result = {
-            "mode": settings.mode,
-            "machine": described.as_json(),
-            "steal_percent": steal.percent(),
-            "rows": [row.as_json() for row in rows],
-        }
         given.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    return 0 if complete else 1
+    if given.write_docs:
+        write_docs(result)
+    missed = [row for row in rows if row.verdict == "missed"] if given.gate else []
+    for row in missed:
+        sys.stderr.write(
+            f"bench: missed: {row.what}: expected {row.target}, found {row.measured:g} {row.unit}\n"
+        )
+    return 0 if complete and not missed else 1
 
 
 def _measure(names: Sequence[str], settings: Settings) -> tuple[list[Row], bool]:
@@ -133,6 +144,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows, with every round, to FILE")
     parser.add_argument(
         "--only", action="append", choices=BENCHMARKS, help="only this one; may be given again"
+    )
+    parser.add_argument(
+        "--gate",
+        action="store_true",
+        help="exit with 1 where a count that must be zero is not, or a whole interval is beyond its target",
+    )
+    parser.add_argument(
+        "--write-docs", action="store_true", help="write the figures into docs/concepts/performance.md"
     )
     parser.add_argument("--rounds", type=int, help="another number of rounds; fewer than 10 decide nothing")
     return parser

@@ -1057,14 +1057,50 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "A core that replaces another one derives from the class for which the fsm was written": (
         "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
+    # ---- numbers in sentences whose quote above lacks them
+    "nly then publishes one epoch, 20 ms ahead.": (
+        "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
+        "HygieneOfTheKernel.NoPageFaultAfterTheStart",
+        "system/test_figures.py::test_with_it_both_are_on_one_grid",
+    ),
+    "and BMP without compression (1, 4, 8, 24": (
+        "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
+        "BmpMaps.PalettesOfOneFourAndEightBits",
+        "BmpMaps.ColoursOf32Bits",
+        "MapFile.RefusesImagesThatCannotBeUsed",
+    ),
+    "24 or 32 bits a pixel": (
+        "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
+        "BmpMaps.PalettesOfOneFourAndEightBits",
+        "BmpMaps.ColoursOf32Bits",
+        "MapFile.RefusesImagesThatCannotBeUsed",
+    ),
+    "4, 8, 24 or 32 bits a pixel, not of OS/2); - more": (
+        "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
+        "BmpMaps.PalettesOfOneFourAndEightBits",
+        "BmpMaps.ColoursOf32Bits",
+        "MapFile.RefusesImagesThatCannotBeUsed",
+    ),
+    "A PGM with a maximum value other than 255": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
+    "A PGM with a maximum value other than 255 and 65535": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
+    "so latencies and blackouts are 0": (
+        "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
+    ),
+    "for 10 periods": ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
+    "1 s at least": ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
+    "rewires the 1 kHz control loop": ("ctest: sensor_breaks",),
     # ---- real time
+    "`scripts/bench --gate` fails where a count that must be zero is not": (
+        "python/project/test_bench_docs.py::test_the_gate",
+        "doors/test_bench_gate.py::test_the_counts_that_must_be_zero_are",
+    ),
     "Without the rights to it everything runs all the same": (
         "ros/executor/test_process.py::test_without_real_time_rights_it_runs_and_says_so",
     ),
     "`require_realtime: true` in the architecture file refuses instead": (
         "ros/executor/test_process.py::test_require_realtime_refuses_to_run_without",
     ),
-    "Every figure stands beside a reference measured in turn with it in the same run": (
+    "Where a reference is shown, it was measured in turn with the figure": (
         "python/project/test_bench_statistics.py::test_every_round_begins_with_another_side",
         "python/project/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
     ),
@@ -1212,6 +1248,18 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "2 processors",
+    "On the disk the demo takes 0.7 GB in the clone",
+    "On the disk the demo takes 0.7 GB in the clone and 0.4 GB of system packages",
+    "On the disk the demo takes 0.7 GB in the clone (`.venv/` 0.5",
+    "`build/` 0.1",
+    "`build/` 0.1) and 0.4 GB of system packages",
+    "it is 2.9 GB in the clone",
+    "for a while 0.8 GB in `/tmp`",
+    "and 0.5 GB of ccache in `~/.cache`",
+    "Intel Xeon) whose 2 processors others kept busy",
+    "its load average was 13 to 22",
+    "1 in 30,111 releases.*",
     "Three kinds of maps may give other cells than a map server",
     "Before you build anything, download",
     "*From the trace of a demo on 2026-11-26",

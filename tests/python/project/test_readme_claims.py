@@ -1,7 +1,7 @@
 """Each claim has a test or a benchmark row: the table is held to the pages, and these to the table."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pytest
 from page_blocks import blocks
@@ -12,12 +12,18 @@ from readme_claims import CLAIMS, PAGES_OF_CLAIMS, PROMISE_NOTHING
 COMMAND = re.compile(r"(mauve|ros2|scripts/\w+|install/lib/\S+) ")
 
 
+GENERATED = re.compile(
+    r"<!-- figures: .*?<!-- end of the figures -->", re.DOTALL
+)  # test_bench_docs.py holds it
+
+
 def _plain(text: str) -> str:
     return " ".join(text.split())
 
 
 def _sentences(page: str) -> Iterator[str]:
-    """Sentences, rows of tables and commands of a page; no other code, no heading, no picture."""
+    """Sentences, rows of tables and commands of a page; no other code, no heading, nothing generated."""
+    page = GENERATED.sub("", page)
     commands = {line for block in blocks(page) if not block.is_fenced for line in block.lines}
     code = {line for block in blocks(page) for line in block.lines}
     paragraph: list[str] = []
@@ -44,6 +50,48 @@ def test_what_the_table_quotes_is_in_a_page(words: str) -> None:
 def test_each_claim_has_a_proof_that_is_there(words: str) -> None:
     assert CLAIMS[words], "a claim without a proof: write the test, or take the words back"
     assert [proof for proof in CLAIMS[words] if not is_there(proof)] == []
+
+
+NUMBER = re.compile(r"(?<![\w.])\d[\d,.]*\d|(?<![\w.])\d(?!\w)")
+NO_FIGURE = re.compile(r"\]\([^)]*\)|`[^`]*`|ROS 2")  # links and code, which is run; a name
+
+
+def _loose_numbers(sentence: str, quotes: Iterable[str]) -> list[str]:
+    """Numbers of a sentence that no quote has: one could be changed, and nobody would see it."""
+    text = NO_FIGURE.sub(lambda found: " " * len(found[0]), sentence)
+    quoted = {
+        place
+        for words in quotes
+        for found in re.finditer(re.escape(words), sentence)
+        for place in range(*found.span())
+    }
+    return [found[0] for found in NUMBER.finditer(text) if not quoted >= set(range(*found.span()))]
+
+
+# Its table of figures is typed: `scripts/bench --write-docs` is there to write it.
+TYPED = "docs/concepts/performance.md"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES_OF_CLAIMS if page != TYPED])
+def test_each_number_is_quoted_in_the_table(page: str) -> None:
+    quotes = (*CLAIMS, *PROMISE_NOTHING)
+    loose = {
+        text: numbers
+        for text in _sentences(PAGES[page])
+        if not COMMAND.match(text) and (numbers := _loose_numbers(text, quotes))
+    }
+    assert loose == {}, "quote the clause with the number in readme_claims.py"
+
+
+def test_a_changed_number_is_found() -> None:
+    quotes = ["a blackout of 14 us", "and misses no"]
+    assert (
+        _loose_numbers("It has a blackout of 14 us (`-p x:=3`, ROS 2), and misses no release.", quotes) == []
+    )
+    assert _loose_numbers("It has a blackout of 15 us, and misses no release of 100.", quotes) == [
+        "15",
+        "100",
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES_OF_CLAIMS)

@@ -1,0 +1,82 @@
+"""What scripts/bench writes into a page is what one run found, and its gate lets no bad figure pass."""
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))  # at the end: it hides nothing
+
+import document
+import run
+from rows import Row, compared, exactly_zero, never_over, not_available
+from settings import Settings
+
+ROWS = {
+    "a ratio within": compared("a", [(1.0, 2.0)] * 12, unit="us", beside="b", ratio_limit=1.5),
+    "a ratio beyond": compared("a", [(4.0, 2.0)] * 12, unit="us", beside="b", ratio_limit=1.5),
+    "too few rounds": compared("a", [(4.0, 2.0)] * 3, unit="us", beside="b", ratio_limit=1.5),
+    "none": exactly_zero("a", [0, 0]),
+    "one": exactly_zero("a", [0, 1], unit="releases"),
+    "over": never_over("a", [3.0], limit=2.0, unit="ms"),
+    "not here": not_available("a", "no such machine"),
+}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_a_row_comes_back_from_its_json(name: str) -> None:
+    row = ROWS[name]
+    told = json.loads(json.dumps(row.as_json()))
+    told["rounds"] = row.rounds
+    assert Row.from_json(told) == row
+
+
+@pytest.mark.parametrize(
+    ("name", "status"),
+    [
+        ("a ratio within", 0),
+        ("a ratio beyond", 1),
+        ("too few rounds", 0),
+        ("none", 0),
+        ("one", 1),
+        ("over", 1),
+    ],
+)
+def test_the_gate(
+    name: str, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def rows(_settings: Settings) -> Iterator[Row]:
+        yield ROWS[name]
+
+    monkeypatch.setattr(run, "BENCHMARKS", {"swap": rows})
+    assert run.main([]) == 0, "without it nothing is judged"
+    assert run.main(["--gate"]) == status
+    assert ("bench: missed: a: expected" in capsys.readouterr().err) == bool(status)
+
+
+def test_the_page_is_written_from_a_whole_run_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "performance.md"
+    page.write_text(f"before\n{document.BEGIN}old\n{document.END}after\n", encoding="utf-8")
+    result = {
+        "mode": "quick",
+        "machine_line": "a machine",
+        "steal_percent": 0.1,
+        "rows": [ROWS["none"].as_json()],
+    }
+    document.write_docs(result, page=page, kept=tmp_path / "performance.json")
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith(
+        f"before\n{document.BEGIN}\na machine; `scripts/bench --quick`, steal time 0.10 %.\n\n| what"
+    )
+    assert text.endswith(f"\n{document.END}after\n")
+    kept = json.loads((tmp_path / "performance.json").read_text(encoding="utf-8"))
+    assert "rounds" not in kept["rows"][0]
+    with pytest.raises(ValueError, match="expected the lines"):
+        document.with_figures("no place", result)
+    with pytest.raises(SystemExit):
+        run.main(["--write-docs", "--only", "swap"])
+    assert "leave out --only" in capsys.readouterr().err
