@@ -139,7 +139,7 @@ def _measure(names: Sequence[str], settings: Settings) -> tuple[list[Row], bool]
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
     amount = parser.add_mutually_exclusive_group()
-    amount.add_argument("--quick", action="store_true", help="about 5 minutes (the default)")
+    amount.add_argument("--quick", action="store_true", help="about 13 minutes (the default)")
     amount.add_argument("--full", action="store_true", help="about 30 minutes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows, with every round, to FILE")
     parser.add_argument(

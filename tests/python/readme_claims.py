@@ -126,7 +126,12 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ParallelChanges.WaitForNoCommitOfOthers",
         "ParallelChanges.ThatAddOrRemoveGoOneAfterTheOther",
     ),
-    "a faulted component gets a new core": (
+    "A faulted component gets a new core, or its present core is configured again": (
+        "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
+        "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
+        "ros/executor/test_faulted_component.py::test_by_the_command_line",
+    ),
+    "mauve replace-core /robot_1/executor guidance mauve_examples/Guidance": (
         "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_the_command_line",
