@@ -32,11 +32,21 @@ def with_figures(page: str, result: Mapping[str, Any]) -> str:
     Raises:
         ValueError: the page has no place for it.
     """
+    before, after = around_figures(page)
+    return f"{before}\n{_figures(result)}\n\n{after}"
+
+
+def around_figures(page: str) -> tuple[str, str]:
+    """What stands before and after the figures of the page, with the lines that mark their place.
+
+    Raises:
+        ValueError: the page has no place for figures.
+    """
     before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError(f"{PAGE.name}: expected the lines {BEGIN.strip()} and {END.strip()}, found not both")
-    return f"{before}{begin}\n{_figures(result)}\n\n{end}{after}"
+    return before + begin, end + after
 
 
 def _figures(result: Mapping[str, Any]) -> str:

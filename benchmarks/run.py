@@ -16,7 +16,7 @@ from pathlib import Path
 import machine
 from analysis import analysis_rows
 from command import command_rows
-from document import write_docs
+from document import PAGE, around_figures, write_docs
 from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from mission import mission_rows
@@ -93,6 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--json: there is no folder {given.json.parent}")
     if given.write_docs and given.only:
         parser.error("--write-docs: the figures are those of one run of all benchmarks; leave out --only")
+    if given.write_docs:
+        try:
+            around_figures(PAGE.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            parser.error(f"--write-docs: {error}")
     settings = FULL if given.full else QUICK
     if given.rounds is not None:
         settings = replace(settings, rounds=given.rounds)

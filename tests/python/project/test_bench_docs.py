@@ -56,6 +56,22 @@ def test_the_gate(
     assert ("bench: missed: a: expected" in capsys.readouterr().err) == bool(status)
 
 
+def test_the_page_of_the_project_has_a_place_for_figures() -> None:
+    document.around_figures(document.PAGE.read_text(encoding="utf-8"))
+
+
+def test_a_page_without_a_place_is_refused_before_anything_is_measured(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "performance.md"
+    page.write_text("no place\n", encoding="utf-8")
+    monkeypatch.setattr(run, "PAGE", page)
+    monkeypatch.setattr(run, "BENCHMARKS", {"swap": lambda _settings: pytest.fail("it measures")})
+    with pytest.raises(SystemExit):
+        run.main(["--write-docs"])
+    assert "--write-docs: performance.md: expected the lines" in capsys.readouterr().err
+
+
 def test_the_page_is_written_from_a_whole_run_only(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
