@@ -83,7 +83,7 @@ def _run(arguments: list[str], interrupts: Interrupts) -> int:
             return INTERRUPTED
         return _report(options, world, mission, interrupts)
     except BrokenPipeError:
-        raise  # nobody reads what the demo prints
+        raise  # the reader of the output is gone
     except OSError as error:
         raise MissionError(f"results folder {options.out}: {failure_text(error)}") from error
 

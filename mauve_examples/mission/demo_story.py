@@ -9,6 +9,7 @@ from mauve_examples.mission.plan import Plan
 from mauve_examples.mission.progress import MissionPicture, RobotPicture
 from mauve_msgs.msg import ComponentInfo, StepReport
 from mauve_rt.supervision.remote_rules import LEFT_TO_EXECUTOR
+from mauve_rt.trace.report.units import counted
 
 COMPONENT = "exploration"
 DONE_LASTS_S = 1.5  # before its first scan, or while a peer's map arrives, a robot may think so for a moment
@@ -54,8 +55,8 @@ class RobotStory:
 class MissionStory:
     """Fed with messages as they arrive.
 
-    What happened is told in the order in which it happened: a message may come half a second late, so each
-    line waits for SETTLE_S.
+    Events are reported in the order of their times. A message may come half a second late, so each line
+    waits for SETTLE_S.
     """
 
     def __init__(
@@ -193,7 +194,7 @@ def describe(swap: Swap) -> str:
     if swap.blackout_ns not in (StepReport.NOT_MEASURED, 0):  # simulated time measures nothing
         words.append(f"blackout {swap.blackout_ns / 1e3:.0f} us")
     if swap.missed_releases != StepReport.NOT_MEASURED:
-        words.append(f"{swap.missed_releases or 'no'} release{'s' * (swap.missed_releases > 1)} missed")
+        words.append(f"{counted(swap.missed_releases, 'release')} missed")
     return ", ".join(words)
 
 

@@ -45,7 +45,7 @@ def _run(verb: Verb, args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except (BrokenPipeError, ImportError):
-        raise  # the reader of the output is gone; the environment is not loaded: whoever called reports it
+        raise  # the reader of the output is gone; the environment is not loaded: the caller reports it
     except Exception as error:  # noqa: BLE001 - no traceback reaches the user of a verb
         report_failure("mauve", error)
         return BAD_USAGE

@@ -175,13 +175,12 @@ class Checks:
             self._resources[name] = describe_resource(resource, self._loader.registry)
         except MauveError as error:
             about = "type" if resource.type else "kind"
-            absence = self._absence("type", resource.type, (*place, about))
-            if error.code == "unknown_type" and absence is not None:
+            is_unknown = error.code == "unknown_type"
+            if is_unknown and (absence := self._absence("type", resource.type, (*place, about))):
                 yield absence
                 return
             what = f"bad {about} '{resource.type or resource.kind}' of resource '{name}': {error}"
-            known = self._loader.names(type_kind)
-            remedy = did_you_mean(resource.type, known) if error.code == "unknown_type" else ""
+            remedy = did_you_mean(resource.type, self._loader.names(type_kind)) if is_unknown else ""
             yield self._model.problem((*place, about), what, remedy=remedy, code=error.code)
             return
         if resource.topic is not None and message_class(self._resources[name].type) is None:

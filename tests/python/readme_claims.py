@@ -80,7 +80,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "The outcome names each component that missed a release": (
         "python/control/test_control.py::test_releases_that_were_missed_are_in_the_message",
     ),
-    "A stop waits for nobody": (
+    "A stop does not wait for a change": (
         "ros/executor/test_beside.py::test_a_stop_by_reconfigure_waits_for_no_preparation",
         "ros/executor/test_beside.py::test_a_stop_waits_for_no_stop_of_another_component",
     ),
@@ -91,7 +91,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "any other goes on beside it": (
         "ros/executor/test_beside.py::test_stop_start_and_list_wait_for_no_preparation",
     ),
-    "Deactivation and the end of the process call all off, and who asked is told so": (
+    "Deactivation and the end of the process call all changes off, and their callers are told so": (
         "ros/executor/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
         "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
