@@ -74,11 +74,15 @@ class Processes:
         """Until a process has printed a word.
 
         Raises:
-            BenchmarkError: it does not, or a process ended.
+            BenchmarkError: it does not; it ended, or another process failed.
         """
         until = time.monotonic() + _START_S
         while word not in self.output(name):
-            ended = [other for other, process in self._running.items() if process.poll() is not None]
+            ended = [
+                other
+                for other, process in self._running.items()
+                if process.poll() not in ((None,) if other == name else (None, 0))
+            ]
             if word in self.output(name):  # its last one
                 return
             if ended:

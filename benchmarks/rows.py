@@ -172,15 +172,21 @@ def markdown(rows: Sequence[Row]) -> str:
 def _measured(row: Row) -> str:
     if row.measured is None:
         return "-"
-    value = f"{row.measured:.4g} {row.unit}".strip()
+    value = f"{_number(row.measured)} {row.unit}".strip()
     interval = row.measured_interval
-    return value if interval is None else f"{value} [{interval.low:.3g}, {interval.high:.3g}]"
+    return value if interval is None else f"{value} [{_number(interval.low)}, {_number(interval.high)}]"
 
 
 def _reference(row: Row) -> str:
-    return "-" if row.reference is None else f"{row.reference:.4g} {row.unit} ({row.reference_what})"
+    return "-" if row.reference is None else f"{_number(row.reference)} {row.unit} ({row.reference_what})"
 
 
 def _ratio(row: Row) -> str:
     interval = row.ratio_interval
     return "-" if interval is None else f"{interval.value:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
+
+
+def _number(value: float) -> str:
+    """With three digits at least, and never as a power of ten that a reader has to multiply out."""
+    digits = f"{value:.3g}"
+    return f"{value:.0f}" if "e+" in digits else digits

@@ -142,8 +142,8 @@ TEST(MapServerRule, SixteenBitsLoseTheLowerOnes) {
   EXPECT_EQ(raw_cells("P2 2 1 65535\n0 25700\n"), (Cells{0, 100}));
 }
 
-/// A PNG of one row, written with libpng's simplified interface and then given a gamma chunk.
-Bytes png_with_gamma(png_uint_32 format, std::vector<png_byte> pixels) {
+/// A PNG of one row, written with libpng's simplified interface and then given a gamma chunk, and one more.
+Bytes png_with_gamma(png_uint_32 format, std::vector<png_byte> pixels, const Bytes& chunk = {}) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.format = format;
@@ -155,7 +155,7 @@ Bytes png_with_gamma(png_uint_32 format, std::vector<png_byte> pixels) {
   EXPECT_NE(png_image_write_to_memory(&image, text.data(), &size, 0, pixels.data(), 0, nullptr), 0);
   // gAMA of 1.0 in place of what the writer declares, each chunk by its length.
   Bytes result = text.substr(0, 33);
-  result += Bytes("\0\0\0\x04gAMA\0\x01\x86\xA0\x31\xE8\x96\x5F", 16);
+  result += Bytes("\0\0\0\x04gAMA\0\x01\x86\xA0\x31\xE8\x96\x5F", 16) + chunk;
   for (std::size_t at = 33; at + 12 <= text.size();) {
     const std::size_t length = png_get_uint_32(reinterpret_cast<png_const_bytep>(&text[at])) + 12U;
     const Bytes name = text.substr(at + 4, 4);
@@ -183,6 +183,12 @@ TEST(MapServerRule, WhatIsNotOpaqueIsUnknownSaveInModeRaw) {
               (Cells{kFree, kUnknown, kOccupied, kUnknown}))
         << mode;
   }
+}
+
+TEST(MapServerRule, TheTransparentColourOfAPngIsUnknown) {
+  const Bytes white_is_transparent("\0\0\0\x06tRNS\0\xFF\0\xFF\0\xFF\x37" "\x58" "\x1B" "\x7D", 18);
+  const Bytes image = png_with_gamma(PNG_FORMAT_RGB, {255, 255, 255, 254, 254, 254, 0, 0, 0}, white_is_transparent);
+  EXPECT_EQ(load(yaml("origin: [0, 0, 0]\n"), image).cells, (Cells{kUnknown, kFree, kOccupied}));
 }
 
 TEST(BmpMaps, RowsBeginAtTheBottomOrAtTheTop) {

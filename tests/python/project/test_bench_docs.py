@@ -56,8 +56,10 @@ def test_the_gate(
     assert ("bench: missed: a: expected" in capsys.readouterr().err) == bool(status)
 
 
-def test_the_page_of_the_project_has_a_place_for_figures() -> None:
-    document.around_figures(document.PAGE.read_text(encoding="utf-8"))
+def test_the_page_has_the_figures_that_are_kept() -> None:
+    page = document.PAGE.read_text(encoding="utf-8")
+    kept = json.loads(document.RESULT.read_text(encoding="utf-8"))
+    assert document.with_figures(page, kept) == page, "its figures are written by scripts/bench --write-docs"
 
 
 def test_a_page_without_a_place_is_refused_before_anything_is_measured(
