@@ -17,6 +17,7 @@ import machine
 from analysis import analysis_rows
 from command import command_rows
 from document import PAGE, around_figures, write_docs
+from echo import echo_rows
 from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from mission import mission_rows
@@ -48,6 +49,7 @@ from wakeup_executor import executor_wakeup_rows
 BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "wakeup": wakeup_rows,
     "executor-wakeup": executor_wakeup_rows,
+    "echo": echo_rows,
     "deployment": deployment_rows,
     "restart": restart_rows,
     "stop": stop_rows,
@@ -144,7 +146,7 @@ def _measure(names: Sequence[str], settings: Settings) -> tuple[list[Row], bool]
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
     amount = parser.add_mutually_exclusive_group()
-    amount.add_argument("--quick", action="store_true", help="about 13 minutes (the default)")
+    amount.add_argument("--quick", action="store_true", help="about 20 minutes (the default)")
     amount.add_argument("--full", action="store_true", help="about 30 minutes")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows, with every round, to FILE")
     parser.add_argument(

@@ -49,11 +49,11 @@ def executor_wakeup_rows(settings: Settings) -> Iterator[Row]:
         note = executor.load_report
     lost = trace.losses[COMPONENT].lost
     note += f"; {lost} trace records were lost" if lost else ""
-    samples = [[_latencies_ns(trace, *found[0]), *found[1:]] for found in rounds]
+    samples = [[latencies_ns(trace, *found[0]), *found[1:]] for found in rounds]
     yield from percentile_rows(what, samples, no_cyclictest=no_cyclictest, note=note)
 
 
-def _latencies_ns(trace: Trace, begin_ns: int, end_ns: int) -> list[float]:
+def latencies_ns(trace: Trace, begin_ns: int, end_ns: int) -> list[float]:
     """Actual minus nominal instant of the releases in a window."""
     releases = trace.of(COMPONENT, Kind.RELEASE)
     chosen = releases[(releases["a"] >= begin_ns) & (releases["a"] < end_ns)]

@@ -93,6 +93,19 @@ class TopicTroubles:
     def policy(self) -> int:
         """The last quality of service that did not fit, as rclpy's QoSPolicyKind."""
 
+class FlatNumbers:
+    """Reads the numbers of messages of one type; a sequence has one number, its length; a text has none."""
+
+    def __init__(self, fields: Sequence[tuple[str, str, str, int, Any]]) -> None:
+        """Fields: (name, type as in .msg files, "" or "fixed" or "sequence", size, fields of a message).
+
+        Raises:
+            MauveError: there is no number, or more than 1,000, or a field cannot be read.
+        """
+    @property
+    def names(self) -> list[str]:
+        """What the numbers are, in their order: position.x, ranges[3], path.length."""
+
 class TopicReport:
     """A bound topic: its name, expanded and remapped, and counts of messages."""
 
@@ -159,6 +172,22 @@ class Bridge:
         """
     def subscribe(self, resource: str, topic: str, type: str, qos: Qos) -> int:
         """As publish(), the other way."""
+    def mirror(
+        self,
+        resource: str,
+        topic: str,
+        type: str,
+        qos: Qos,
+        *,
+        period_ns: int,
+        numbers: FlatNumbers | None = None,
+        number: int | None = None,
+    ) -> int:
+        """Open a topic on which the polled value is published, at most once in `period_ns`; as publish().
+
+        With `numbers`: all of them as mauve_msgs/msg/Values, their names on another topic, with
+        `/names` behind it; with `number`, too: that one as std_msgs/msg/Float64.
+        """
     def call(self, resource: str, service: str, type: str) -> int:
         """Open a ROS service that answers a client's calls; as publish()."""
     def offer(self, resource: str, service: str, type: str, offered: str) -> int:

@@ -213,6 +213,7 @@ class RecentMaxima:
 
     component: Final[str]
     wakeup_ns: Final[int]
+    response_ns: Final[int]  # from the nominal instant of a release to the entry of the next wait
     execution_ns: Final[dict[str, int]]  # by execution state
 
 @final

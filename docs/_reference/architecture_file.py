@@ -9,6 +9,7 @@ from mauve_rt.model.section import Section
 SECTIONS: dict[type[Section], tuple[str, str]] = {
     schema.FileModel: ("The file", "At the top level of the file."),
     schema.ExecutorModel: ("executor", "`executor:`"),
+    schema.MirrorModel: ("mirror", "`executor: {mirror: [NAME, {...}]}`"),
     schema.SenderModel: ("sender", "`executor: {sender: {...}}`"),
     schema.DiagnosticsModel: (
         "diagnostics",

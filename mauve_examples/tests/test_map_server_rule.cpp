@@ -186,8 +186,14 @@ TEST(MapServerRule, WhatIsNotOpaqueIsUnknownSaveInModeRaw) {
 }
 
 TEST(MapServerRule, TheTransparentColourOfAPngIsUnknown) {
-  const Bytes white_is_transparent("\0\0\0\x06tRNS\0\xFF\0\xFF\0\xFF\x37" "\x58" "\x1B" "\x7D", 18);
-  const Bytes image = png_with_gamma(PNG_FORMAT_RGB, {255, 255, 255, 254, 254, 254, 0, 0, 0}, white_is_transparent);
+  const Bytes white_is_transparent(
+      "\0\0\0\x06tRNS\0\xFF\0\xFF\0\xFF\x37"
+      "\x58"
+      "\x1B"
+      "\x7D",
+      18);
+  const Bytes image =
+      png_with_gamma(PNG_FORMAT_RGB, {255, 255, 255, 254, 254, 254, 0, 0, 0}, white_is_transparent);
   EXPECT_EQ(load(yaml("origin: [0, 0, 0]\n"), image).cells, (Cells{kUnknown, kFree, kOccupied}));
 }
 

@@ -128,7 +128,11 @@ ComponentDescription describe_component(Component& component) {
 }
 
 RecentMaxima take_recent_maxima(const Component& component) {
-  RecentMaxima maxima{component.name(), component.task().statistics().wakeup.maximum().take_recent_ns(), {}};
+  const TaskStatistics& statistics = component.task().statistics();
+  RecentMaxima maxima{component.name(),
+                      statistics.wakeup.maximum().take_recent_ns(),
+                      statistics.response.take_recent_ns(),
+                      {}};
   for (const auto& [state, time] : *component.state_times())
     maxima.execution_ns[state] = time.maximum().take_recent_ns();
   return maxima;
@@ -249,6 +253,7 @@ void bind_descriptions(py::module_& module) {
   py::class_<RecentMaxima>(module, "RecentMaxima")
       .def_readonly("component", &RecentMaxima::component)
       .def_readonly("wakeup_ns", &RecentMaxima::wakeup_ns)
+      .def_readonly("response_ns", &RecentMaxima::response_ns)
       .def_readonly("execution_ns", &RecentMaxima::execution_ns);
   module.def("allocation_counting", [] { return std::string(to_string(allocation_counting())); });
 }

@@ -36,6 +36,15 @@ class SerializedResource : public Resource {
   bool next_sample(Message& message, time_ns_t& time_ns, std::uint64_t& seen) override {
     return read(message, time_ns, seen) == DataStatus::new_data;
   }
+  bool peek_sample(Message& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    message.reserve(max_bytes_);  // not under the lock
+    {
+      const std::lock_guard lock(mutex_);
+      sequence = look(message, time_ns);
+    }
+    if (sequence == 0) message = options_.zero;
+    return sequence != 0;
+  }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     return message.size() >= kCdrHeader.size() && write(message, time_ns);
   }
@@ -50,6 +59,8 @@ class SerializedResource : public Resource {
  protected:
   virtual DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept = 0;
   virtual bool put_in(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT = 0;
+  /// Copies the message written last; returns how many were written.
+  virtual std::uint64_t look(Message& message, time_ns_t& time_ns) const noexcept = 0;
 
   DataStatus read(Message& message, time_ns_t& time_ns, std::uint64_t& seen) {
     message.reserve(max_bytes_);  // not under the lock
@@ -130,13 +141,6 @@ class SerializedData final : public SerializedResource {
   explicit SerializedData(SerializedOptions options)
       : SerializedResource(SharedDataKind::describe().name, std::move(options)), place_(place()) {}
 
-  bool peek_sample(Message& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
-    sequence = 0;
-    if (read(message, time_ns, sequence) != DataStatus::none) return true;
-    message = options().zero;
-    return false;
-  }
-
  protected:
   DataStatus take_out(Message& message, time_ns_t& time_ns, std::uint64_t& seen) noexcept override {
     if (sequence_ == 0) return DataStatus::none;
@@ -149,6 +153,11 @@ class SerializedData final : public SerializedResource {
     ++sequence_;
     return true;
   }
+  std::uint64_t look(Message& message, time_ns_t& time_ns) const noexcept override {
+    message.assign(place_.message.begin(), place_.message.end());
+    time_ns = place_.time_ns;
+    return sequence_;
+  }
 
  private:
   Place place_;
@@ -160,6 +169,7 @@ class SerializedData final : public SerializedResource {
 /// | member                 | written by           | under  |
 /// | ---------------------- | -------------------- | ------ |
 /// | places_, first_, size_ | read, write services | mutex_ |
+/// | sequence_              | write service        | mutex_ |
 class SerializedRing final : public SerializedResource {
  public:
   explicit SerializedRing(SerializedOptions options)
@@ -189,7 +199,14 @@ class SerializedRing final : public SerializedResource {
     }
     places_[(first_ + size_) % places_.size()].set(message, time_ns);
     ++size_;
+    ++sequence_;
     return true;
+  }
+  std::uint64_t look(Message& message, time_ns_t& time_ns) const noexcept override {
+    const Place& newest = places_[(first_ + size_ + places_.size() - 1) % places_.size()];
+    message.assign(newest.message.begin(), newest.message.end());
+    time_ns = newest.time_ns;
+    return sequence_;
   }
 
  private:
@@ -202,6 +219,7 @@ class SerializedRing final : public SerializedResource {
   std::vector<Place> places_;
   std::size_t first_{0};
   std::size_t size_{0};
+  std::uint64_t sequence_{0};
 };
 
 template <typename Made>

@@ -177,6 +177,7 @@ ComponentDescription describe_component(Component& component);
 struct RecentMaxima {
   std::string component;
   time_ns_t wakeup_ns;
+  time_ns_t response_ns;
   std::map<std::string, time_ns_t> execution_ns;  // by state
 };
 RecentMaxima take_recent_maxima(const Component& component);

@@ -39,6 +39,7 @@ class Client:
 
     def __init__(self, discovery: Discovery) -> None:
         self._discovery = discovery
+        self._known: dict[str, tuple[Participant, Any]] = {}  # by service: who is asked again
 
     def call(self, service_type: Any, service: str, request: Any, *, wait_s: float = 0.0) -> Any:
         """The reply of a service, e.g. `/robot_1/executor/stop`.
@@ -55,7 +56,10 @@ class Client:
         Raises:
             NoExecutorError: all that is there is known and has no such service, or there is no reply in 15 s.
         """
-        participant, client = self._found(service_type, service, wait_s)
+        participant, client = self._known.get(service) or self._found(service_type, service, wait_s)
+        if not client.service_is_ready():
+            participant, client = self._found(service_type, service, wait_s)
+        self._known[service] = participant, client
         if getattr(request, "request_id", None) == "":
             request.request_id = str(uuid.uuid4())
         futures: list[Any] = []
@@ -130,6 +134,23 @@ class Client:
             self._look_again()
         return self.seen_executors()
 
+    def poll(self, service_type: Any, service: str, *, every_s: float) -> "Poll":
+        """For who asks a service again and again, and waits for no answer."""
+        return Poll(self._discovery, service_type, service, every_s=every_s)
+
+    def follow(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
+        """Call `heard` with every message, in spin()."""
+        node = self._discovery.participants[0].node
+        node.create_subscription(message_type, topic, heard, QoSProfile(depth=100))
+
+    def spin(self) -> None:
+        """Take what has come; returns at once, or after 0.05 s where nothing comes. Ctrl-C ends it."""
+        self._discovery.hurry()
+        first, *others = self._discovery.participants
+        for participant in others:
+            participant.executor.spin_once(timeout_sec=0)
+        _spin_once(first)
+
     def listen(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
         """Call `heard` with every message, until KeyboardInterrupt."""
         participant = self._discovery.participants[0]
@@ -137,10 +158,45 @@ class Client:
         while True:
             _spin_once(participant)
 
+    def sleep_until(self, instant_s: float) -> None:
+        """Until an instant of time.monotonic(); Ctrl-C ends it."""
+        while (left_s := instant_s - time.monotonic()) > 0:
+            time.sleep(min(left_s, _POLL_S))
+            _raise_interrupts()
+        _raise_interrupts()
+
     def _look_again(self) -> None:
         self._discovery.hurry()
         time.sleep(_LOOK_S)
         _raise_interrupts()
+
+
+class Poll:
+    """Asks one service again and again; a request without an answer is given up."""
+
+    def __init__(self, discovery: Discovery, service_type: Any, service: str, *, every_s: float) -> None:
+        self._discovery = discovery
+        self._type = service_type
+        self._service = service
+        self._every_s = every_s
+        self._clients: list[Any] = []
+        self._future: Any = None
+        self._due_s = 0.0
+
+    def look(self, request: Callable[[], Any]) -> Any:
+        """The answer to the last request, once; None: there is none yet. Asks anew when it is time."""
+        reply = None
+        if self._future is not None and self._future.done():
+            reply, self._future = self._future.result(), None
+        now = time.monotonic()
+        if now >= self._due_s:
+            newer = self._discovery.participants[len(self._clients) :]
+            self._clients += [each.node.create_client(self._type, self._service) for each in newer]
+            client = next((each for each in self._clients if each.service_is_ready()), None)
+            if client is not None and (self._future is None or now >= self._due_s + RESEND_S):
+                self._future = client.call_async(request())
+                self._due_s = now + self._every_s
+        return reply
 
 
 def _executors(offered: dict[str, list[str]]) -> list[str]:

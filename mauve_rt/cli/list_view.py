@@ -98,8 +98,9 @@ def _lonely(on_ros: Mapping[str, str], connected: set[str]) -> dict[str, str]:
 
 
 def _ros_names(resource: Any) -> str:
-    names = {side: getattr(resource, side) for side in _ROS_SIDES}
-    return "\n".join(f"[dim]{side}[/] {name}" for side, name in names.items() if name)
+    names = [(side, getattr(resource, side)) for side in _ROS_SIDES]
+    names += [("mirrors", topic) for topic in resource.mirrors]
+    return "\n".join(f"[dim]{side}[/] {name}" for side, name in names if name)
 
 
 def _table(*folding: str) -> Table:

@@ -1,12 +1,21 @@
 """The verbs of `mauve`, each with `add_arguments(parser)` and `main(args) -> exit status`."""
 
 import argparse
-import re
 import sys
 import time
 from typing import Any
 
-from mauve_rt.cli import analyze_verb, check_verb, report_verb, rules_verb, trace_verb
+from mauve_rt.cli import (
+    analyze_verb,
+    check_verb,
+    echo_verb,
+    mirror_verb,
+    report_verb,
+    rules_verb,
+    trace_verb,
+    watch_verb,
+)
+from mauve_rt.cli.arguments import absolute_name
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -14,7 +23,7 @@ _LOOK_S = 0.02  # between two looks at what a change cost
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("executor", type=_absolute, help="the executor's node, e.g. /robot_1/executor")
+    parser.add_argument("executor", type=absolute_name, help="the executor's node, e.g. /robot_1/executor")
     parser.add_argument("--json", action="store_true", help="print the reply as JSON")
 
 
@@ -313,13 +322,6 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
-def _absolute(name: str) -> str:
-    absolute = "/" + name.strip("/")
-    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", absolute, re.ASCII):
-        raise argparse.ArgumentTypeError(f"expected a node's name such as /robot_1/executor, found {name}")
-    return absolute
-
-
 VERBS = (
     Verb("list", "show the components of an executor", _add_executor, _list),
     Verb("stop", "stop a component", _add_stop, _stop),
@@ -345,6 +347,9 @@ VERBS = (
         analyze_verb.add_arguments,
         analyze_verb.main,
     ),
+    Verb("echo", "show the values of a resource or port", echo_verb.add_arguments, echo_verb.main),
+    Verb("mirror", "publish a value on a ROS topic", mirror_verb.add_arguments, mirror_verb.main),
+    Verb("watch", "show a live table of executors", watch_verb.add_arguments, watch_verb.main),
     Verb("record", "start or stop a recording of an executor", _add_recording, _recording),
     Verb(
         "report",

@@ -92,7 +92,7 @@ def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription
     ]
 
 
-def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, str]]) -> list[Any]:
+def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, Any]]) -> list[Any]:
     """ResourceInfo of every resource; `bindings`: ROS names by resource and field."""
     authors = runtime.authors()
     return [

@@ -36,6 +36,7 @@ class ArchitectureModel:
         self.require_realtime = content.executor.require_realtime
         self.diagnostics = content.executor.diagnostics
         self.sender = content.executor.sender
+        self.mirrors = list(content.executor.mirror)
         self.components: dict[str, ComponentModel] = dict(content.components)
         self.resources: dict[str, ResourceModel] = dict(content.resources)
         self.connections = [
@@ -126,6 +127,7 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
         *element_problems(model),
         *_connection_problems(model),
         *_port_count_problems(model),
+        *_value_name_problems(model),
     ]
     if problems:
         raise ArchitectureFileError(file.path, problems)
@@ -242,6 +244,19 @@ def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
             remedy = f"a port connects to one service; see line {first[port]}"
             yield model.problem(at_port, what, remedy=remedy, code="duplicate_name")
         first.setdefault(port, line)
+
+
+def _value_name_problems(model: ArchitectureModel) -> Iterator[Problem]:
+    """What is mirrored is a resource, or a port that is connected to one."""
+    ports = {f"{each.component}.{each.port}" for each in model.connections}
+    for index, mirror in enumerate(model.mirrors):
+        if mirror.name not in model.resources and mirror.name not in ports:
+            yield model.problem(
+                ("executor", "mirror", index),
+                f"the value '{mirror.name}' that is mirrored is not there",
+                expected="a resource, or component.port of a connection",
+                remedy=did_you_mean(mirror.name, [*model.resources, *ports]),
+            )
 
 
 def _port_count_problems(model: ArchitectureModel) -> Iterator[Problem]:

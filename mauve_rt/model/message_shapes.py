@@ -75,7 +75,7 @@ def _difference(
     """Field, expected and found of the first difference."""
     declared: Mapping[str, str] = definition.get_fields_and_field_types()
     for (name, words), shape in zip_longest(declared.items(), fields, fillvalue=(None, "")):
-        expected = _of_message(name, words) if name is not None else None
+        expected = message_field(name, words) if name is not None else None
         found = _of_struct(shape) if isinstance(shape, FieldShape) else None
         if expected is None or found is None:
             known = expected or found
@@ -115,7 +115,7 @@ def _of_struct(shape: FieldShape) -> _Field:
     return _Field(shape.name, shape.type, shape.text_capacity, array, shape.size)
 
 
-def _of_message(name: str, words: str) -> _Field:
+def message_field(name: str, words: str) -> _Field:
     """From the words of a generated class: `sequence<geometry_msgs/Point, 4>`, `double[9]`, `string<10>`."""
     element, array, size = words, "", 0
     if match := re.fullmatch(r"sequence<(.+?)(?:, (\d+))?>", words):

@@ -73,6 +73,8 @@ _NAMESPACE = Text(
     without="__",
     made=lambda text: "/" + text.strip("/"),
 )
+_VALUE_NAME = Text(r"\w+(?:\.\w+)?", "a resource, or component.port")
+DEFAULT_MIRROR_HZ, MAX_MIRROR_HZ = 50.0, 1000.0
 _ENDPOINT = Text(r"\w+\.\w+", "name.port or name.service")
 _RESOURCE_KIND = Text(
     rf"{'|'.join(given_kinds())}|{_PLUGIN}",
@@ -144,6 +146,28 @@ class SenderModel(Section):
     )
 
 
+class MirrorModel(Section):
+    """A value that the executor publishes on a topic while it runs."""
+
+    name: str = setting(_VALUE_NAME, "a resource, or component.port of a read or write port")
+    field: str = setting(Text(), "one number of the value; without the key the whole value", default="")
+    topic: str = setting(
+        Text(rf"(?:(?:~/|/)?{_ROS_WORDS})?", "a ROS name such as scan, /map or ~/status", without="__"),
+        "name of the topic, relative to the namespace of the executor; without the key ~/mirror/NAME",
+        default="",
+    )
+    rate_hz: float = setting(
+        Real(above=0, most=MAX_MIRROR_HZ), "most messages a second", default=DEFAULT_MIRROR_HZ
+    )
+
+
+class _Mirror(Part):
+    """A MirrorModel, or the name alone."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        return super().read({"name": value} if isinstance(value, str) else value, place, faults)
+
+
 class ExecutorModel(Section):
     """The process as a whole."""
 
@@ -161,6 +185,11 @@ class ExecutorModel(Section):
     )
     sender: SenderModel = setting(
         Part(SenderModel), "the thread that sends the messages of bound topics", default=SenderModel()
+    )
+    mirror: list[MirrorModel] = setting(
+        ListOf(_Mirror(MirrorModel)),
+        "values that the executor publishes while it runs: names, or mappings with the keys below",
+        default=[],
     )
 
 

@@ -32,6 +32,18 @@ struct Private {
   double value{};
 };
 
+/// Not a ROS message either, with every kind of field.
+struct Attitude {
+  double roll{};
+  std::array<float, 3> rates{};
+  Point origin{};
+  std::array<Point, 2> corners{};
+  mauve::BoundedVector<std::int32_t, 4> codes;
+  mauve::BoundedString<16> mode;
+  bool level{};
+  std::uint64_t round{};
+};
+
 /// One that cannot be copied as bytes.
 struct Owning {
   Owning() = default;
@@ -101,6 +113,8 @@ struct Trigger {
 MAUVE_TYPE(executor_tests::Number, "std_msgs/msg/Float64", data)
 MAUVE_TYPE(executor_tests::Point, "geometry_msgs/msg/Point", x, y, z)
 MAUVE_TYPE(executor_tests::Private, "executor_tests/Private", value)
+MAUVE_TYPE(executor_tests::Attitude, "executor_tests/Attitude", roll, rates, origin, corners, codes, mode,
+           level, round)
 MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
 MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", data)
 MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
@@ -354,6 +368,46 @@ struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
   }
 };
 
+/// Writes to each kind of resource, every 10 ms.
+struct PilotShell : mauve::Shell {
+  mauve::WritePort<Attitude>& attitude = write_port<Attitude>("attitude");
+  mauve::WritePort<Point>& place = write_port<Point>("place").optional();
+  mauve::WritePort<Number>& latest = write_port<Number>("latest").optional();
+  mauve::WritePort<Number>& queue = write_port<Number>("queue").optional();
+  mauve::ReadPort<Attitude>& felt = read_port<Attitude>("felt").optional();
+  mauve::EventPort& beat = event_port("beat").optional();
+};
+
+struct Pilot : mauve::Core<PilotShell> {
+  Attitude attitude;
+
+  void act() {
+    ++attitude.round;
+    attitude.roll = static_cast<double>(attitude.round) / 2;
+    attitude.rates = {0.5F, static_cast<float>(attitude.round), -1.5F};
+    attitude.origin = {1.0, 2.0, 3.0};
+    attitude.corners = {Point{4.0, 5.0, 6.0}, Point{7.0, 8.0, static_cast<double>(attitude.round)}};
+    static_cast<void>(attitude.codes.resize(attitude.round % 3));
+    static_cast<void>(attitude.mode.assign("cruise"));
+    attitude.level = attitude.round % 2 == 0;
+    shell().attitude.write(attitude);
+    shell().place.write({attitude.roll, 0.25, -1.0});
+    shell().latest.write({attitude.roll});
+    static_cast<void>(shell().queue.write({attitude.roll}));
+    shell().beat.raise();
+  }
+};
+
+struct PilotFsm : mauve::Fsm<PilotShell, Pilot> {
+  void define() override {
+    mauve::State& run = execution("Fly", "act", &Pilot::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 /// Calls at every activation, with true and false in turns.
 struct CallerShell : mauve::Shell {
   mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
@@ -519,6 +573,7 @@ MAUVE_PLUGINS(registry) {
   registry.type<Number>();
   registry.type<Point>();
   registry.type<Private>();
+  registry.type<Attitude>();
   registry.type<Owning>();
   registry.shell<CounterShell>(shell);
   registry.shell<OtherShell>("executor_tests/OtherShell");
@@ -556,4 +611,8 @@ MAUVE_PLUGINS(registry) {
   registry.shell<TwinShell>(twin);
   registry.core<Twin>("executor_tests/Twin", twin);
   registry.fsm<TwinFsm>("executor_tests/TwinFsm", twin);
+  const std::string pilot = "executor_tests/PilotShell";
+  registry.shell<PilotShell>(pilot);
+  registry.core<Pilot>("executor_tests/Pilot", pilot);
+  registry.fsm<PilotFsm>("executor_tests/PilotFsm", pilot);
 }

@@ -23,7 +23,10 @@ PAGES_OF_CLAIMS = (
             "traces",
         )
     ),
-    *(f"docs/howto/{name}.md" for name in ("install", "operate", "record_and_report", "write_a_core")),
+    *(
+        f"docs/howto/{name}.md"
+        for name in ("install", "operate", "record_and_report", "see_values", "write_a_core")
+    ),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
 
@@ -381,7 +384,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ): ("ros/cli/test_ros2_command.py::test_ros2_run_starts_an_executor",),
     (
         "Its interface is in `mauve_msgs` (`~/list_components`, `~/stop`, `~/start`, "
-        "`~/replace_core`, `~/reconfigure`, `~/list_rules`, `~/load_rules`, `~/start_recording`, "
+        "`~/replace_core`, `~/reconfigure`, `~/list_rules`, `~/load_rules`, "
+        "`~/read_values`, `~/mirror`, `~/start_recording`, "
         "`~/stop_recording`, `~/state`, `~/events`, `~/decisions`, `/diagnostics`)."
     ): ("ros/cli/test_list.py::test_the_interface_is_the_one_that_readme_lists",),
     "On an installed Jazzy, with its supervisor and everything remapped as you like:": (
@@ -1404,6 +1408,116 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/project/test_bench_statistics.py::test_every_round_begins_with_another_side",
         "python/project/test_bench_statistics.py::test_the_interval_contains_the_true_median_about_as_often_as_it_says",
     ),
+    # ---- see values
+    "Every value that a resource holds can be seen.": (
+        "ros/executor/test_values.py::test_values_of_every_kind_by_resource_and_by_port",
+    ),
+    "Nothing in the architecture file has to change.": (
+        "ros/executor/test_values.py::test_a_look_takes_nothing_away",
+        "bench: wake-up latency of a 1 kHz component, its value read 100 times a second",
+    ),
+    "A poll costs a component no more than one more reader does.": (
+        "ros/executor/test_values.py::test_a_look_takes_nothing_away",
+        "bench: wake-up latency of a 1 kHz component, its value read 100 times a second",
+    ),
+    "mauve echo /robot_1/executor pose # a resource; until Ctrl-C": (
+        "ros/executor/test_values.py::test_echo",
+    ),
+    "mauve echo /robot_1/executor control.pose --once # the same by a port that is connected to it": (
+        "ros/executor/test_values.py::test_echo",
+    ),
+    "mauve echo /robot_1/executor pose --field theta --rate 50": ("ros/executor/test_values.py::test_echo",),
+    "mauve echo /robot_1/executor pose --csv # a line for each poll": (
+        "ros/executor/test_values.py::test_echo_as_a_table",
+    ),
+    "The command polls 10 times a second, unless `--rate` gives another rate.": (
+        "ros/executor/test_values.py::test_echo",
+    ),
+    "Writes between two polls are counted, not shown.": ("ros/executor/test_values.py::test_echo",),
+    "Each value has the time of its writer and its age.": (
+        "ros/executor/test_values.py::test_values_of_every_kind_by_resource_and_by_port",
+    ),
+    "Structs of your own are shown as messages are.": (
+        "ros/executor/test_values.py::test_values_of_every_kind_by_resource_and_by_port",
+    ),
+    "An element of a `ring_buffer` stays in it: the command shows the element that was written last.": (
+        "RingFixture.ALookShowsTheElementWrittenLastAndTakesNoneAway",
+        "ros/executor/test_values.py::test_a_look_takes_nothing_away",
+    ),
+    "mauve mirror /robot_1/executor pose # on /robot_1/executor/mirror/pose": (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+    ),
+    "mauve mirror /robot_1/executor pose --field theta --topic heading --rate 100": (
+        "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
+    ),
+    "mauve mirror /robot_1/executor pose --stop # without a value: all of them": (
+        "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
+    ),
+    (
+        "A mirror publishes a value on a ROS topic while the executor runs, so that "
+        "PlotJuggler, Foxglove, `rqt_plot` and `ros2 topic echo` draw it."
+    ): ("ros/executor/test_values.py::test_mirrors_of_the_file",),
+    (
+        "The thread that sends messages polls the value, at most 50 times a second unless "
+        "`--rate` gives another rate."
+    ): (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+        "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
+    ),
+    "A value that was not written since the last message is not published again.": (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+        "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
+    ),
+    "| of a ROS message type | the same message |": (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+    ),
+    "| one number of it (`--field`) | `std_msgs/msg/Float64` |": (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+    ),
+    (
+        "| a struct of your own | `mauve_msgs/msg/Values`; their names are on the topic "
+        "`NAME/names`, latched |"
+    ): ("ros/executor/test_values.py::test_a_mirror_of_an_own_struct",),
+    "An architecture file starts mirrors with the executor:": (
+        "ros/executor/test_values.py::test_mirrors_of_the_file",
+    ),
+    "A mirror ends with its resource.": (
+        "ros/executor/test_values.py::test_a_mirror_ends_with_its_resource",
+    ),
+    "`mauve list` shows the mirrors.": ("python/cli/test_list_view.py::test_mirrors_of_a_resource",),
+    "mauve watch /robot_1/executor /robot_2/executor --value pose:theta": (
+        "ros/cli/test_watch.py::test_a_table_that_keys_change",
+    ),
+    "mauve watch /robot_1/executor --once # one table, without a terminal": (
+        "ros/cli/test_watch.py::test_once_it_needs_no_terminal",
+    ),
+    (
+        "The table has a line for each component: state, core, rate, worst wake-up and "
+        "response of the last second, longest execution, overruns."
+    ): (
+        "ros/cli/test_watch.py::test_a_table_that_keys_change",
+        "python/cli/test_watch_view.py::test_a_line_for_each_component",
+    ),
+    "Below it are the rules, the values that you named, and the last change.": (
+        "python/cli/test_watch_view.py::test_rules_values_and_the_last_change",
+    ),
+    ("An executor that ends stays on the screen with its last values; when it is back, the table goes on."): (
+        "ros/cli/test_watch.py::test_an_executor_may_end_and_come_back",
+    ),
+    "| `s` | sort by another column |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
+    "| `/` | show only components whose name or state has these letters |": (
+        "ros/cli/test_watch.py::test_a_table_that_keys_change",
+    ),
+    "| up, down, Enter | open one component: ports, their values, properties |": (
+        "ros/cli/test_watch.py::test_a_table_that_keys_change",
+    ),
+    "| Escape | back to the table |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
+    "| `p` | pause |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
+    "| `q` | quit |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
+    "The values of other resources are not recorded;": (
+        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    ),
+    "shows them while the robot runs.": ("ros/executor/test_values.py::test_echo",),
     # ---- the house
     (
         "`scripts/lint` checks style, types, layers and includes, and builds `docs/` "
@@ -1442,6 +1556,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "The messages are:",
+    "| value | topic |",
+    "| key | effect |",
     "2 processors): the radio link is lost, a rule replaces the core of `exploration` on both robots.",
     "On the disk the demo takes 0.7 GB in the clone and 0.4 GB of system packages",
     (
@@ -1466,7 +1583,8 @@ PROMISE_NOTHING = (
     "All else:",
     (
         "[install](docs/howto/install.md), [operate an executor](docs/howto/operate.md), [write a "
-        "core](docs/howto/write_a_core.md), [record and report](docs/howto/record_and_report.md), "
+        "core](docs/howto/write_a_core.md), [see values](docs/howto/see_values.md), "
+        "[record and report](docs/howto/record_and_report.md), "
         "[real-time rights](docs/howto/realtime_rights.md), [several "
         "machines](docs/several_machines.md), [is my robot "
         "schedulable?](docs/howto/is_my_robot_schedulable.md), [launch "
@@ -1584,8 +1702,6 @@ PROMISE_NOTHING = (
     "[Rules](../rules.md) describes conditions, priorities and tools.",
     "| command | use |",
     "`mauve_examples/architecture/robot.yaml` is the mission's",
-    "Bind a resource to see its values",
-    "The values of other resources are not recorded",
     "`DIR_csv/topic.beat.csv`",
     ("While the robot runs, plot the topic with any ROS tool, such as `rqt_plot /beat/data` or PlotJuggler."),
     "A C++ core may override these functions",

@@ -82,6 +82,8 @@ class Binding {
   virtual void attach(std::shared_ptr<Resource> resource) { resource_ = std::move(resource); }
   /// Sends what its resource has for the outside, oldest first; true when there may be more. [non-rt]
   virtual bool send() { return false; }
+  /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
+  virtual time_ns_t next_look_ns() const { return kForever; }
   /// What its receivers wait for. [non-rt]
   virtual std::vector<Arrival*> arrivals(Lane /*lane*/) { return {}; }
   /// Whether rules listen for the silence of its resource: then it reports arrivals as early as it can, and that

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "bridge.hpp"
 
+#include <algorithm>
+
 #include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
@@ -28,6 +30,9 @@ std::size_t Bridge::publish(const TopicSettings& settings) {
 }
 std::size_t Bridge::subscribe(const TopicSettings& settings) {
   return open<IncomingTopic>(settings, opened_, std::ref(log_));
+}
+std::size_t Bridge::mirror(const TopicSettings& topic, const MirrorSettings& settings) {
+  return open<Mirror>(topic, opened_, std::ref(log_), settings);
 }
 std::size_t Bridge::call(const CallSettings& settings) { return open<CalledService>(settings); }
 std::size_t Bridge::offer(const CallSettings& settings, const std::string& offered) {
@@ -115,6 +120,15 @@ bool Bridge::send_some() {
   return more;
 }
 
+time_ns_t Bridge::next_look_ns() {
+  const std::lock_guard lock(mutex_);
+  time_ns_t next = monotonic_now_ns() + kLook;
+  for (const auto& [number, binding] : bindings_) {
+    if (binding->is_attached()) next = std::min(next, binding->next_look_ns());
+  }
+  return next;
+}
+
 void Bridge::send_all() {
   Notifier& written = architecture_.publications();
   for (bool ending = false; !ending;) {
@@ -123,7 +137,7 @@ void Bridge::send_all() {
     ending = ending_.load(std::memory_order_acquire);
     while (send_some()) {
     }
-    if (!ending) written.wait(word, monotonic_now_ns() + kLook);
+    if (!ending) written.wait(word, next_look_ns());
   }
 }
 

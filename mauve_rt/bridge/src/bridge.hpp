@@ -13,6 +13,7 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 
 #include "calls.hpp"
+#include "mirror.hpp"
 #include "thread.hpp"
 #include "topics.hpp"
 
@@ -41,6 +42,8 @@ class Bridge {
 
   std::size_t publish(const TopicSettings& settings);
   std::size_t subscribe(const TopicSettings& settings);
+  /// The value is polled, and published when it is a new one: on a topic, and for Values on another one with `/names`.
+  std::size_t mirror(const TopicSettings& topic, const MirrorSettings& settings);
   /// A client's calls go to a ROS service.
   std::size_t call(const CallSettings& settings);
   /// A resource's call is a ROS service.
@@ -68,6 +71,7 @@ class Bridge {
   template <typename Kind, typename... Args>
   std::size_t open(const Args&... args);
   bool send_some();
+  time_ns_t next_look_ns();
   void send_all();
   void start_receivers();
   void stop_receivers();

@@ -43,6 +43,29 @@ std::size_t open_topic(Bridge& self, const std::string& resource, const std::str
   return (self.*open)({.resource = resource, .name = topic, .type = type, .qos = qos});
 }
 
+/// From (name, type, "" | "fixed" | "sequence", size, fields).
+FlatField flat_field(const py::tuple& told) {
+  FlatField field{.name = told[0].cast<std::string>(), .type = told[1].cast<std::string>()};
+  const auto array = told[2].cast<std::string>();
+  if (!array.empty()) field.arity = array == "fixed" ? FlatField::Arity::fixed : FlatField::Arity::sequence;
+  field.size = told[3].cast<std::size_t>();
+  for (const py::handle inner : told[4]) field.fields.push_back(flat_field(inner.cast<py::tuple>()));
+  return field;
+}
+
+FlatNumbers flat_numbers(const py::iterable& fields) {
+  std::vector<FlatField> all;
+  for (const py::handle field : fields) all.push_back(flat_field(field.cast<py::tuple>()));
+  return FlatNumbers(std::move(all));
+}
+
+std::size_t open_mirror(Bridge& self, const std::string& resource, const std::string& topic,
+                        const std::string& type, const rmw_qos_profile_t& qos, time_ns_t period_ns,
+                        const std::optional<FlatNumbers>& numbers, std::optional<std::size_t> number) {
+  return self.mirror({.resource = resource, .name = topic, .type = type, .qos = qos},
+                     {.period_ns = period_ns, .numbers = numbers, .number = number});
+}
+
 py::bytes python_bytes(const std::vector<std::byte>& data) {
   return {reinterpret_cast<const char*>(data.data()), data.size()};
 }
@@ -150,6 +173,9 @@ PYBIND11_MODULE(_bridge, module) {
       .def_property_readonly("refused", [](const TopicReport& self) { return self.counts.refused; })
       .def_readonly("refusal", &TopicReport::refusal)
       .def_property_readonly("troubles", [](const TopicReport& self) { return self.troubles; });
+  py::class_<FlatNumbers>(module, "FlatNumbers")
+      .def(py::init(&flat_numbers), py::arg("fields"))
+      .def_property_readonly("names", &FlatNumbers::names);
   py::class_<Bridge>(module, "Bridge")
       .def(py::init([](std::uintptr_t node, std::uintptr_t architecture, int priority,
                        const std::vector<int>& cpus) {
@@ -163,6 +189,9 @@ PYBIND11_MODULE(_bridge, module) {
            py::arg("qos"), Unlocked())
       .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
            py::arg("type"), py::arg("qos"), Unlocked())
+      .def("mirror", &open_mirror, py::arg("resource"), py::arg("topic"), py::arg("type"), py::arg("qos"),
+           py::kw_only(), py::arg("period_ns"), py::arg("numbers") = std::nullopt,
+           py::arg("number") = std::nullopt, Unlocked())
       .def(
           "call",
           [](Bridge& self, const std::string& resource, const std::string& service, const std::string& type) {

@@ -164,6 +164,7 @@ void Machine::leave_wait() {
 void Machine::enter_wait(const State& state) {
   waiting_ = &state;
   next_ = nullptr;
+  statistics_.response.record(boundary_ns_ - clock_ns());
   if (listening_.is_late_response(boundary_ns_ - clock_ns())) tell_late_response();
   if (state.event == nullptr) {
     set_clock_ns(later_by(clock_ns(), state.duration_ns));

@@ -5,12 +5,14 @@ before, where everything can still be refused, attach() after.
 """
 
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile
 
-from mauve_rt._bridge import Bridge, CallReport, TopicReport
+from mauve_rt._bridge import Bridge, CallReport, FlatNumbers, TopicReport
 from mauve_rt._kernel import Architecture, ResourceDescription
 from mauve_rt.errors import MauveError, TopicError
 from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
@@ -18,6 +20,10 @@ from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
 from mauve_rt.trace.bag.recorded import SentMessage, TopicQos
+
+MAX_MIRRORS = 64
+_MIRROR_DEPTH = 10
+_SIDES = {"publish": "publishes", "subscribe": "subscribes"}  # fields of ResourceInfo
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,21 @@ class _BoundTopic:
         return SentMessage(self.topic, self.type_name, data, time_ns, self.qos)
 
 
+class Mirrored(NamedTuple):
+    """A value that is polled and published."""
+
+    name: str
+    """As requested: a resource, or component.port."""
+    field: str
+    """One number of it; empty: the whole value."""
+    resource: str
+    topic: str
+    """Expanded and remapped."""
+    type: str
+    """Of the messages."""
+    rate_hz: float
+
+
 class BoundResources:
     """Publishers, subscriptions, clients and services of one architecture, from configure() to close().
 
@@ -41,6 +62,7 @@ class BoundResources:
     | `_bridge`   | configure(), close()                | any                 | `_lock`    |
     | `_numbers`  | open(), discard(), remove() ...     | the same            | `_lock`    |
     | `_topics`   | open(), close(): grows, else emptied | recorder, any       | each dict operation is one |
+    | `_mirrors`  | mirror(), end_mirrors(), remove() ... | the same           | `_lock`    |
     """
 
     def __init__(self, node: LifecycleNode) -> None:
@@ -49,6 +71,7 @@ class BoundResources:
         self._bridge: Bridge | None = None
         self._numbers: dict[str, list[int]] = {}  # of what is open, by resource
         self._topics: dict[int, _BoundTopic] = {}  # by their numbers in the bridge, also of those closed
+        self._mirrors: dict[int, Mirrored] = {}  # of those that are open
 
     def configure(self, model: ArchitectureModel, architecture: Architecture) -> None:
         """Open and attach whatever the file binds; nothing flows before start().
@@ -141,6 +164,7 @@ class BoundResources:
     def remove(self, resources: Iterable[str]) -> None:
         """Close the topics and services of resources that are gone; what they were told before is sent."""
         with self._lock:
+            self.end_mirrors(lambda mirrored: mirrored.resource in resources)
             self.discard({name: self._numbers.pop(name) for name in resources if name in self._numbers})
 
     def start(self) -> None:
@@ -163,22 +187,80 @@ class BoundResources:
                 bridge.close()
             self._numbers.clear()
             self._topics.clear()
+            self._mirrors.clear()
 
     def _require_bridge(self) -> Bridge:
         if self._bridge is None:
             raise MauveError("the executor is not configured: nothing can be bound to ROS")
         return self._bridge
 
+    # ---- values that are polled and published
+
+    def mirror(self, wanted: Mirrored, *, numbers: FlatNumbers | None, number: int | None) -> None:
+        """Publish the value of a resource from now on.
+
+        Raises:
+            MauveError: another mirror, resource or node has the topic; or the middleware refuses.
+        """
+        with self._lock:
+            bridge = self._require_bridge()
+            if wanted in self._mirrors.values():
+                return
+            if len(self._mirrors) >= MAX_MIRRORS:
+                raise MauveError(f"there are {MAX_MIRRORS} mirrors already; stop one of them first")
+            if wanted.topic in {bound.topic for bound in self._present()}:
+                raise MauveError(f"topic {wanted.topic} is bound already; choose another one")
+            if others := self._node.count_publishers(wanted.topic):
+                raise MauveError(f"topic {wanted.topic} has {others} other publishers; choose another one")
+            qos = QoSProfile(depth=_MIRROR_DEPTH)
+            number_ = bridge.mirror(
+                wanted.resource,
+                wanted.topic,
+                wanted.type,
+                native_qos(qos),
+                period_ns=round(1e9 / wanted.rate_hz),
+                numbers=numbers,
+                number=number,
+            )
+            self._topics[number_] = _BoundTopic(
+                wanted.resource, "mirror", wanted.topic, wanted.type, recorded_qos(qos)
+            )
+            self._mirrors[number_] = wanted
+            bridge.attach([number_])
+
+    def end_mirrors(self, is_meant: Callable[[Mirrored], bool]) -> list[Mirrored]:
+        """End the mirrors that are meant; returns them."""
+        with self._lock:
+            ended = {number: each for number, each in self._mirrors.items() if is_meant(each)}
+            if ended:
+                self._require_bridge().close([*ended])
+            for number in ended:
+                del self._mirrors[number]
+            return [*ended.values()]
+
+    def mirrors(self) -> list[Mirrored]:
+        """Those that are open."""
+        with self._lock:
+            return [*self._mirrors.values()]
+
+    def _present(self) -> list[_BoundTopic]:
+        """The topics that are open."""
+        numbers = {number for numbers in self._numbers.values() for number in numbers} | set(self._mirrors)
+        return [bound for number, bound in self._topics.items() if number in numbers]
+
     # ---- for those who ask
 
-    def bindings(self) -> dict[str, dict[str, str]]:
+    def bindings(self) -> dict[str, dict[str, Any]]:
         """The ROS names of each bound resource, expanded and remapped, as ResourceInfo's fields."""
         # `_topics` keeps those closed too: of a resource that was added again the last one counts.
-        directions = {bound.resource: bound.direction for bound in list(self._topics.values())}
-        found: dict[str, dict[str, str]] = {}
+        bound_topics = [each for each in list(self._topics.values()) if each.direction in _SIDES]
+        sides = {bound.topic: _SIDES[bound.direction] for bound in bound_topics}
+        found: dict[str, dict[str, Any]] = {}
+        for mirrored in self.mirrors():
+            found.setdefault(mirrored.resource, {}).setdefault("mirrors", []).append(mirrored.topic)
         for topic in self.topics():
-            side = "publishes" if directions.get(topic.resource) == "publish" else "subscribes"
-            found.setdefault(topic.resource, {})[side] = topic.topic
+            if topic.topic in sides:
+                found.setdefault(topic.resource, {})[sides[topic.topic]] = topic.topic
         for call in self.calls():
             side = "offers" if call.is_offered else "calls"
             found.setdefault(call.resource, {})[side] = call.service

@@ -83,6 +83,7 @@ class Diagnostics:
             "wakeup_p99_ns": part.wakeup_p99_ns,
             "wakeup_max_ns": part.wakeup_max_ns,
             "wakeup_recent_max_ns": recent.wakeup_ns,
+            "response_recent_max_ns": recent.response_ns,
             "allocations": part.allocations,
             "page_faults": part.page_faults,
         }

@@ -14,10 +14,12 @@ from mauve_rt._kernel import STOP_TIMEOUT_NS, process_ends
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.values import Values
 from mauve_rt.counts import counted
 from mauve_rt.errors import MauveError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
+from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
@@ -73,6 +75,8 @@ class ExecutorNode(LifecycleNode):
         self._settings = settings
         declare_settings(self, PARAMETERS, settings)
         self._bound = BoundResources(self)
+        self._values = Values(runtime)
+        self._mirrors = Mirrors(self, self._values, self._bound)
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._properties = Parameters(self, runtime)
@@ -119,6 +123,8 @@ class ExecutorNode(LifecycleNode):
             self._runtime,
             control=control,
             bound=self._bound,
+            values=self._values,
+            mirrors=self._mirrors,
             state=self._state,
             parameters=self._properties,
             rules=self._rules,
@@ -214,6 +220,7 @@ class ExecutorNode(LifecycleNode):
             self._guard.follow(self._runtime)
         self._properties.follow()
         self._bound.configure(self._runtime.model, self._runtime.architecture)
+        self._mirrors.configure(self._runtime.model.mirrors)
         with self._properties.lock:
             names = ("rules", "bag", "record_topics", "bag_split_s", "bag_split_bytes")
             rules, bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)

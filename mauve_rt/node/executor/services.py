@@ -12,6 +12,8 @@ from mauve_msgs.srv import (
     ListComponents,
     ListRules,
     LoadRules,
+    Mirror,
+    ReadValues,
     Reconfigure,
     ReplaceCore,
     Start,
@@ -22,12 +24,17 @@ from mauve_msgs.srv import (
 from mauve_rt.control.control import Control
 from mauve_rt.control.requests import Code, Outcome, RecordingOrder, Report, Request
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.values import Values
+from mauve_rt.errors import MauveError
 from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
+from mauve_rt.interfaces.values import value_message
+from mauve_rt.model.schema import DEFAULT_MIRROR_HZ
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import log_request
 from mauve_rt.node.executor.events import Event
+from mauve_rt.node.executor.mirrors import Mirrors, topics
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.rules import OwnRules
 from mauve_rt.node.executor.state import StatePublisher
@@ -54,6 +61,8 @@ class Services:
         *,
         control: Control,
         bound: BoundResources,
+        values: Values,
+        mirrors: Mirrors,
         state: StatePublisher,
         parameters: Parameters,
         rules: OwnRules,
@@ -74,8 +83,12 @@ class Services:
         # The change is made by then: what is wrong here is told, and no refusal of it.
         self._follow = watch.guarded("the parameters", parameters.follow)
         self._untold = _Untold()
+        self._values = values
+        self._mirrors = mirrors
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
         node.create_service(ListRules, "~/list_rules", self._list_rules, callback_group=query_group)
+        node.create_service(ReadValues, "~/read_values", self._read_values, callback_group=query_group)
+        node.create_service(Mirror, "~/mirror", self._mirror, callback_group=query_group)
         node.create_service(LoadRules, "~/load_rules", self._on_load_rules, callback_group=control_group)
         for service, name, translate in (
             (Stop, "~/stop", _stop),
@@ -153,6 +166,44 @@ class Services:
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         response.warnings = self._warnings()
+        return response
+
+    def _read_values(self, request: Any, response: Any) -> Any:
+        response.instance_id = self._runtime.instance_id
+        response.revision = self._runtime.revision
+        found = self._values.read(request.names)
+        response.values = [
+            value_message(name, value, with_definition=request.with_definitions)
+            for name, value in zip(request.names, found, strict=True)
+        ]
+        return response
+
+    def _mirror(self, request: Any, response: Any) -> Any:
+        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+        try:
+            if request.stop:
+                ended = self._mirrors.end(request.name, request.topic)
+                response.topics = [topic for each in ended for topic in topics(each)]
+                response.message = f"stopped: {', '.join(each.topic for each in ended)}"
+            else:
+                mirrored = self._mirrors.start(
+                    request.name,
+                    field=request.field,
+                    topic=request.topic,
+                    rate_hz=request.rate_hz or DEFAULT_MIRROR_HZ,
+                )
+                response.topics, response.type = topics(mirrored), mirrored.type
+                names = f", names on {response.topics[1]}" if len(response.topics) > 1 else ""
+                response.message = (
+                    f"{mirrored.name} is published on {mirrored.topic} ({mirrored.type}{names}), "
+                    f"at most {mirrored.rate_hz:g} times a second"
+                )
+        except MauveError as error:
+            response.code, response.message = int(Code.INVALID), str(error)
+            return response
+        response.success = True
+        text = f"mirror: {response.message}"
+        self._logger.info(text)
         return response
 
     def _list_rules(self, _request: Any, response: Any) -> Any:

@@ -1,23 +1,17 @@
 """The messages of a bag's topics as CSV files, one for each topic."""
 
 import csv
-import dataclasses
-import json
 import re
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.message_fields import flat_fields
 from mauve_rt.trace.progress import Progress
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.trace import Trace
 
-MOST_ELEMENTS = 1000
-"""Of an array that is written out; of a longer one, as an image's, its length is."""
 _TIMES = ("log_time_ns", "monotonic_ns")
 _NO_NAME = re.compile(r"[^\w.-]")
 
@@ -54,7 +48,7 @@ def _write(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progre
     with ExitStack() as open_files:
         tables: dict[str, _Table] = {}
         for done, message in enumerate(trace.messages(*topics)):
-            row = dict(_flat("", message.msg))
+            row = dict(flat_fields(message.msg))
             table = tables.get(message.topic)
             if table is None:
                 path = folder / _file_name(message.topic, taken=[file.name for file in folder.iterdir()])
@@ -76,34 +70,6 @@ class _Table:
 
     def write(self, log_time_ns: int, monotonic_ns: int, row: dict[str, Any]) -> None:
         self._writer.writerow([log_time_ns, monotonic_ns, *(row.get(name, "") for name in self._fields)])
-
-
-def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """The columns of a message, by their names."""
-    if dataclasses.is_dataclass(value):
-        for field in dataclasses.fields(value):
-            yield from _flat(f"{name}.{field.name}" if name else field.name, getattr(value, field.name))
-    elif isinstance(value, np.ndarray | list | tuple | bytes):
-        yield name, _array_text(value)
-    else:
-        yield name, value
-
-
-def _array_text(values: Any) -> str:
-    if len(values) > MOST_ELEMENTS:
-        return f"{len(values)} elements"
-    return json.dumps(_plain(values))
-
-
-def _plain(value: Any) -> Any:
-    """As JSON has it."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple | bytes):
-        return [_plain(one) for one in value]
-    if dataclasses.is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    return value
 
 
 def _file_name(topic: str, *, taken: list[str]) -> str:

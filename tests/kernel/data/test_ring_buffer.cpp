@@ -60,6 +60,33 @@ TEST_F(RingFixture, AnEmptyRingLeavesTheLastElementsTimeAndThePlaceAlone) {
   EXPECT_EQ(DataStatus::none, first.input.read().status);
 }
 
+TEST_F(RingFixture, ALookShowsTheElementWrittenLastAndTakesNoneAway) {
+  std::vector<std::byte> message;
+  time_ns_t time_ns = 0;
+  std::uint64_t written = 7;
+  const auto looked = [&] {
+    Number number;
+    EXPECT_TRUE(CdrReader(message).get(number));
+    return number.value;
+  };
+  EXPECT_FALSE(ring.peek_sample(message, time_ns, written));
+  EXPECT_EQ(0U, written);
+  EXPECT_EQ(0.0, looked());
+  for (int i = 1; i <= 2; ++i) ring.write.write({static_cast<double>(i)}, 10 * i);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(ring.peek_sample(message, time_ns, written));
+    EXPECT_EQ(2.0, looked());
+    EXPECT_EQ(20, time_ns);
+    EXPECT_EQ(2U, written);
+  }
+  std::uint64_t seen = 0;
+  EXPECT_TRUE(ring.next_sample(message, time_ns, seen));
+  EXPECT_EQ(1.0, looked());
+  EXPECT_TRUE(ring.next_sample(message, time_ns, seen));
+  EXPECT_TRUE(ring.peek_sample(message, time_ns, written)) << "readers took all";
+  EXPECT_EQ(2.0, looked());
+}
+
 TEST_F(RingFixture, OverwritingKeepsTheNewestAndCountsTheLost) {
   RingBuffer<Number> overwriting(2, WhenFull::overwrite);
   writer.output.connect(overwriting.write, "ring");

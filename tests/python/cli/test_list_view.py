@@ -134,3 +134,13 @@ def test_a_state_that_lasts_is_told_against_period_and_bound() -> None:
         "stuck: hung: state Act has lasted 2.5 s (period 0.01 s, hung from 1 s on)",
         "starved: hung: wait Act is 2.5 s past its instant (period 0.01 s, hung from 1 s on)",
     ]
+
+
+def test_mirrors_of_a_resource() -> None:
+    resource = ResourceInfo(name="pose", publishes="/pose", mirrors=["/x/mirror/pose", "/heading"])
+    lines = _printed(ListComponents.Response(resources=[resource]))
+    assert [line.split()[-2:] for line in lines if "/" in line] == [
+        ["publishes", "/pose"],
+        ["mirrors", "/x/mirror/pose"],
+        ["mirrors", "/heading"],
+    ]

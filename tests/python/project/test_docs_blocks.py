@@ -151,6 +151,20 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "guidance --force": (GIVEN_UP,),
         "is stopped by force": (GIVEN_UP,),
     },
+    "docs/howto/see_values.md": {
+        "mauve echo /robot_1/executor pose   ": (
+            "ros/executor/test_values.py::test_echo",
+            "ros/executor/test_values.py::test_echo_as_a_table",
+        ),
+        "mauve mirror /robot_1/executor pose   ": (
+            "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
+        ),
+        "executor: {mirror:": ("ros/executor/test_values.py::test_mirrors_of_the_file",),
+        "mauve watch /robot_1/executor --once": (
+            "ros/cli/test_watch.py::test_a_table_that_keys_change",
+            "ros/cli/test_watch.py::test_once_it_needs_no_terminal",
+        ),
+    },
     "docs/howto/systemd.md": {
         "Description=MAUVE RT executor": (
             UNIT_FILES,

@@ -11,7 +11,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from mauve_rt.trace import open as open_trace
 from mauve_rt.trace.export.csv_files import export_csv
-from mauve_rt.trace.export.topic_files import MOST_ELEMENTS, _file_name
+from mauve_rt.trace.export.topic_files import _file_name
+from mauve_rt.trace.format.message_fields import MOST_ELEMENTS
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 

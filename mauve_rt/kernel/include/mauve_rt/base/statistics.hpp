@@ -80,6 +80,7 @@ struct TaskStatistics {
   std::atomic<std::uint64_t> overruns{0};
   std::atomic<std::uint64_t> skipped{0};
   LatencyHistogram wakeup;
+  Maximum response;
 };
 
 }  // namespace mauve

@@ -154,7 +154,8 @@ class Resource : public ConfigurablePart {
   bool next_published(std::vector<std::byte>& message, time_ns_t& time_ns) {
     return notifier_ != nullptr && next_sample(message, time_ns, handed_out_);
   }
-  /// Looks at the newest sample without removing it; false when there is none. [non-rt]
+  /// Looks at the newest sample without removing it; false, and the type's default, when nothing was written yet.
+  /// `sequence`: how many were written. An empty message: this resource has no value to show. [non-rt]
   virtual bool peek_sample(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/,
                            std::uint64_t& /*sequence*/) {
     return false;

@@ -58,6 +58,19 @@ class RingBuffer final : public Resource {
     CdrWriter(message).put(*value);
     return true;
   }
+  /// The element written last; a reader may have removed it.
+  bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    auto value = std::make_unique<T>();
+    {
+      const std::lock_guard lock(mutex_);
+      const Place& newest = places_[(first_ + size_ + places_.size() - 1) % places_.size()];
+      *value = newest.value;
+      time_ns = newest.time_ns;
+      sequence = sequence_;
+    }
+    CdrWriter(message).put(*value);
+    return sequence != 0;
+  }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
