@@ -13,6 +13,7 @@ from mauve_rt.trace.report.page import page, write_page
 from mauve_rt.trace.report.runs.compared import ComparedRuns
 from mauve_rt.trace.report.runs.noise import Floats
 from mauve_rt.trace.report.runs.tables import (
+    VERDICTS,
     View,
     decisions_view,
     reconfigurations_view,
@@ -114,11 +115,10 @@ def _figures(drawings: Sequence[tuple[str, str]], count: int) -> str:
 
 def _table(view: View) -> str:
     words = len(view.names) + len(view.words)
-    marked_from = len(view.columns) - 3
     rows = [
         [
-            Cell(text, "attention" if row.marked and index >= marked_from else "", number=index >= words)
-            for index, text in enumerate(row.cells)
+            Cell(text, "attention" if row.marked and column in VERDICTS else "", number=index >= words)
+            for index, (column, text) in enumerate(zip(view.columns, row.cells, strict=True))
         ]
         for row in view.rows
     ]

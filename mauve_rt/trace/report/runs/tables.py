@@ -21,6 +21,8 @@ from mauve_rt.trace.report.units import time_text
 
 _NONE = "\N{EN DASH}"
 _MARK = "larger than noise"
+VERDICTS = ("B / A", "B - A", "interval", "largest difference", _MARK)
+"""Columns that tell how B differs; a page colours these of a marked row."""
 _MANY_ROWS = 400
 
 
@@ -50,7 +52,7 @@ class View:
 
     @property
     def is_marked(self) -> bool:
-        """Tell whether a row is marked."""
+        """Return whether a row is marked."""
         return any(row.marked for row in self.rows)
 
 

@@ -52,7 +52,7 @@ class Figure:
 
     @property
     def differs(self) -> bool:
-        """Tell whether the difference is larger than the noise."""
+        """Return whether the difference is larger than the noise."""
         return self.judged is not None and self.judged.differs
 
 
@@ -80,7 +80,7 @@ class ComponentRun:
 
     @property
     def is_simulated(self) -> bool:
-        """Tell whether each wake-up came exactly on time, as only simulated time has it."""
+        """Return whether each wake-up came exactly on time, as only simulated time has it."""
         wakeups = self.series["wake-up latency"].values
         return bool(len(wakeups)) and not wakeups.any()
 

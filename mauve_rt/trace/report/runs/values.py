@@ -64,7 +64,7 @@ class ComparedField:
 
     @property
     def differs(self) -> bool:
-        """Tell whether B differs by more than the noise; in simulated time, whether any sample differs."""
+        """Return whether B differs by more than the noise; in simulated time, whether any sample differs."""
         return self.mean.differs or self.rms.differs or bool(self.largest_difference)
 
 

@@ -36,7 +36,9 @@ def verdict_on(found: ComparedRuns) -> Verdict:
     differing = sorted(found.differing, key=_weight, reverse=True)
     sentences = [Sentence(ATTENTION, figure_in_words(figure)) for figure in differing[1:_NAMED]]
     if len(differing) > _NAMED:
-        sentences.append(Sentence(ATTENTION, f"{counted(len(differing) - _NAMED, 'more figure')} differ."))
+        sentences.append(
+            Sentence(ATTENTION, f"The tables mark {counted(len(differing) - _NAMED, 'more figure')}.")
+        )
     sentences += [Sentence(ATTENTION, f"Only in {run}: {thing}.") for run, thing in only_in_one(found)]
     sentences += list(_instants(found))
     lossy = [name for name, trace in zip("AB", found.traces, strict=True) if trace.lost]

@@ -111,6 +111,24 @@ def test_two_overruns_are_no_difference() -> None:
     assert (overruns.a, overruns.b, overruns.differs) == (0, 2, False)
 
 
+def test_a_maximum_has_no_mark() -> None:
+    a, b = pair(0)
+    rows = b.records["c"]
+    (releases,) = np.nonzero(rows["kind"] == Kind.RELEASE)
+    rows["b"][releases[700]] += PERIOD_NS // 2
+    found = compare_runs(a, b)
+    (largest,) = (one for one in found.timing if one.name == "wake-up latency max")
+    assert largest.b > PERIOD_NS // 2 > 5 * largest.a
+    assert (largest.differs, largest.remark) == (False, "a single value")
+
+
+def test_another_load_is_a_difference() -> None:
+    a, b = pair(0)
+    loaded = long_trace(["c"], CYCLES, seed=2, load=LOAD, slower={"c": 1.3})
+    assert compare_runs(a, loaded).differing
+    assert not compare_runs(a, b).differing
+
+
 def test_more_tested_figures_widen_the_interval() -> None:
     change = Change(0.5, 0.15, 31, 0.1, is_ratio=False)
     assert change.judged(1).differs
@@ -135,8 +153,10 @@ def test_correlation_widens_the_interval() -> None:
 
 def test_the_percentile_of_a_run_is_exact_and_that_of_few_values_is_not_told() -> None:
     values = np.random.default_rng(4).integers(1, 10**9, 5_000)
-    half, tail = percentile_changes(values, 2 * values, (32, 32), [0.5, 0.9999])
-    assert tail is None
+    half, tail = percentile_changes(values, 2 * values, (32, 32), [0.5, 0.99])
+    assert tail is not None
+    assert percentile_changes(values[:1_000], values, (32, 32), [0.99]) != [None]
+    assert percentile_changes(values[:999], values, (32, 32), [0.99]) == [None]
     assert half is not None
     assert half.value == pytest.approx(math.log(2), rel=1e-3)
 
@@ -424,6 +444,16 @@ def test_the_page_is_in_the_first_folder_unless_told_otherwise(
     first = (tmp_path / "one" / "comparison.html").read_bytes()
     assert main(["report", one, two, "--compare"]) == 0
     assert (tmp_path / "one" / "comparison.html").read_bytes() == first  # resampled by the same seeds
+
+
+def test_a_run_may_be_a_folder_of_bags(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for day in ("monday", "tuesday"):
+        for robot in ("robot_1", "robot_2"):
+            (tmp_path / day).mkdir(exist_ok=True)
+            record_small_bag(tmp_path / day / robot)
+    assert main(["report", str(tmp_path / "monday"), str(tmp_path / "tuesday"), "--compare", "--json"]) == 0
+    subjects = {one["subject"] for one in json.loads(capsys.readouterr().out)["figures"]}
+    assert subjects == {"robot_1/a", "robot_2/a"}
 
 
 @pytest.mark.parametrize(
