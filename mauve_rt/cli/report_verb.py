@@ -44,6 +44,8 @@ def main(args: argparse.Namespace) -> int:
     out = args.out or (first if first.is_dir() else first.parent) / name
     try:
         return compare.main(args, out) if args.compare else _report(args, out)
+    except BrokenPipeError:
+        raise  # the reader of the tables is gone
     except OSError as error:
         print(f"mauve: report {out}: cannot be written ({error.strerror or error})", file=sys.stderr)
         return BAD_USAGE

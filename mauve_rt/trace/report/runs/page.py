@@ -22,6 +22,7 @@ from mauve_rt.trace.report.runs.tables import (
 )
 from mauve_rt.trace.report.runs.values import ComparedField, Samples
 from mauve_rt.trace.report.runs.words import number_text, verdict_on
+from mauve_rt.trace.report.tables import words_section
 from mauve_rt.trace.report.units import time_text
 from mauve_rt.trace.report.verdict import verdict_html
 
@@ -51,7 +52,12 @@ def write_comparison(path: Path, found: ComparedRuns, *, title: str) -> None:
         sections.append(values)
     outcome = verdict_html(verdict_on(found), title=title) + cards(_cards(found))
     names = paragraph(f"A: {found.names[0]}. B: {found.names[1]}.")
-    write_page(path, page(title, outcome, [names, *(one.render() for one in sections)], sections=sections))
+    write_page(
+        path,
+        page(
+            title, outcome, [names, *(one.render() for one in sections), words_section()], sections=sections
+        ),
+    )
 
 
 def _cards(found: ComparedRuns) -> list[Card]:

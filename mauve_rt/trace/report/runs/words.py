@@ -140,15 +140,14 @@ def nan_text(share: float) -> str:
 
 def _change(value: float, figure: Figure, judged: Judged) -> str:
     if judged.is_ratio:
-        return ratio_text(value)
+        return _ratio_text(value, digits=3 if abs(judged.value - 1) < _NEAR_ONE else 2)
     text = time_text(value) if figure.is_time else number_text(value)
     return f"+{text}" if value > 0 else text
 
 
-def ratio_text(ratio: float) -> str:
-    """Return a ratio; with more digits near 1."""
+def _ratio_text(ratio: float, *, digits: int) -> str:
     if math.isinf(ratio):
         return "\N{INFINITY}"
     if ratio >= _LARGE:
         return f"{ratio:,.0f}"
-    return f"{ratio:.3f}" if abs(ratio - 1) < _NEAR_ONE or ratio < _NEAR_ONE else f"{ratio:.2f}"
+    return f"{ratio:.{digits if ratio >= _NEAR_ONE else 3}f}"
