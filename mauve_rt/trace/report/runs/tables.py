@@ -13,11 +13,10 @@ from mauve_rt.trace.report.runs.words import (
     change_text,
     interval_text,
     mark_text,
-    nan_text,
     number_text,
     text_of,
 )
-from mauve_rt.trace.report.units import time_text
+from mauve_rt.trace.report.units import share_text, time_text
 
 _NONE = "\N{EN DASH}"
 _MARK = "larger than noise"
@@ -74,8 +73,8 @@ def decisions_view(found: ComparedRuns) -> View | None:
     rows = [Row(_rule_cells(found, rule)) for rule in found.rules()]
     if not rows:
         return None
-    times = ("A: cause to act p50", "max", "B: cause to act p50", "max")
-    numbers = ("acts in A", "in B", "first act in A", "in B", *times, "only in")
+    times = ("cause to act, A: p50", "A: max", "B: p50", "B: max")
+    numbers = ("acts in A", "in B", "order in A", "in B", *times, "only in")
     return View("Decisions", ("rule",), numbers, rows=rows[:_MANY_ROWS], note=order_in_words(*found.acts))
 
 
@@ -92,7 +91,7 @@ def reconfigurations_view(found: ComparedRuns) -> View | None:
         rows.append(Row((*cells, *counts, *blackouts, *missed, _only(*(cost.count for cost in costs)))))
     if not rows:
         return None
-    blackout = ("A: blackout p50", "max", "B: blackout p50", "max")
+    blackout = ("blackout, A: p50", "A: max", "B: p50", "B: max")
     numbers = ("in A", "in B", *blackout, "missed in A", "in B", "only in")
     return View("Reconfigurations", ("component",), numbers, ("from", "to"), rows[:_MANY_ROWS])
 
@@ -101,23 +100,11 @@ def values_view(found: ComparedRuns) -> View | None:
     """Return the table of values; None when the bags share no topic with a number."""
     if not found.values.fields:
         return None
-    numbers = [
-        "A: mean",
-        "B: mean",
-        "B - A",
-        "interval",
-        "A: rms",
-        "B: rms",
-        "A: min",
-        "max",
-        "B: min",
-        "max",
-    ]
-    numbers += ["A: samples", "NaN", "B: samples", "NaN"]
-    if found.simulated:
-        numbers.append("largest difference")
+    numbers = ["mean in A", "in B", "B - A", "interval", _MARK]
+    numbers += ["largest difference"] if found.simulated else []
+    numbers += ["rms in A", "in B", "range in A", "in B", "samples in A", "in B"]
     rows = [Row(tuple(_value_cells(one, found)), one.differs) for one in found.values.fields]
-    return View("Values", ("topic", "field"), (*numbers, _MARK), rows=rows, note=" ".join(_left_out(found)))
+    return View("Values", ("topic", "field"), tuple(numbers), rows=rows, note=" ".join(_left_out(found)))
 
 
 def all_views(found: ComparedRuns) -> list[View]:
@@ -162,16 +149,16 @@ def _value_cells(one: ComparedField, found: ComparedRuns) -> Iterator[str]:
     yield from map(number_text, (one.mean.a, one.mean.b))
     yield change_text(one.mean)
     yield interval_text(one.mean)
+    yield "yes" if one.differs else mark_text(one.mean)
+    if found.simulated:
+        yield number_text(one.largest_difference)
     yield from map(number_text, (one.rms.a, one.rms.b))
     for run in (one.a, one.b):
         finite = run.finite
-        yield from (number_text(float(of(finite)) if len(finite) else None) for of in (np.min, np.max))
+        ends = (float(finite.min()), float(finite.max())) if len(finite) else None
+        yield " to ".join(map(number_text, ends)) if ends else _NONE
     for run in (one.a, one.b):
-        yield f"{len(run.values):,}"
-        yield nan_text(run.nan_share)
-    if found.simulated:
-        yield number_text(one.largest_difference)
-    yield "yes" if one.differs else mark_text(one.mean)
+        yield f"{len(run.values):,}" + (f" ({share_text(run.nan_share)} NaN)" if run.nan_share else "")
 
 
 def _left_out(found: ComparedRuns) -> Iterator[str]:

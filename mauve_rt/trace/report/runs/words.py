@@ -7,7 +7,7 @@ from mauve_rt.trace.report.runs.compared import ComparedRuns, only_in_one
 from mauve_rt.trace.report.runs.noise import Judged
 from mauve_rt.trace.report.runs.timing import Figure
 from mauve_rt.trace.report.sentences import ATTENTION, GOOD, Sentence
-from mauve_rt.trace.report.units import counted, share_text, time_text
+from mauve_rt.trace.report.units import counted, time_text
 from mauve_rt.trace.report.verdict import Verdict
 
 LEAD = "Do the two runs differ?"
@@ -88,14 +88,13 @@ def figure_in_words(figure: Figure) -> str:
         if not (figure.a and figure.b):
             return f"{figure.subject}: {figure.measure}: {both}."
         rate = f"{figure.subject}'s {figure.measure} per release are"
-    elif figure.measure == "value":
-        rate = f"{figure.subject}: the {figure.statistic} is"
     else:
         rate = f"{figure.subject}'s {figure.name} is"
     change, interval = change_text(figure), interval_text(figure)
     if figure.judged.is_ratio:
         return f"{rate} {change} {_TIMES} {interval} of A's ({both})."
-    return f"{rate} {change} {interval} apart ({both})."
+    statistic = figure.statistic if figure.measure == "value" else figure.name
+    return f"{figure.subject}: the {statistic} differs by {change} {interval} ({both})."
 
 
 def change_text(figure: Figure) -> str:
@@ -131,11 +130,6 @@ def number_text(value: float | None) -> str:
     if value is None or math.isnan(value):
         return _NONE
     return f"{value:.4g}".replace("-", _MINUS)
-
-
-def nan_text(share: float) -> str:
-    """Return the share of values that are no number."""
-    return share_text(share) if share else "0"
 
 
 def _change(value: float, figure: Figure, judged: Judged) -> str:
