@@ -7,7 +7,7 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.report.runs.events import Act, Change, Cost, acts_of, costs_of
+from mauve_rt.trace.report.runs.events import Act, CoreChange, Cost, acts_of, costs_of
 from mauve_rt.trace.report.runs.timing import ComponentRun, Figure, component_run, only_in, timing_figures
 from mauve_rt.trace.report.runs.values import Values, compared_values
 from mauve_rt.trace.report.units import listed
@@ -29,7 +29,7 @@ class ComparedRuns:
     values: Values
     acts: tuple[list[Act], list[Act]]
     """Of rules, by time."""
-    costs: tuple[dict[Change, Cost], dict[Change, Cost]]
+    costs: tuple[dict[CoreChange, Cost], dict[CoreChange, Cost]]
     """Of reconfigurations."""
     tested: int
     """Figures with an interval: these share the 5 %."""
@@ -51,7 +51,7 @@ class ComparedRuns:
         """Names of all rules that acted in either run."""
         return list(dict.fromkeys(act.rule for run in self.acts for act in run))
 
-    def changes(self) -> list[Change]:
+    def changes(self) -> list[CoreChange]:
         """Kinds of reconfigurations of either run."""
         return sorted({*self.costs[0], *self.costs[1]})
 

@@ -26,7 +26,7 @@ class Act:
 
 
 @dataclass(frozen=True, order=True)
-class Change:
+class CoreChange:
     """What a reconfiguration changed."""
 
     component: str
@@ -87,7 +87,7 @@ def _of_supervisors(messages: Iterable[Any]) -> list[Act]:
     return found
 
 
-def costs_of(trace: Trace, measured: Sequence[Reconfiguration]) -> dict[Change, Cost]:
+def costs_of(trace: Trace, measured: Sequence[Reconfiguration]) -> dict[CoreChange, Cost]:
     """Return what the committed reconfigurations cost, per component and change of core.
 
     Raises:
@@ -96,12 +96,12 @@ def costs_of(trace: Trace, measured: Sequence[Reconfiguration]) -> dict[Change, 
     """
     told = any(kind == EVENT_TYPE for kind, _ in trace.topics.values())
     requests = join_requests(measured, trace.messages(EVENT_TYPE) if told else ())
-    found: dict[Change, Cost] = {}
+    found: dict[CoreChange, Cost] = {}
     for one, request in zip(measured, requests, strict=True):
         if not one.committed:
             continue
         from_core, to_core = (request.from_core, request.to_core) if request else ("", "")
-        change = Change(one.component, from_core, to_core or one.what)
+        change = CoreChange(one.component, from_core, to_core or one.what)
         before = found.get(change, Cost())
         missed = before.missed_releases + (one.missed_releases or 0)
         found[change] = Cost((*before.blackouts_ns, one.blackout_ns), missed)

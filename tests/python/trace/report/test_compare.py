@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from html import unescape
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,16 +26,20 @@ from synthetic_traces import (
     swap,
     trace_of,
 )
+from trace_decisions import said
 
 from mauve_rt.cli.compare import comparison_values, comparison_view, plain
 from mauve_rt.cli.main import main
 from mauve_rt.cli.tables import print_tables
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import Message, TracedDecision
+from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report.runs.compared import ComparedRuns, compare_runs, only_in_one
+from mauve_rt.trace.report.runs.events import EVENT_TYPE, Act, CoreChange
 from mauve_rt.trace.report.runs.noise import (
     Change,
     Events,
@@ -263,6 +268,45 @@ def test_reconfigurations_are_compared_by_what_they_changed() -> None:
     ]
 
 
+def of_topics(trace: Trace, *messages: Message, types: dict[str, str]) -> Trace:
+    """Add messages; `types` of their topics."""
+
+    def source(topics: tuple[str, ...]) -> Iterator[Message]:
+        return (one for one in messages if {one.topic, types[one.topic]} & set(topics))
+
+    return replace(trace, topics={topic: (kind, 1) for topic, kind in types.items()}, message_source=source)
+
+
+def test_the_acts_of_a_supervisor_are_those_of_its_messages() -> None:
+    types = {"/supervisor/decisions": DECISION_TYPE}
+    messages = (
+        said(50, "condition_true", "", topic="/supervisor/decisions"),
+        said(51, "do", "", act="do", topic="/supervisor/decisions"),
+        said(60, "done", "", act="do", took_s=0.011, topic="/supervisor/decisions"),
+    )
+    a, b = pair(2)
+    found = compare_runs(a, of_topics(b, *messages, types=types))
+    assert found.acts == ([], [Act(53 * MS, "lidar_lost (/supervisor)", "do", 11 * MS)])
+    (note,) = (view.note for view in all_views(found) if view.heading == "Decisions")
+    assert "from act 1 on: no act in A, “lidar_lost (/supervisor): do” in B." in note
+
+
+def test_a_reconfiguration_is_named_by_its_cores_where_the_bag_names_them() -> None:
+    trace = swapped(20_000)
+    (measured,) = reconfigurations(trace)
+    cores = {"from_core": "pkg/Old", "to_core": "pkg/New"}
+    step = SimpleNamespace(
+        step="replace_core", component="c", prepare_ns=7, blackout_ns=measured.blackout_ns, **cores
+    )
+    event = SimpleNamespace(success=True, requested_by="", cause="", report=[step])
+    types = {"/executor/events": EVENT_TYPE}
+    told = of_topics(trace, Message("/executor/events", 0, measured.armed_ns + MS, event), types=types)
+    found = compare_runs(told, told)
+    assert found.changes() == [CoreChange("c", "pkg/Old", "pkg/New")]
+    (view,) = (view for view in all_views(found) if view.heading == "Reconfigurations")
+    assert view.rows[0].cells[:5] == ("c", "Old", "New", "1", "1")
+
+
 # ---- values
 
 
@@ -322,6 +366,23 @@ def test_fields_beyond_the_most_are_left_out_and_counted(monkeypatch: pytest.Mon
     found = compare_runs(with_values(a, np.ones(50)), with_values(b, np.ones(50)))
     assert len(found.values.fields) == 2
     assert found.values.left_out == ["1 more fields are left out (of /speed)."]
+
+
+def test_a_topic_that_cannot_be_read_is_left_out_and_the_others_are_compared() -> None:
+    a, b = pair(3)
+    readable = with_values(b, np.ones(50))
+
+    def source(topics: tuple[str, ...]) -> Iterator[Message]:
+        if "/broken" in topics:
+            raise TraceError("the definition cannot be read")
+        return readable.messages(*topics)
+
+    topics = {"/broken": ("pkg/msg/Broken", 3), **readable.topics}
+    broken = replace(readable, topics=topics, message_source=source)
+    other = replace(with_values(a, np.ones(50)), topics=topics)
+    found = compare_runs(other, broken)
+    assert {one.field.topic for one in found.values.fields} == {"/speed"}
+    assert found.values.left_out == ["/broken is left out: the definition cannot be read"]
 
 
 def simulated(cycles: int) -> Trace:
