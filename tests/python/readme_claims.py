@@ -746,15 +746,15 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         'difference excludes "no change", and the difference exceeds the difference between the two '
         "halves of either run."
     ): (
-        f"{_REPORT}_compare.py::test_more_tested_figures_widen_the_interval",
-        f"{_REPORT}_compare.py::test_a_change_within_the_halves_of_a_run_is_no_difference",
+        f"{_REPORT}_compare_noise.py::test_more_tested_figures_widen_the_interval",
+        f"{_REPORT}_compare_noise.py::test_a_change_within_the_halves_of_a_run_is_no_difference",
     ),
     (
         "The intervals come from resampled blocks of consecutive releases, because releases that follow each "
         "other are alike."
-    ): (f"{_REPORT}_compare.py::test_correlation_widens_the_interval",),
+    ): (f"{_REPORT}_compare_noise.py::test_correlation_widens_the_interval",),
     "They hold at 95 % for all figures of the page together.": (
-        f"{_REPORT}_compare.py::test_more_tested_figures_widen_the_interval",
+        f"{_REPORT}_compare_noise.py::test_more_tested_figures_widen_the_interval",
     ),
     "Of 100 pages about equal runs, at most about 5 have a mark.": (
         f"{_REPORT}_compare.py::test_equal_runs_are_marked_on_few_pages",
@@ -763,8 +763,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "A run of fewer than 500 releases that lasts less than 10 s is too short to tell, and a p99 needs "
         "1,000 values."
     ): (
-        f"{_REPORT}_compare.py::test_a_run_is_cut_into_blocks_of_enough_values_or_long_enough",
-        f"{_REPORT}_compare.py::test_the_percentile_of_a_run_is_exact_and_that_of_few_values_is_not_told",
+        f"{_REPORT}_compare_noise.py::test_a_run_is_cut_into_blocks_of_enough_values_or_long_enough",
+        f"{_REPORT}_compare_noise.py::test_the_percentile_of_a_run_is_exact_and_that_of_few_values_is_not_told",
     ),
     "A maximum is a single value and has no mark.": (f"{_REPORT}_compare.py::test_a_maximum_has_no_mark",),
     "A burst of overruns counts as one.": (f"{_REPORT}_compare.py::test_a_burst_of_overruns_counts_as_one",),
