@@ -727,6 +727,58 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     '`mauve_rt.trace.report.write_report(Path("report.html"), mauve_rt.trace.open("DIR"))`.': (
         "python/project/test_readme_examples.py::test_the_report_is_written_from_python",
     ),
+    # ---- compare two runs
+    (
+        "mauve report A B --compare # writes A/comparison.html and prints the tables; --json, --out FILE.html"
+    ): (
+        f"{_REPORT}_compare.py::test_the_page_is_in_the_first_folder_unless_told_otherwise",
+        f"{_REPORT}_compare.py::test_the_command_compares_a_bag_with_itself",
+    ),
+    "A and B are each one run: a bag or a folder of bags.": (
+        f"{_REPORT}_compare.py::test_a_run_may_be_a_folder_of_bags",
+    ),
+    (
+        "The page and the tables show the timing of each component, the decisions of rules, the "
+        "reconfigurations and the values of topics in both runs, and list everything that only one run has."
+    ): (
+        f"{_REPORT}_compare.py::test_terminal_and_page_agree",
+        f"{_REPORT}_compare.py::test_a_rule_that_acted_only_in_b_is_listed",
+        f"{_REPORT}_compare.py::test_components_and_states_of_one_run_are_listed",
+    ),
+    (
+        'The mark "larger than noise" stands where two conditions hold: the whole interval of the '
+        'difference excludes "no change", and the difference exceeds the difference between the two '
+        "halves of either run."
+    ): (
+        f"{_REPORT}_compare_noise.py::test_more_tested_figures_widen_the_interval",
+        f"{_REPORT}_compare_noise.py::test_a_change_within_the_halves_of_a_run_is_no_difference",
+    ),
+    (
+        "The intervals come from resampled blocks of consecutive releases, because releases that follow each "
+        "other are alike."
+    ): (f"{_REPORT}_compare_noise.py::test_correlation_widens_the_interval",),
+    "They hold at 95 % for all figures of the page together.": (
+        f"{_REPORT}_compare_noise.py::test_more_tested_figures_widen_the_interval",
+    ),
+    "Of 100 pages about equal runs, at most about 5 have a mark.": (
+        f"{_REPORT}_compare.py::test_equal_runs_are_marked_on_few_pages",
+    ),
+    (
+        "A run of fewer than 500 releases that lasts less than 10 s is too short to tell, and a p99 needs "
+        "1,000 values."
+    ): (
+        f"{_REPORT}_compare_noise.py::test_a_run_is_cut_into_blocks_of_enough_values_or_long_enough",
+        f"{_REPORT}_compare_noise.py::test_the_percentile_of_a_run_is_exact_and_that_of_few_values_is_not_told",
+    ),
+    "A maximum is a single value and has no mark.": (f"{_REPORT}_compare.py::test_a_maximum_has_no_mark",),
+    "A burst of overruns counts as one.": (f"{_REPORT}_compare.py::test_a_burst_of_overruns_counts_as_one",),
+    "In simulated time the page also shows the largest difference at equal instants.": (
+        f"{_REPORT}_compare.py::test_in_simulated_time_a_single_sample_that_differs_is_told",
+    ),
+    (
+        "The noise is measured within each run: another load of the computer during one of the runs is a "
+        "difference, too."
+    ): (f"{_REPORT}_compare.py::test_another_load_is_a_difference",),
     # ---- concepts: components and time
     "all replaceable parts (`package/Class`)": (
         "Rule9Parts.AllThreePartsAndAnotherTwoBack",

@@ -1,6 +1,6 @@
 """Traces of components that never ran, as their reader gives them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -125,17 +125,36 @@ def periodic_trace(components: Sequence[str] = ("c",), cycles: int = 50) -> Trac
     return trace_of(source)
 
 
-def long_trace(components: Sequence[str], cycles: int, *, late: Iterable[int] = ()) -> Trace:
-    """Many cycles of six records, made by numpy: noisy times; the cycles in `late` overran."""
+def long_trace(
+    components: Sequence[str],
+    cycles: int,
+    *,
+    late: Iterable[int] = (),
+    seed: int = 0,
+    load: float = 0.0,
+    slower: Mapping[str, float] | None = None,
+) -> Trace:
+    """Many cycles of six records, made by numpy: noisy times; the cycles in `late` overran.
+
+    `load` is the standard deviation of the logarithm of a load that changes within some ten cycles; states of
+    the components in `slower` take so many times as long.
+    """
     names = ("", "wait", "sense", "act")
     kinds = (Kind.RELEASE, Kind.STATE_BEGIN, Kind.STATE_END, Kind.STATE_BEGIN, Kind.STATE_END, Kind.WAIT)
     words = (1, 2, 2, 3, 3, 1)
     records: dict[str, Records] = {}
     for index, component in enumerate(components):
-        noise = np.random.default_rng(index)
+        noise = np.random.default_rng((seed, index) if seed else index)
         nominal = EPOCH_NS + np.arange(cycles, dtype=np.int64) * PERIOD_NS
         wakeup = noise.gamma(2, 8_000, cycles).astype(np.int64)
         sense, act = (noise.gamma(6, mean, cycles).astype(np.int64) for mean in (40_000, 90_000))
+        if load:
+            changing = np.convolve(noise.normal(size=cycles + 9), np.full(10, 10**-0.5), "valid")
+            wakeup, sense, act = (
+                (one * np.exp(load * changing)).astype(np.int64) for one in (wakeup, sense, act)
+            )
+        factor = (slower or {}).get(component, 1)
+        sense, act = ((one * factor).astype(np.int64) for one in (sense, act))
         rows = np.zeros((cycles, len(kinds)), RECORD)
         rows["kind"], rows["name"], rows["component"] = kinds, words, index
         ends = np.cumsum([nominal + wakeup, sense * 0, sense, act * 0, act, act * 0], axis=0).T

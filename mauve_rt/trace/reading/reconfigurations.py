@@ -85,10 +85,11 @@ def _takeovers(records: Records) -> Iterator[tuple[int, int]]:
     """Indices of each fault after which a fallback core took over, and of the start that followed."""
     kinds = records["kind"]
     (ends,) = np.nonzero(np.isin(kinds, (Kind.START, Kind.STOP, Kind.FAULT, Kind.RELEASE, Kind.PARKED)))
-    for fault, end in pairwise(ends.tolist()):
+    starts_anew = (kinds[ends[:-1]] == Kind.FAULT) & (kinds[ends[1:]] == Kind.START)
+    for index in np.flatnonzero(starts_anew).tolist():
+        fault, end = int(ends[index]), int(ends[index + 1])
         between = records[fault:end]
-        taken = (between["kind"] == Kind.RECONFIGURATION) & (between["c"] == 0)
-        if kinds[fault] == Kind.FAULT and kinds[end] == Kind.START and taken.any():
+        if ((between["kind"] == Kind.RECONFIGURATION) & (between["c"] == 0)).any():
             yield fault, end
 
 

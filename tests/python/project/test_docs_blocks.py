@@ -139,6 +139,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "# writes DIR/report.html": (
             "python/trace/report/test_page.py::test_the_command_writes_into_the_bag_unless_told_otherwise",
         ),
+        "mauve report A B --compare": (
+            "python/trace/report/test_compare.py::test_the_page_is_in_the_first_folder_unless_told_otherwise",
+        ),
     },
     "docs/howto/repair_a_faulted_component.md": {
         "# before the repair": (REPAIRED,),
