@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.cli.completion import complete_executors, completed_by
 from mauve_rt.cli.verb import OK, REFUSED
 
 
@@ -94,9 +95,10 @@ def _prepared(rule: Any) -> str:
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    name = parser.add_argument(
         "executor",
         type=lambda name: "/" + name.strip("/"),
         help="the executor's node, e.g. /robot_1/executor",
     )
+    completed_by(name, complete_executors)
     parser.add_argument("--json", action="store_true", help="print the reply as JSON")

@@ -7,6 +7,12 @@ import time
 from typing import Any
 
 from mauve_rt.cli import analyze_verb, check_verb, report_verb, rules_verb, trace_verb
+from mauve_rt.cli.completion import (
+    complete_components,
+    complete_cores,
+    complete_executors,
+    completed_by,
+)
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -14,13 +20,14 @@ _LOOK_S = 0.02  # between two looks at what a change cost
 
 
 def _add_executor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("executor", type=_absolute, help="the executor's node, e.g. /robot_1/executor")
+    name = parser.add_argument("executor", type=_absolute, help="the executor's node, e.g. /robot_1/executor")
+    completed_by(name, complete_executors)
     parser.add_argument("--json", action="store_true", help="print the reply as JSON")
 
 
 def _add_request(parser: argparse.ArgumentParser) -> None:
     _add_executor(parser)
-    parser.add_argument("component", help="name of the component")
+    completed_by(parser.add_argument("component", help="name of the component"), complete_components)
     _add_record(parser)
 
 
@@ -82,7 +89,7 @@ def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
-    parser.add_argument("core", help="the new core, package/Class")
+    completed_by(parser.add_argument("core", help="the new core, package/Class"), complete_cores)
 
 
 def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
