@@ -134,6 +134,7 @@ def test_components_are_completed(shell: Shell, cache: Cache, verb: str) -> None
     assert shell.complete(f"mauve {verb} {NODE} ") == ["counter", "guard"]
     assert shell.complete(f"mauve {verb} {NODE.lstrip('/')} g") == ["guard"]
     assert shell.complete(f"mauve {verb} {OTHER} ") == []
+    assert _words(complete_components, executor=f"{NODE.lstrip('/')}/") == ["counter", "guard"]
 
 
 def test_the_cores_that_may_replace_are_completed(shell: Shell, cache: Cache) -> None:
@@ -243,6 +244,8 @@ def test_each_domain_has_names_of_its_own(shell: Shell, cache: Cache) -> None:
 
 def test_a_domain_that_is_none_completes_nothing(shell: Shell, cache: Cache) -> None:
     assert shell.complete("mauve list ", ROS_DOMAIN_ID="robots") == []
+    assert shell.complete("mauve list ", ROS_DOMAIN_ID="300") == []
+    assert [path.name for path in cache.file.parent.iterdir()] == [cache.file.name], "and no refresh begins"
 
 
 _ENTRY = {"name": NODE, "seen_s": 1e12, "listed_s": 1, "sockets": [], "components": [], "resources": []}
@@ -300,6 +303,18 @@ def test_a_folder_that_others_may_use_is_not_taken(
     other.file.parent.symlink_to(cache.file.parent)
     monkeypatch.setattr(completion_cache, "_TEMPORARY", str(tmp_path / "none"))
     assert Cache.of_environment() is None
+
+
+def test_in_the_runtime_folder_of_another_account_nothing_is_made(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a program that sudo runs with the user's environment."""
+    runtime, user = Path(os.environ["XDG_RUNTIME_DIR"]), os.geteuid()
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(completion_cache, "_TEMPORARY", str(tmp_path))
+    monkeypatch.setattr(os, "geteuid", lambda: user + 1)
+    assert Cache.of_environment() is None
+    assert list(runtime.iterdir()) == []
 
 
 def test_without_a_folder_to_write_in_nothing_is_completed(
