@@ -4,6 +4,8 @@ import argparse
 import re
 from collections.abc import Callable
 
+from mauve_rt.cli.completion import complete_executors, complete_values, completed_by
+
 
 def absolute_name(name: str) -> str:
     """A node's name with its leading '/'."""
@@ -26,3 +28,23 @@ def positive_rate(most_hz: float) -> Callable[[str], float]:
         return hertz
 
     return rate
+
+
+def add_executor(parser: argparse.ArgumentParser) -> None:
+    """The executor that a verb is about."""
+    name = parser.add_argument(
+        "executor", type=absolute_name, help="the executor's node, e.g. /robot_1/executor"
+    )
+    completed_by(name, complete_executors)
+
+
+def add_executor_and_json(parser: argparse.ArgumentParser) -> None:
+    """As add_executor(), of a verb that prints a reply."""
+    add_executor(parser)
+    parser.add_argument("--json", action="store_true", help="print the reply as JSON")
+
+
+def add_value(parser: argparse.ArgumentParser, what: str, *, nargs: str | None = None) -> None:
+    """The resource or port whose value a verb is about."""
+    default = "" if nargs == "?" else None
+    completed_by(parser.add_argument("value", help=what, nargs=nargs, default=default), complete_values)

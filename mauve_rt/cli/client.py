@@ -13,6 +13,7 @@ from typing import Any
 from rclpy.qos import QoSProfile
 from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 
+from mauve_rt.cli.completion_cache import Cache
 from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
 from mauve_rt.cli.transport import accounts_in_the_way, by_fast_dds, by_udp
 from mauve_rt.errors import ParameterError
@@ -24,7 +25,7 @@ DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another
 STARTING_S = 3.0  # where there is no executor at all, one may be starting
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
 RESEND_S = 4.0
-_LIST_SERVICE = "mauve_msgs/srv/ListComponents"
+_LIST_SERVICE, _LIST = "mauve_msgs/srv/ListComponents", "/list_components"
 _POLL_S = 0.05  # waiting in rclpy does not end at a Ctrl-C: short waits do
 _LOOK_S = 0.01  # between two looks at what is discovered
 _interrupted = threading.Event()
@@ -35,11 +36,13 @@ class NoExecutorError(ParameterError):
 
 
 class Client:
-    """Asks executors. For one thread."""
+    """Asks executors, and writes the names that they answer for completions. For one thread."""
 
-    def __init__(self, discovery: Discovery) -> None:
+    def __init__(self, discovery: Discovery, cache: Cache | None = None) -> None:
         self._discovery = discovery
         self._known: dict[str, tuple[Participant, Any]] = {}  # by service: who is asked again
+        self._cache = cache
+        self._list_clients: dict[tuple[str, int], Any] = {}  # of `ask_for_list`
 
     def call(self, service_type: Any, service: str, request: Any, *, wait_s: float = 0.0) -> Any:
         """The reply of a service, e.g. `/robot_1/executor/stop`.
@@ -70,7 +73,10 @@ class Client:
             _spin_once(participant)
             for future in futures:
                 if future.done():
-                    return future.result()
+                    reply = future.result()
+                    if service.endswith(_LIST):
+                        self.note_list(service.removesuffix(_LIST), reply)
+                    return reply
         raise NoExecutorError(self._unanswered(service))
 
     def _found(self, service_type: Any, service: str, wait_s: float) -> tuple[Participant, Any]:
@@ -129,10 +135,47 @@ class Client:
 
     def find_executors(self, *, wait_s: float = ANNOUNCED_S) -> list[str]:
         """Executors, as soon as all that is there is known; after `wait_s` where that cannot be told."""
+        searching = self.search(wait_s=wait_s)
+        while (found := next(searching)) is None:
+            time.sleep(_LOOK_S)
+            _raise_interrupts()
+        return found
+
+    def search(self, *, wait_s: float = ANNOUNCED_S) -> Iterator[list[str] | None]:
+        """As `find_executors`, but yields None while it searches; the caller waits between two looks."""
         deadline = time.monotonic() + wait_s
         while not self._discovery.is_complete() and time.monotonic() < deadline:
-            self._look_again()
-        return self.seen_executors()
+            self._discovery.hurry()
+            yield None
+        found = self.seen_executors()
+        if self._cache is not None:
+            self._cache.note_found(found, self._discovery.other_sockets())
+        yield found
+
+    def ask_for_list(self, executor: str) -> Any:
+        """A future of the executor's ListComponents reply; None while its service is not reached."""
+        from mauve_msgs.srv import ListComponents  # noqa: PLC0415 - takes its time to load
+
+        for number, participant in enumerate(self._discovery.participants):
+            key = (executor, number)
+            if key not in self._list_clients:
+                service = executor + _LIST
+                self._list_clients[key] = participant.node.create_client(ListComponents, service)
+            if self._list_clients[key].service_is_ready():
+                return self._list_clients[key].call_async(ListComponents.Request())
+        return None
+
+    def note_list(self, executor: str, reply: Any) -> None:
+        """Write the names of a ListComponents reply for completions."""
+        if self._cache is not None:
+            self._cache.note_reply(executor, reply, self._discovery.other_sockets())
+
+    def spin_all(self, wait_s: float) -> None:
+        """Take what has come from the network, after a wait."""
+        time.sleep(wait_s)
+        for participant in self._discovery.participants:
+            participant.executor.spin_once(timeout_sec=0)
+        _raise_interrupts()
 
     def poll(self, service_type: Any, service: str, *, every_s: float) -> "Poll":
         """For who asks a service again and again, and waits for no answer."""
@@ -200,8 +243,7 @@ class Poll:
 
 
 def _executors(offered: dict[str, list[str]]) -> list[str]:
-    suffix = "/list_components"
-    return sorted(name.removesuffix(suffix) for name, types in offered.items() if _LIST_SERVICE in types)
+    return sorted(name.removesuffix(_LIST) for name, types in offered.items() if _LIST_SERVICE in types)
 
 
 def _spin_once(participant: Participant) -> None:
@@ -240,6 +282,7 @@ def connected(*, first: bool = False) -> Iterator[Client]:
     """
     if problem := domain_problem():
         raise ParameterError(problem)
+    cache = Cache.of_environment()  # before the environment is changed
     limit_discovery()
     if unresolved := resolve_static_peers():
         print(f"mauve: {unresolved_text(unresolved)}", file=sys.stderr)
@@ -250,6 +293,6 @@ def connected(*, first: bool = False) -> Iterator[Client]:
         closing(Discovery(is_local=is_local)) as discovery,
     ):
         try:
-            yield Client(discovery)
+            yield Client(discovery, cache)
         except UnsupportedTypeSupport as error:  # as of a package whose libraries are not found
             raise ImportError(str(error)) from error

@@ -9,7 +9,6 @@ every participant has a port of those that RTPS defines.
 import os
 import resource
 import time
-from pathlib import Path
 from typing import NamedTuple
 
 import rclpy
@@ -17,16 +16,16 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from mauve_rt.cli.rtps_ports import UDP_TABLE, discovery_sockets
 from mauve_rt.cli.transport import by_fast_dds
 from mauve_rt.node.shared.log_folder import NO_LOG_FILES
+from mauve_rt.node.shared.loopback import udp_sockets
 
 ANNOUNCED_S = 3.5  # by then every participant has told of itself, to whomever missed it before
 _SPOKEN_S = 0.2  # after which one more participant speaks: an answer comes within 0.11 s
 _MAX_SPEAKERS = 8
 _FILES_OF_PROCESS, _FILES_OF_SPEAKER = 24, 10  # that are open, with some to spare
 _SETTLED_S = 0.15  # endpoints come in a few packets at once
-_FIRST_PORT, _DOMAIN_PORTS, _MAX_PARTICIPANTS = 7410, 250, 120  # of discovery by unicast, in RTPS
-_UDP = Path("/proc/net/udp")
 _KEY_BYTES = 12  # of an endpoint's global id: its participant's part
 
 
@@ -49,7 +48,7 @@ class Discovery:
         self._seen: object = None
         self._seen_s = time.monotonic()
         self._speak()
-        self._can_count = is_local and by_fast_dds() and _UDP.exists()
+        self._can_count = is_local and by_fast_dds() and UDP_TABLE.exists()
 
     @property
     def domain(self) -> int:
@@ -81,6 +80,11 @@ class Discovery:
         if is_due and len(self.participants) < self._most_speakers and len(self._known()) < self._count():
             self._speak()
 
+    def other_sockets(self) -> frozenset[str]:
+        """The discovery sockets of other processes, by inode; none where participants cannot be counted."""
+        found = discovery_sockets(self.domain) if self._can_count else []
+        return frozenset(socket.inode for socket in found) - udp_sockets().keys()
+
     def close(self) -> None:
         """Leave the graph."""
         while self.participants:
@@ -111,10 +115,7 @@ class Discovery:
 
     def _count(self) -> int:
         """How many participants this machine has in our domain."""
-        first = _FIRST_PORT + _DOMAIN_PORTS * self.domain
-        ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
-        lines = _UDP.read_text("ascii").splitlines()[1:] if self._can_count else []
-        return len({port for line in lines if (port := int(line.split()[1].rpartition(":")[2], 16)) in ports})
+        return len({socket.port for socket in discovery_sockets(self.domain)}) if self._can_count else 0
 
 
 def _most_speakers() -> int:

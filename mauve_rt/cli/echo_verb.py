@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from mauve_rt.cli.arguments import absolute_name, positive_rate
+from mauve_rt.cli.arguments import add_executor, add_value, positive_rate
 from mauve_rt.cli.verb import OK, REFUSED
 from mauve_rt.errors import MauveError
 
@@ -19,8 +19,8 @@ _CSV_HEAD = ("time_ns", "monotonic_ns", "age_ns", "writes")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `mauve echo`."""
-    parser.add_argument("executor", type=absolute_name, help="the executor's node, e.g. /robot_1/executor")
-    parser.add_argument("value", help="a resource, or COMPONENT.PORT of a read or write port")
+    add_executor(parser)
+    add_value(parser, "a resource, or COMPONENT.PORT of a read or write port")
     parser.add_argument(
         "--field", metavar="F", default="", help="show one field of it, such as position.x or ranges[3]"
     )

@@ -17,7 +17,7 @@ from typing import NoReturn
 
 import mauve_rt
 from mauve_rt.cli.pipe import piped
-from mauve_rt.cli.verb import run
+from mauve_rt.cli.verb import BAD_USAGE, OK, run
 from mauve_rt.cli.verbs import VERBS
 from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.lean_start import leave_out_unused
@@ -31,10 +31,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     leave_out_unused()
     parser = build_parser()
     if "_ARGCOMPLETE" in os.environ:  # the shell asks for a completion
-        import argcomplete  # noqa: PLC0415
-
-        argcomplete.autocomplete(parser)
+        return _complete(parser)
     return piped(lambda: _parse_and_run(parser, arguments))
+
+
+def _complete(parser: argparse.ArgumentParser) -> int:
+    """Print what may stand at the cursor; options only after a dash, so that a single name is inserted."""
+    try:
+        import argcomplete  # noqa: PLC0415
+    except ImportError:
+        return BAD_USAGE  # without a word: the user is typing
+    argcomplete.autocomplete(parser, always_complete_options=False)
+    return OK
 
 
 def _parse_and_run(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> int:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from mauve_rt.cli.arguments import absolute_name, positive_rate
+from mauve_rt.cli.arguments import add_executor, add_value, positive_rate
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED
 
 _MOST_HZ = 1000.0
@@ -11,13 +11,9 @@ _MOST_HZ = 1000.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `mauve mirror`."""
-    parser.add_argument("executor", type=absolute_name, help="the executor's node, e.g. /robot_1/executor")
-    parser.add_argument(
-        "value",
-        nargs="?",
-        default="",
-        help="a resource, or COMPONENT.PORT of a read or write port; not needed with --stop",
-    )
+    add_executor(parser)
+    what = "a resource, or COMPONENT.PORT of a read or write port; not needed with --stop"
+    add_value(parser, what, nargs="?")
     parser.add_argument("--field", metavar="F", default="", help="one number of it, such as position.x")
     parser.add_argument(
         "--topic",

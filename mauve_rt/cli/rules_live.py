@@ -5,17 +5,18 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.cli.arguments import add_executor_and_json
 from mauve_rt.cli.verb import OK, REFUSED
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
     """Whose."""
-    _add_executor(parser)
+    add_executor_and_json(parser)
 
 
 def add_load(parser: argparse.ArgumentParser) -> None:
     """Whose, and from where."""
-    _add_executor(parser)
+    add_executor_and_json(parser)
     parser.add_argument(
         "file",
         nargs="?",
@@ -91,12 +92,3 @@ def _prepared(rule: Any) -> str:
     if not rule.ready:
         return "no"
     return f"{rule.memory_bytes / 1024:.0f} KiB" if rule.memory_bytes else "yes"
-
-
-def _add_executor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "executor",
-        type=lambda name: "/" + name.strip("/"),
-        help="the executor's node, e.g. /robot_1/executor",
-    )
-    parser.add_argument("--json", action="store_true", help="print the reply as JSON")

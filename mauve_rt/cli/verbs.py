@@ -15,21 +15,17 @@ from mauve_rt.cli import (
     trace_verb,
     watch_verb,
 )
-from mauve_rt.cli.arguments import absolute_name
+from mauve_rt.cli.arguments import add_executor_and_json
+from mauve_rt.cli.completion import complete_components, complete_cores, complete_properties, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
 _LOOK_S = 0.02  # between two looks at what a change cost
 
 
-def _add_executor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("executor", type=absolute_name, help="the executor's node, e.g. /robot_1/executor")
-    parser.add_argument("--json", action="store_true", help="print the reply as JSON")
-
-
 def _add_request(parser: argparse.ArgumentParser) -> None:
-    _add_executor(parser)
-    parser.add_argument("component", help="name of the component")
+    add_executor_and_json(parser)
+    completed_by(parser.add_argument("component", help="name of the component"), complete_components)
     _add_record(parser)
 
 
@@ -91,17 +87,35 @@ def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
-    parser.add_argument("core", help="the new core, package/Class")
+    completed_by(parser.add_argument("core", help="the new core, package/Class"), complete_cores)
 
 
 def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
-    _add_executor(parser)
+    add_executor_and_json(parser)
     parser.add_argument("file", help="YAML list of steps {kind, target, name, value}; - for standard input")
     parser.add_argument("--dry-run", action="store_true", help="check and prepare everything, change nothing")
     _add_record(parser)
     _add_timeout(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
+
+
+def _add_set(parser: argparse.ArgumentParser) -> None:
+    add_executor_and_json(parser)
+    name = parser.add_argument("property", type=_property, help="COMPONENT.PROPERTY, e.g. control.max_speed")
+    completed_by(name, complete_properties)
+    parser.add_argument("value", help="the new value, as in an architecture file")
+    _add_record(parser)
+    _add_timeout(parser)
+
+
+def _property(text: str) -> tuple[str, str]:
+    component, dot, name = text.partition(".")
+    if not (component and dot and name):
+        raise argparse.ArgumentTypeError(
+            f"expected COMPONENT.PROPERTY such as control.max_speed, found {text}"
+        )
+    return component, name
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -173,6 +187,15 @@ def _reconfigure(args: argparse.Namespace) -> int:
         commit_timeout_s=args.timeout,
         force=args.force or change.force,
     )
+
+
+def _set(args: argparse.Namespace) -> int:
+    from mauve_msgs.msg import ReconfigurationStep  # noqa: PLC0415
+    from mauve_msgs.srv import Reconfigure  # noqa: PLC0415
+
+    component, name = args.property
+    step = ReconfigurationStep(kind="set_property", target=component, name=name, value=args.value)
+    return _request(args, Reconfigure, "reconfigure", steps=[step], commit_timeout_s=args.timeout)
 
 
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
@@ -270,7 +293,7 @@ def _add_recording(parser: argparse.ArgumentParser) -> None:
     start.set_defaults(starts=True)
     stop.set_defaults(starts=False)
     for action in (start, stop):
-        _add_executor(action)
+        add_executor_and_json(action)
     start.add_argument(
         "bag",
         nargs="?",
@@ -323,7 +346,7 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = (
-    Verb("list", "show the components of an executor", _add_executor, _list),
+    Verb("list", "show the components of an executor", add_executor_and_json, _list),
     Verb("stop", "stop a component", _add_stop, _stop),
     Verb("start", "start a stopped component", _add_request, _start),
     Verb(
@@ -333,7 +356,7 @@ VERBS = (
         _replace_core,
     ),
     Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
-    Verb("events", "show the reconfigurations of an executor as they happen", _add_executor, _events),
+    Verb("events", "show the reconfigurations of an executor as they happen", add_executor_and_json, _events),
     Verb("nodes", "list the executors that can be reached", _add_json, _nodes),
     Verb(
         "check",
@@ -347,6 +370,7 @@ VERBS = (
         analyze_verb.add_arguments,
         analyze_verb.main,
     ),
+    Verb("set", "set a property of a component", _add_set, _set),
     Verb("echo", "show the values of a resource or port", echo_verb.add_arguments, echo_verb.main),
     Verb("mirror", "publish a value on a ROS topic", mirror_verb.add_arguments, mirror_verb.main),
     Verb("watch", "show a live table of executors", watch_verb.add_arguments, watch_verb.main),

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from mauve_rt.cli.arguments import absolute_name
+from mauve_rt.cli.completion import complete_executors, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK
 
 if TYPE_CHECKING:
@@ -27,9 +28,10 @@ _ESCAPE, _BACKSPACE = "\x1b", ("\x7f", "\b")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `mauve watch`."""
-    parser.add_argument(
+    names = parser.add_argument(
         "executors", nargs="+", type=absolute_name, metavar="executor", help="node of an executor"
     )
+    completed_by(names, complete_executors)
     parser.add_argument(
         "--value",
         action="append",

@@ -361,12 +361,29 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "mauve events /robot_1/executor # as they happen, until Ctrl-C": (
         "ros/cli/test_verbs.py::test_events_are_followed",
     ),
+    "mauve set /robot_1/executor control.max_speed 0.5": ("ros/cli/test_verbs.py::test_a_property_is_set",),
+    (
+        "The Tab key completes executors, components, the cores that may replace the present one, properties, "
+        "resources and ports."
+    ): (
+        "python/cli/test_completion.py::test_values_are_resources_and_ports",
+        "python/cli/test_completion.py::test_properties_are_completed",
+        "python/cli/test_completion.py::test_executors_are_completed",
+        "python/cli/test_completion.py::test_components_are_completed",
+        "python/cli/test_completion.py::test_the_cores_that_may_replace_are_completed",
+        "ros/cli/test_completion.py::test_names_of_a_running_executor_are_completed",
+    ),
+    "A background process asks the executors for these names, so the first Tab may show none.": (
+        "ros/cli/test_completion.py::test_names_of_a_running_executor_are_completed",
+        "python/cli/test_completion.py::test_nothing_is_known_and_ros_cannot_be_loaded",
+    ),
     "Where the ROS 2 command line is installed, every verb is one of `ros2 mauve` too:": (
         "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
         "python/cli/test_ros2_entry_points.py::test_the_verbs_are_those_of_mauve",
     ),
     "`ros2 mauve list /robot_1/executor`, with completion, the same output and the same exit status.": (
         "ros/cli/test_ros2_command.py::test_verbs_are_completed",
+        "ros/cli/test_completion.py::test_names_of_a_running_executor_are_completed",
         "ros/cli/test_ros2_command.py::test_verbs_answer_as_those_of_mauve",
     ),
     "ros2 service call /robot_1/executor/replace_core mauve_msgs/srv/ReplaceCore": (

@@ -55,7 +55,7 @@ def as_user(domain: int) -> Iterator[Callable[..., tuple[int, str]]]:
     def run(*words: str, **environment: str) -> tuple[int, str]:
         done = subprocess.run(
             [*wrapper, sys.executable, "-c", MAUVE, *words],
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "HOME": home} | environment,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "HOME": home, "TMPDIR": home} | environment,
             cwd="/",
             capture_output=True,
             text=True,

@@ -65,6 +65,22 @@ def test_verbs_do_what_they_say(mauve: Mauve) -> None:
     assert states["counter"]["core"] == "executor_tests/Backwards"
 
 
+def test_a_property_is_set(mauve: Mauve) -> None:
+    done = mauve("set", NODE, "counter.step", "2.5", "--cause", "for a test")
+    assert (done.returncode, done.stderr) == (0, "")
+    parts = {part["name"]: part for part in json.loads(mauve("list", NODE, "--json").stdout)["components"]}
+    assert "step=2.5" in parts["counter"]["properties"]
+    beyond = mauve("set", NODE, "counter.step", "11")
+    assert beyond.returncode == 1
+    assert "10" in beyond.stderr
+    unknown = mauve("set", NODE, "counter.stepp", "1")
+    assert unknown.returncode == 1
+    assert "did you mean step?" in unknown.stderr
+    bad = mauve("set", NODE, "step", "1")
+    assert bad.returncode == 2
+    assert "expected COMPONENT.PROPERTY such as control.max_speed, found step" in bad.stderr
+
+
 def test_output_that_nobody_reads_ends_a_verb_quietly(
     mauve: Mauve, environment: dict[str, str], graph: Any
 ) -> None:
