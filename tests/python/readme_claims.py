@@ -363,8 +363,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "mauve set /robot_1/executor control.max_speed 0.5": ("ros/cli/test_verbs.py::test_a_property_is_set",),
     (
-        "The Tab key completes executors, components, the cores that may replace the present one, properties, "
-        "resources and ports."
+        "The Tab key completes executors, components, the cores that may replace the present one, "
+        "properties, resources and ports."
     ): (
         "python/cli/test_completion.py::test_values_are_resources_and_ports",
         "python/cli/test_completion.py::test_properties_are_completed",
