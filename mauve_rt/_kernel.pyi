@@ -758,6 +758,24 @@ class Host:
         """Ends every wait_published and wait_change at once (for shutting down)."""
 
 @final
+class ValueLog:
+    """Every write to the resource of a name, also when another one takes that name. For one thread."""
+
+    def __init__(self, architecture: Architecture, resource: str, *, bytes: int = ...) -> None:
+        """Keep writes from now on, as many as have room in about so many bytes: 16 to 8,192.
+
+        Raises:
+            MauveError: there is no such resource, or it has no values.
+        """
+    def take(self) -> list[tuple[bytes, int]]:
+        """(serialized message, writer's time in ns) of each write since the last call, in order."""
+    def end(self) -> None:
+        """Keep no more; what was not taken is gone. May be called again."""
+    @property
+    def lost(self) -> int:
+        """Writes that found no room."""
+
+@final
 class Deployer(Host):
     """The host of threads: one for each component."""
 

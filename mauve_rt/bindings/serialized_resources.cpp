@@ -45,6 +45,15 @@ class SerializedResource : public Resource {
     if (sequence == 0) message = options_.zero;
     return sequence != 0;
   }
+  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_, max_bytes_, touched_place()); }
+  void end_log() override { log_.close(mutex_); }
+  bool next_write(Message& message, time_ns_t& time_ns) override {
+    return log_.next([&](const Place& written) {
+      message.assign(written.message.begin(), written.message.end());
+      time_ns = written.time_ns;
+    });
+  }
+  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     return message.size() >= kCdrHeader.size() && write(message, time_ns);
   }
@@ -73,6 +82,7 @@ class SerializedResource : public Resource {
       const std::lock_guard lock(mutex_);
       if (!floor_.admits(time_ns)) return true;
       if (!put_in(message, time_ns)) return false;
+      log_.put(message, time_ns);
     }
     written(time_ns);
     return true;
@@ -83,6 +93,7 @@ class SerializedResource : public Resource {
       if (!mutex_.try_lock()) return TryWrite::busy;
       const std::lock_guard lock(mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !put_in(message, time_ns)) return TryWrite::done;
+      log_.put(message, time_ns);
     }
     written(time_ns);
     return TryWrite::done;
@@ -90,6 +101,12 @@ class SerializedResource : public Resource {
   Place place() const {
     Place made;
     made.message.reserve(max_bytes_);
+    return made;
+  }
+  /// A copy of it has all its memory, touched.
+  Place touched_place() const {
+    Place made;
+    made.message.resize(max_bytes_);
     return made;
   }
   const SerializedOptions& options() const noexcept { return options_; }
@@ -127,6 +144,7 @@ class SerializedResource : public Resource {
   const std::size_t max_bytes_;  // of one message
   PiMutex mutex_;
   WriteFloor floor_;
+  WriteLog<Place> log_;  // under mutex_
   Read read_{*this};
   Write write_{*this};
 };

@@ -29,6 +29,7 @@ void bind_settings(py::module_& module);
 void bind_architecture(py::module_& module);
 /// Registers Host and Deployer, their reports and the trace's drain.
 void bind_host(py::module_& module);
+void bind_value_log(py::module_& module);
 /// Registers Transaction and its reports.
 void bind_transaction(py::module_& module);
 /// Registers what parts written in Python see of their shell, and what they declare themselves with.

@@ -16,7 +16,13 @@ from mauve_rt.cli import (
     watch_verb,
 )
 from mauve_rt.cli.arguments import add_executor_and_json
-from mauve_rt.cli.completion import complete_components, complete_cores, complete_properties, completed_by
+from mauve_rt.cli.completion import (
+    complete_components,
+    complete_cores,
+    complete_properties,
+    complete_values,
+    completed_by,
+)
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
@@ -307,6 +313,14 @@ def _add_recording(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[:TYPE[:QOS]]",
         help="record this topic too; may be repeated",
     )
+    values = start.add_argument(
+        "--value",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="record every write to this resource, or COMPONENT.PORT, too; may be repeated",
+    )
+    completed_by(values, complete_values)
     start.add_argument(
         "--split-s",
         type=float,
@@ -336,6 +350,7 @@ def _recording(args: argparse.Namespace) -> int:
         "start_recording",
         bag=args.bag,
         topics=args.topic,
+        values=args.value,
         split_s=args.split_s,
         split_bytes=max(round(args.split_mb * 1e6), 0),
     )

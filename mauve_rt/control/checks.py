@@ -76,9 +76,11 @@ def check_revision(request: Request, runtime: Runtime) -> None:
 
 
 def _check_recording(order: RecordingOrder) -> None:
-    texts = [order.bag, *order.topics]
-    if len(order.topics) > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
-        text = f"expected at most {MAX_TOPICS} topics, and no text longer than {MAX_TEXT} characters"
+    texts = [order.bag, *order.topics, *order.values]
+    many = max(len(order.topics), len(order.values))
+    if many > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
+        what = f"{MAX_TOPICS} topics and {MAX_TOPICS} values"
+        text = f"expected at most {what}, and no text longer than {MAX_TEXT} characters"
         raise RefusalError(Code.INVALID, text)
     if "\0" in order.bag:
         raise RefusalError(Code.INVALID, "bag: a folder's name has no null character")

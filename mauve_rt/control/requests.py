@@ -70,11 +70,14 @@ class RecordingOrder:
     start: bool
     bag: str = ""
     topics: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
     split_s: float = 0.0  # 0: the default
     split_bytes: int = 0
 
     def __str__(self) -> str:
-        words = " ".join(("start_recording", self.bag, *self.topics)) if self.start else "stop_recording"
+        words = "stop_recording"
+        if self.start:
+            words = " ".join(("start_recording", self.bag, *self.topics, *self.values))
         return cut(words.strip(), _LONGEST_WORDS)
 
 
@@ -121,7 +124,7 @@ class Request:
         for step in self.steps:
             yield from (step.kind, step.target, step.name, step.value)
         if self.recording is not None:
-            yield from (self.recording.bag, *self.recording.topics)
+            yield from (self.recording.bag, *self.recording.topics, *self.recording.values)
 
     def digest(self) -> bytes:
         """Of its contents: equal where two requests are, for all that anybody will ever see."""

@@ -37,6 +37,7 @@ class ArchitectureModel:
         self.diagnostics = content.executor.diagnostics
         self.sender = content.executor.sender
         self.mirrors = list(content.executor.mirror)
+        self.recorded = list(content.executor.record)
         self.components: dict[str, ComponentModel] = dict(content.components)
         self.resources: dict[str, ResourceModel] = dict(content.resources)
         self.connections = [
@@ -247,15 +248,17 @@ def _connection_problems(model: ArchitectureModel) -> Iterator[Problem]:
 
 
 def _value_name_problems(model: ArchitectureModel) -> Iterator[Problem]:
-    """What is mirrored is a resource, or a port that is connected to one."""
+    """What is mirrored or recorded is a resource, or a port that is connected to one."""
     ports = {f"{each.component}.{each.port}" for each in model.connections}
-    for index, mirror in enumerate(model.mirrors):
-        if mirror.name not in model.resources and mirror.name not in ports:
+    named = [("mirror", index, mirror.name) for index, mirror in enumerate(model.mirrors)]
+    named += [("record", index, name) for index, name in enumerate(model.recorded)]
+    for key, index, name in named:
+        if name not in model.resources and name not in ports:
             yield model.problem(
-                ("executor", "mirror", index),
-                f"the value '{mirror.name}' that is mirrored is not there",
+                ("executor", key, index),
+                f"there is no value '{name}'",
                 expected="a resource, or component.port of a connection",
-                remedy=did_you_mean(mirror.name, [*model.resources, *ports]),
+                remedy=did_you_mean(name, [*model.resources, *ports]),
             )
 
 

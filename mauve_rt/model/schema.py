@@ -186,6 +186,11 @@ class ExecutorModel(Section):
     sender: SenderModel = setting(
         Part(SenderModel), "the thread that sends the messages of bound topics", default=SenderModel()
     )
+    record: list[str] = setting(
+        ListOf(_VALUE_NAME),
+        "values that are recorded whenever the executor records: resources, or component.port",
+        default=[],
+    )
     mirror: list[MirrorModel] = setting(
         ListOf(_Mirror(MirrorModel)),
         "values that the executor publishes while it runs: names, or mappings with the keys below",

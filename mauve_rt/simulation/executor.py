@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.control.control import Control
 from mauve_rt.control.faults import FaultWatch
+from mauve_rt.control.recorded_values import RecordedValues, choose
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.interfaces.descriptions import (
@@ -83,6 +84,8 @@ class SimulatedExecutor:
         self._refused: Counter[str] = Counter()
         self._architecture = b""
         self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
+        self._values = RecordedValues(self._runtime, choose(self._runtime, model.recorded, self.name))
+        self._values.keep_messages(on=True)
         self._rules_file = RulesFile(rules) if rules is not None else None
         if self._rules_file is not None:
             rule_actions(self._rules_file, self._runtime)  # whether they can be used
@@ -180,13 +183,14 @@ class SimulatedExecutor:
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
         waiting, self._waiting = self._waiting, []
+        waiting += self._values.take_messages()
         drain = self._runtime.host.drain_trace()
         if self._architecture:
             self._bag.tell_architecture(self._architecture, drain)
         self._received.update(message.topic for message in waiting)
         self._refused += self._bag.write(drain, waiting, whole=True)
         self._bag.tell_ledger(self._received, self._refused)
-        self._bag.tell_dropped(self._refused.total())
+        self._bag.tell_dropped(self._refused.total() + self._values.dropped_messages())
 
     def flush(self) -> None:
         """Make the bag a finished one of what was recorded; waits for the disk."""
@@ -199,6 +203,7 @@ class SimulatedExecutor:
         self.carry()
         self.refresh()
         self.record()
+        self._values.keep_messages(on=False)
         self._bag.close()
 
     def _keep(self, sample: Sample) -> None:

@@ -1583,10 +1583,28 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "| Escape | back to the table |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
     "| `p` | pause |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
     "| `q` | quit |": ("ros/cli/test_watch.py::test_a_table_that_keys_change",),
-    "The values of other resources are not recorded;": (
-        "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",
+    "The values of other resources are recorded by `--value` (": (
+        "ros/executor/test_values.py::test_every_write_is_recorded",
     ),
-    "shows them while the robot runs.": ("ros/executor/test_values.py::test_echo",),
+    "mauve record start /robot_1/executor --value pose --value control.command": (
+        "ros/executor/test_values.py::test_every_write_is_recorded",
+    ),
+    (
+        "The bag has every write to these resources, not samples, on the topics "
+        "`/robot_1/executor/values/pose` and so on: one message a write, with its definition."
+    ): (
+        "ros/executor/test_values.py::test_every_write_is_recorded",
+        "ros/executor/test_values.py::test_every_write_is_recorded_in_virtual_time",
+        "WriteLogs.KeepEveryWriteFromTheBeginToTheEnd",
+    ),
+    "So `rosbags`, `mcap` and Foxglove read structs of your own, too.": (
+        "ros/executor/test_values.py::test_every_write_is_recorded",
+    ),
+    "The time of a message is the writer's.": ("WriteLogs.KeepEveryWriteFromTheBeginToTheEnd",),
+    "A write that finds no room is counted among the dropped messages.": ("WriteLogs.CountWhatFindsNoRoom",),
+    "An architecture file names values that are recorded whenever the executor records:": (
+        "ros/executor/test_values.py::test_every_write_is_recorded",
+    ),
     # ---- the house
     (
         "`scripts/lint` checks style, types, layers and includes, and builds `docs/` "

@@ -48,6 +48,7 @@ void EventCounter::Raise::raise(time_ns_t time_ns) noexcept {
     const std::lock_guard lock(owner_.mutex_);
     ++owner_.count_.data;
     owner_.time_ns_ = time_ns;
+    owner_.log_.put(owner_.count_, time_ns);
   }
   owner_.written(time_ns);
 }
@@ -76,6 +77,13 @@ bool EventCounter::peek_sample(std::vector<std::byte>& message, time_ns_t& time_
   else
     put_signal(message, said_);
   return status != DataStatus::none;
+}
+
+bool EventCounter::next_write(std::vector<std::byte>& message, time_ns_t& time_ns) {
+  return log_.next([&](const WrittenValue<EventCount>& raised) {
+    time_ns = raised.time_ns;
+    CdrWriter(message).put(raised.value);
+  });
 }
 
 bool EventCounter::write_sample(std::span<const std::byte> message, time_ns_t time_ns) {

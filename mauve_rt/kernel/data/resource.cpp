@@ -75,6 +75,14 @@ void Resource::set_longest_hold_ns(time_ns_t longest_hold_ns) {
   longest_hold_ns_ = longest_hold_ns;
 }
 
+void Resource::begin_log(std::size_t /*bytes*/) {
+  throw Error(ErrorCode::invalid_argument, "the resource has no values that could be recorded",
+              {.element = description(),
+               .expected = "a shared_data, latest_value, ring_buffer or event",
+               .found = kind_,
+               .remedy = "record another resource"});
+}
+
 void Resource::bind_input() {
   for (const ServiceBase* service : services_) {
     if (service->kind() == PortKind::write) service->check_ports(service->ports() + 1);

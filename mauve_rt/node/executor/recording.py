@@ -15,19 +15,20 @@ from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import monotonic_ns
+from mauve_rt.control.recorded_values import RecordedValues, choose
 from mauve_rt.control.requests import Code, RecordingOrder, RefusalError
 from mauve_rt.control.runtime import Observed, Runtime
-from mauve_rt.errors import ParameterError, one_line
+from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.interfaces.descriptions import trace_architecture
 from mauve_rt.interfaces.qos import qos_profile, recorded_qos
 from mauve_rt.model import message_class
 from mauve_rt.model.schema import QOS_NAMES
 from mauve_rt.node.executor.bound_resources import BoundResources
-from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
-    from mauve_rt.trace.recording.recorder import Recorder
+    from mauve_rt.trace.recording.recorder import MessageSource, Recorder
 
 _DEPTH = 100  # of the topics recorded beside the executor's own
 _BEST_EFFORT = "best_effort"
@@ -95,7 +96,7 @@ class Recording:
         self._chosen: tuple[ChosenTopic, ...] = ()
         self._told: set[tuple[str, str]] = set()  # topics, and types of others on them
 
-    def start(self, bag: Path, topics: Sequence[str], *, split: Split) -> Path:
+    def start(self, bag: Path, topics: Sequence[str], *, split: Split, values: Sequence[str] = ()) -> Path:
         """Create the bag and record from now on; returns its folder, absolute. Another recording ends.
 
         Args:
@@ -104,10 +105,11 @@ class Recording:
                 effort, the default, hears every publisher; transient_local also hears what was said before.
                 What the executor sends, and what its resources are bound to, is recorded anyhow, and once.
             split: when to go on in a new file.
+            values: resources, or COMPONENT.PORT, whose every write is recorded, besides those of the file.
 
         Raises:
-            ParameterError: a topic is written otherwise, nobody knows its type, that is not installed, or the
-                topic is used with another one.
+            ParameterError: a value is not there; a topic is written otherwise, nobody knows its type, that is
+                not installed, or the topic is used with another one.
             TraceError: the folder exists already or cannot be written.
 
         """
@@ -115,16 +117,21 @@ class Recording:
         from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415
 
         chosen = tuple(self._choose(topics))
+        name = self._node.get_fully_qualified_name()
+        try:
+            recorded = choose(self._runtime, [*self._runtime.model.recorded, *values], name)
+        except MauveError as error:
+            raise ParameterError(str(error)) from error
         with self._lock:
             self.stop()
             self._subscribe(chosen)  # first: what is refused here leaves no folder behind
             recorder = Recorder(
                 self._runtime.host,
                 bag.absolute(),
-                node_name=self._node.get_fully_qualified_name(),
+                node_name=name,
                 split=split,
                 on_error=self._node.get_logger().error,
-                messages=self._bound,
+                messages=_Sources(self._bound, RecordedValues(self._runtime, recorded)),
                 keeper=keeper_program(),
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
@@ -280,6 +287,23 @@ class Recording:
         self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
 
 
+class _Sources:
+    """Several sources of messages as one."""
+
+    def __init__(self, *sources: "MessageSource") -> None:
+        self._sources = sources
+
+    def keep_messages(self, *, on: bool) -> None:
+        for source in self._sources:
+            source.keep_messages(on=on)
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        return [message for source in self._sources for message in source.take_messages()]
+
+    def dropped_messages(self) -> int:
+        return sum(source.dropped_messages() for source in self._sources)
+
+
 class RecordingOrders:
     """Carries out orders to start and stop recordings. They name folders below one, and only there."""
 
@@ -313,7 +337,7 @@ class RecordingOrders:
             raise RefusalError(Code.INVALID, text)
         try:
             split = Split(after_s=order.split_s or Split().after_s, after_bytes=order.split_bytes)
-            directory = self._recording.start(bag, order.topics, split=split)
+            directory = self._recording.start(bag, order.topics, split=split, values=order.values)
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error
         except TraceError as error:

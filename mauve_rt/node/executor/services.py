@@ -275,6 +275,7 @@ def _start_recording(ros: Any) -> Request:
         start=True,
         bag=ros.bag,
         topics=tuple(ros.topics),
+        values=tuple(ros.values),
         split_s=ros.split_s,
         split_bytes=ros.split_bytes,
     )

@@ -33,6 +33,8 @@ class SentMessage(NamedTuple):
     data: bytes
     monotonic_ns: int
     qos: TopicQos | None
+    definition: str = ""
+    """Of a type that no installed package has: the .msg text, as a bag stores it."""
 
 
 @dataclass(frozen=True, kw_only=True)

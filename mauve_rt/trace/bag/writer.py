@@ -108,8 +108,12 @@ class BagWriter:
         """Log time of the present file's first flushed message; 0 when there is none."""
         return self._file.flushed.start_ns
 
-    def add_topic(self, name: str, type_name: str, *, qos: TopicQos | None = None) -> None:
+    def add_topic(
+        self, name: str, type_name: str, *, qos: TopicQos | None = None, definition: str = ""
+    ) -> None:
         """Declare a topic by absolute name and type (package/msg/Name); doing so again does nothing.
+
+        `definition`: the .msg text of a type that no installed package has.
 
         Raises:
             TraceError: the name is relative, the topic has another type already, or the type is not
@@ -126,10 +130,10 @@ class BagWriter:
             msg = f"topic {name}: expected an absolute name, e.g. /robot_1/{name}"
             raise TraceError(msg)
         if type_name not in self._schemas:
-            definition = find_definition(type_name)
-            self._schemas[type_name] = (_declare_schema(self._file, definition), definition)
-        schema_id, definition = self._schemas[type_name]
-        topic = _Topic(name, definition, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
+            defined = Definition(type_name, definition, "") if definition else find_definition(type_name)
+            self._schemas[type_name] = (_declare_schema(self._file, defined), defined)
+        schema_id, defined = self._schemas[type_name]
+        topic = _Topic(name, defined, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
         _declare_channel(self._file, topic, schema_id)
         self._topics[name] = topic
         self._stale = True

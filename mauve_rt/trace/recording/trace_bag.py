@@ -253,7 +253,9 @@ class TraceBag:
 
     def _write_message(self, message: SentMessage, drain: Drain) -> bool:
         try:
-            self._bag.add_topic(message.topic, message.type_name, qos=message.qos)
+            self._bag.add_topic(
+                message.topic, message.type_name, qos=message.qos, definition=message.definition
+            )
         except TraceError as error:
             refused = (message.topic, message.type_name)
             if refused not in self._refused_types:

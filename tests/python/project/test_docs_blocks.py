@@ -162,6 +162,13 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "mauve mirror /robot_1/executor pose   ": (
             "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
         ),
+        "mauve record start /robot_1/executor --value": (
+            "ros/executor/test_values.py::test_every_write_is_recorded",
+        ),
+        "executor: {record:": (
+            "ros/executor/test_values.py::test_every_write_is_recorded",
+            "ros/executor/test_values.py::test_every_write_is_recorded_in_virtual_time",
+        ),
         "executor: {mirror:": ("ros/executor/test_values.py::test_mirrors_of_the_file",),
         "mauve watch /robot_1/executor --once": (
             "ros/cli/test_watch.py::test_a_table_that_keys_change",

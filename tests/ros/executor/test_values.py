@@ -12,18 +12,29 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Point
+from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import PATIENCE_S
+from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64
 
-from mauve_msgs.msg import Value, ValueNames, Values
-from mauve_msgs.srv import ListComponents, Mirror, ReadValues, Reconfigure
+import mauve_rt.trace
+from mauve_msgs.msg import ReplyCode, Value, ValueNames, Values
+from mauve_msgs.srv import ListComponents, Mirror, ReadValues, Reconfigure, StartRecording
+from mauve_rt._kernel import Simulation
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model import load_architecture
+from mauve_rt.simulation.executor import SimulatedExecutor
+from mauve_rt.simulation.topics import SimulatedTopics
 from mauve_rt.trace.format.message_decoding import Decoder
 
 NODE = "/robot_1/executor"
 ARCHITECTURE = """\
 mauve: 1
-executor: {namespace: /robot_1, mirror: [place, {name: pilot.latest, field: data, topic: level, rate_hz: 20}]}
+executor:
+  namespace: /robot_1
+  record: [queue, pilot.latest]
+  mirror: [place, {name: pilot.latest, field: data, topic: level, rate_hz: 20}]
 components:
   pilot: {shell: executor_tests/PilotShell, core: executor_tests/Pilot, fsm: executor_tests/PilotFsm}
   caller: {shell: executor_tests/CallerShell, core: executor_tests/Caller, fsm: executor_tests/CallerFsm}
@@ -58,7 +69,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 def running(start_executor: Callable[..., Any], tmp_path: Path, graph: Any) -> Any:
     path = tmp_path / "robot.yaml"
     path.write_text(ARCHITECTURE, encoding="utf-8")
-    process = start_executor("-p", f"architecture:={path}")
+    process = start_executor("-p", f"architecture:={path}", "-p", f"bags:={tmp_path}")
     graph.spin_until(lambda: graph.node.count_services(f"{NODE}/list_parameters") > 0, "all services")
     return process
 
@@ -318,3 +329,97 @@ def test_the_command_starts_and_stops_a_mirror(mauve: Callable[..., Any], graph:
         2,
         "mauve: name a resource, or COMPONENT.PORT (see mauve list)\n",
     )
+
+
+def recorded(bag: Path) -> dict[str, list[Any]]:
+    """The messages of each topic of values, as rosbags decodes them by the definitions in the bag."""
+    found: dict[str, list[Any]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages():
+            if "/values/" in connection.topic:
+                name = connection.topic.removeprefix(f"{NODE}/values/")
+                found.setdefault(name, []).append(reader.deserialize(data, connection.msgtype))
+    return found
+
+
+def assert_each_write(values: dict[str, list[Any]], *, least: int) -> None:
+    """Of the pilot's: not one is missing between the first and the last."""
+    assert set(values) == {"attitude", "queue", "latest"}
+    rounds = [message.round for message in values["attitude"]]
+    assert len(rounds) > least
+    assert rounds == list(range(rounds[0], rounds[0] + len(rounds)))
+    assert all(message.roll == message.round / 2 for message in values["attitude"])
+    assert all(message.mode == "cruise" for message in values["attitude"])
+    rolls = [2 * message.data for message in values["latest"]]
+    assert rolls == [rolls[0] + number for number in range(len(rolls))]
+    assert len(rolls) > least
+
+
+def test_every_write_is_recorded(running: Any, graph: Any, mauve: Callable[..., Any], tmp_path: Path) -> None:
+    del running
+    started = mauve("record", "start", NODE, "flight", "--value", "pilot.attitude")
+    assert (started.returncode, started.stderr) == (0, "")
+    begun = ask(graph, "latest")[0].writes
+    graph.spin_until(lambda: ask(graph, "latest")[0].writes > begun + 150, "150 more writes")
+    stopped = mauve("record", "stop", NODE)
+    assert stopped.returncode == 0, stopped.stderr
+    assert "were dropped" not in stopped.stdout
+    values = recorded(tmp_path / "flight")
+    values.setdefault("queue", [])  # nobody reads it: it was full before
+    assert_each_write(values, least=150)
+    with (tmp_path / "flight" / "flight_0.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    schemas = {schema.name: schema.data.decode() for schema in summary.schemas.values()}
+    assert "float32[3] rates" in schemas["executor_tests/msg/Attitude"]
+    trace = mauve_rt.trace.open(tmp_path / "flight")
+    assert trace.lost == 0
+    assert len(list(trace.messages(f"{NODE}/values/attitude"))) == len(values["attitude"])
+
+
+def test_every_write_is_recorded_in_virtual_time(tmp_path: Path, plugin_prefix: Path) -> None:
+    del plugin_prefix
+    path = tmp_path / "robot.yaml"
+    path.write_text(ARCHITECTURE.replace("record: [", "record: [attitude, "), encoding="utf-8")
+    simulation = Simulation()
+    executor = SimulatedExecutor(simulation, SimulatedTopics(), path, tmp_path / "bag", complain=pytest.fail)
+    simulation.deploy()
+    executor.activate()
+    for second in (1, 2):
+        simulation.run_until(simulation.epoch_ns() + second * 10**9)
+        executor.record()
+    executor.close()
+    values = recorded(tmp_path / "bag")
+    ends = [values[name].pop() for name in ("attitude", "latest")]
+    assert [ends[0].round, ends[1].data] == [0, 0.0], "the safe outputs of the stop"
+    assert_each_write(values, least=199)
+    assert values["attitude"][0].round == 1
+    assert [message.data for message in values["queue"]] == [0.5, 1.0, 1.5, 2.0, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("value", "problem"),
+    [
+        ("atitude", "value to record: no resource or port is named 'atitude'; did you mean attitude?"),
+        ("lamp", "value to record: resource lamp is of kind executor_tests/Lamp, which has no value to show"),
+    ],
+)
+def test_a_value_that_cannot_be_recorded_starts_nothing(
+    running: Any, graph: Any, tmp_path: Path, value: str, problem: str
+) -> None:
+    del running
+    reply = graph.ask(StartRecording, f"{NODE}/start_recording", bag="none", values=[value])
+    assert (reply.success, reply.code) == (False, ReplyCode.INVALID)
+    assert reply.message.startswith(problem)
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_file_that_names_values_that_are_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    text = ARCHITECTURE.replace("record: [queue", "record: [queu").replace("[place,", "[plac,")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ArchitectureFileError) as raised:
+        load_architecture(path)
+    lines = raised.value.lines()
+    assert any("there is no value 'queu'" in line and "did you mean queue?" in line for line in lines)
+    assert any("there is no value 'plac'" in line for line in lines)

@@ -9,6 +9,7 @@
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
+#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -48,6 +49,10 @@ class EventCounter final : public Resource {
   /// What is said of raises not told of yet. [non-rt]
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override;
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override;
+  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
+  void end_log() override { log_.close(mutex_); }
+  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override;
+  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   /// A message that arrives raises the event once, whatever count it carries; false when malformed. [non-rt]
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override;
 
@@ -73,6 +78,7 @@ class EventCounter final : public Resource {
   PiMutex mutex_;
   EventCount count_;
   time_ns_t time_ns_{0};
+  WriteLog<WrittenValue<EventCount>> log_;  // under mutex_
 
  public:
   Read read{*this};

@@ -12,6 +12,7 @@
 #include "mauve_rt/data/latest_register.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
+#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -28,6 +29,7 @@ inline constexpr std::uint32_t kLeftBehind = 2;
 /// | register_   | readers, each with a ReaderState        | wait-free                                         |
 /// | register_   | the writer; the watchdog for its zeros  | write_mutex_, free but for a writer that hangs    |
 /// | floor_      | the writer; who takes its end over      | write_mutex_                                      |
+/// | log_        | the writer                              | write_mutex_                                      |
 /// | register_   | the serialized face, and one number for rules, as one more reader | serial_mutex_           |
 template <Described T>
 class LatestValue final : public NewestResource {
@@ -52,6 +54,15 @@ class LatestValue final : public NewestResource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
+  void begin_log(std::size_t bytes) override { log_.open(bytes, write_mutex_); }
+  void end_log() override { log_.close(write_mutex_); }
+  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
+    return log_.next([&](const WrittenValue<T>& written) {
+      time_ns = written.time_ns;
+      CdrWriter(message).put(written.value);
+    });
+  }
+  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
     return mauve::find_number<T>(path);
   }
@@ -93,6 +104,7 @@ class LatestValue final : public NewestResource {
         const std::lock_guard lock(owner_.write_mutex_);
         if (!owner_.floor_.admits(time_ns)) return true;
         if (!owner_.register_.write(value, time_ns)) return false;
+        owner_.log_.put(value, time_ns);
       }
       owner_.written(time_ns);
       return true;
@@ -102,6 +114,7 @@ class LatestValue final : public NewestResource {
         if (!owner_.write_mutex_.try_lock()) return TryWrite::busy;
         const std::lock_guard lock(owner_.write_mutex_, std::adopt_lock);
         if (!owner_.floor_.admits(time_ns) || !owner_.register_.write(value, time_ns)) return TryWrite::done;
+        owner_.log_.put(value, time_ns);
       }
       owner_.written(time_ns);
       return TryWrite::done;
@@ -142,6 +155,7 @@ class LatestValue final : public NewestResource {
   PiMutex write_mutex_;
   WriteFloor floor_;
   PiMutex serial_mutex_;
+  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};

@@ -160,6 +160,14 @@ class Resource : public ConfigurablePart {
                            std::uint64_t& /*sequence*/) {
     return false;
   }
+  /// Keeps every write from now on for next_write(), in about so many bytes, until end_log(). [non-rt]
+  /// Throws Error (invalid_argument): it has no values to keep.
+  virtual void begin_log(std::size_t bytes);
+  virtual void end_log() {}
+  /// The oldest write that was not taken yet, as a message; false: there is none. [non-rt], one thread
+  virtual bool next_write(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/) { return false; }
+  /// Writes that found no room there. [rt]
+  virtual std::uint64_t lost_writes() const MAUVE_RT { return 0; }
   /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }

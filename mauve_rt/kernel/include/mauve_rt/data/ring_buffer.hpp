@@ -11,6 +11,7 @@
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
+#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -22,6 +23,7 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 ///
 /// | member                                   | written by           | under  | hot |
 /// |------------------------------------------|----------------------|--------|-----|
+/// | log_                                     | write service        | mutex_ | if any |
 /// | places_, first_, size_, sequence_, lost_ | read, write services | mutex_ | yes |
 template <Described T>
 class RingBuffer final : public Resource {
@@ -75,6 +77,15 @@ class RingBuffer final : public Resource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
+  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
+  void end_log() override { log_.close(mutex_); }
+  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
+    return log_.next([&](const WrittenValue<T>& written) {
+      time_ns = written.time_ns;
+      CdrWriter(message).put(written.value);
+    });
+  }
+  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::string why_refused(std::span<const std::byte> message) const override {
     const auto value = std::make_unique<T>();
     return CdrReader(message).get(*value)
@@ -159,6 +170,7 @@ class RingBuffer final : public Resource {
     place.time_ns = time_ns;
     place.sequence = ++sequence_;
     ++size_;
+    log_.put(value, time_ns);
     return true;
   }
 
@@ -170,6 +182,7 @@ class RingBuffer final : public Resource {
   std::uint64_t sequence_{0};
   std::uint64_t lost_{0};
   WhenFull when_full_;
+  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};

@@ -9,6 +9,7 @@
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
+#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -18,6 +19,7 @@ namespace mauve {
 /// |-----------------------------|----------------|--------|-----|
 /// | value_, time_ns_, sequence_ | write service  | mutex_ | yes |
 /// | floor_                      | who takes an end over | mutex_ | yes |
+/// | log_                        | write service  | mutex_ | if any |
 template <Described T>
 class SharedData final : public NewestResource {
  public:
@@ -34,6 +36,15 @@ class SharedData final : public NewestResource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
+  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
+  void end_log() override { log_.close(mutex_); }
+  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
+    return log_.next([&](const WrittenValue<T>& written) {
+      time_ns = written.time_ns;
+      CdrWriter(message).put(written.value);
+    });
+  }
+  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
     return mauve::find_number<T>(path);
   }
@@ -107,6 +118,7 @@ class SharedData final : public NewestResource {
     value_ = value;
     time_ns_ = time_ns;
     ++sequence_;
+    log_.put(value, time_ns);
     return true;
   }
 
@@ -115,6 +127,7 @@ class SharedData final : public NewestResource {
   T value_{};
   time_ns_t time_ns_{0};
   std::uint64_t sequence_{0};
+  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};

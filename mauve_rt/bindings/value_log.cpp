@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The writes to a resource, for a recorder in Python.
+#include "translate.hpp"
+
+namespace mauve::bindings {
+
+namespace {
+
+/// Every write to the resource of a name, also when another one takes that name. For one thread.
+class ValueLog {
+ public:
+  using Writes = std::vector<std::pair<std::vector<std::byte>, time_ns_t>>;
+
+  /// Throws Error: there is no such resource, or it has no values.
+  ValueLog(PyArchitecture& architecture, std::string resource, std::size_t bytes)
+      : architecture_(architecture.architecture),
+        name_(std::move(resource)),
+        bytes_(bytes),
+        resource_(architecture_.hold_resource(name_)) {
+    begin();
+  }
+  ~ValueLog() { end(); }
+  ValueLog(const ValueLog&) = delete;
+  ValueLog& operator=(const ValueLog&) = delete;
+
+  Writes take() {
+    Writes writes;
+    take_rest(writes);
+    std::shared_ptr<Resource> present = architecture_.find_resource(name_);
+    if (present != resource_ && !ended_) {
+      take_rest(writes);
+      leave();
+      resource_ = std::move(present);
+      if (resource_ != nullptr) begin();
+    }
+    return writes;
+  }
+  std::uint64_t lost() const {
+    return lost_ + (resource_ == nullptr ? 0 : resource_->lost_writes() - lost_before_);
+  }
+  void end() noexcept {
+    if (ended_) return;
+    ended_ = true;
+    leave();
+  }
+
+ private:
+  void begin() {
+    lost_before_ = resource_->lost_writes();
+    resource_->begin_log(bytes_);
+  }
+  void leave() {
+    if (resource_ == nullptr) return;
+    lost_ += resource_->lost_writes() - lost_before_;
+    resource_->end_log();
+    resource_ = nullptr;
+  }
+  void take_rest(Writes& writes) {
+    if (resource_ == nullptr) return;
+    std::vector<std::byte> message;
+    time_ns_t time_ns = 0;
+    while (resource_->next_write(message, time_ns)) writes.emplace_back(message, time_ns);
+  }
+
+  Architecture& architecture_;
+  const std::string name_;
+  const std::size_t bytes_;
+  std::shared_ptr<Resource> resource_;  // nullptr: it was removed, or the log has ended
+  std::uint64_t lost_{0};
+  std::uint64_t lost_before_{0};  // this log, by the present resource
+  bool ended_{false};
+};
+
+py::list take(ValueLog& self) {
+  ValueLog::Writes writes;
+  {
+    const py::gil_scoped_release release;
+    writes = self.take();
+  }
+  py::list all;
+  for (const auto& [message, time_ns] : writes)
+    all.append(
+        py::make_tuple(py::bytes(reinterpret_cast<const char*>(message.data()), message.size()), time_ns));
+  return all;
+}
+
+}  // namespace
+
+void bind_value_log(py::module_& module) {
+  using Unlocked = py::call_guard<py::gil_scoped_release>;
+  py::class_<ValueLog>(module, "ValueLog")
+      .def(py::init<PyArchitecture&, std::string, std::size_t>(), py::arg("architecture"),
+           py::arg("resource"), py::kw_only(), py::arg("bytes") = std::size_t{1} << 20U,
+           py::keep_alive<1, 2>(), Unlocked())
+      .def("take", &take)
+      .def("end", &ValueLog::end, Unlocked())
+      .def_property_readonly("lost", &ValueLog::lost);
+}
+
+}  // namespace mauve::bindings
