@@ -1,6 +1,6 @@
 """What `mauve watch` shows, at 80 columns or more; made from what is known, without a terminal."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -82,22 +82,27 @@ def view(
         parts += _opened(executor, component)
     else:
         cursor = selection.cursor if has_keys else None
-        parts.append(_components(shown, cursor, several=len(executors) > 1))
+        parts.append(_components(shown, cursor, _whose if len(executors) > 1 else _nobodys))
         parts += [
             Text.from_markup(f"[bold red]{row.component.name}[/]  {escape(text)}")
             for row in shown
             if (text := row.component.fault or row.figures.remark)
         ]
-        parts += [part for executor in executors for part in _rules(executor)]
+        of_whom = _whose if len(executors) > 1 else _nobodys
+        parts += [part for executor in executors for part in _rules(executor, of_whom(executor.name))]
         values = [
-            (name, value)
+            (of_whom(executor.name) + name, value)
             for executor in executors
             for name, value in executor.values.items()
             if executor.is_there
         ]
         if values:
             parts.append(_values(values))
-        parts += [_event(executor) for executor in executors if executor.last_event is not None]
+        parts += [
+            _event(executor, of_whom(executor.name))
+            for executor in executors
+            if executor.last_event is not None
+        ]
     if has_keys:
         parts.append(_footer(selection))
     return Group(*parts)
@@ -114,14 +119,24 @@ def _heading(executor: WatchedExecutor) -> Text:
     return Text.from_markup("  ".join([*words, *(f"[yellow]{escape(each)}[/]" for each in reply.warnings)]))
 
 
-def _components(shown: Sequence[Row], cursor: int | None, *, several: bool) -> Table:
+def _whose(executor: str) -> str:
+    """The namespace of one of several executors."""
+    return f"{executor.rpartition('/')[0]} "
+
+
+def _nobodys(_executor: str) -> str:
+    """There is only one."""
+    return ""
+
+
+def _components(shown: Sequence[Row], cursor: int | None, of_whom: Callable[[str], str]) -> Table:
     table = _table()
     table.add_column("component", no_wrap=True, max_width=_NAME_WIDTH)
     table.add_column("core", overflow="fold")
     for name in ("state", "Hz", "wake-up", "response", "execution", "overruns"):
         table.add_column(name, justify="left" if name == "state" else "right", no_wrap=True)
     for number, row in enumerate(shown):
-        name = f"{row.executor.rpartition('/')[0]} {row.component.name}" if several else row.component.name
+        name = of_whom(row.executor) + row.component.name
         figures = row.figures
         table.add_row(
             escape(name),
@@ -137,13 +152,13 @@ def _components(shown: Sequence[Row], cursor: int | None, *, several: bool) -> T
     return table
 
 
-def _rules(executor: WatchedExecutor) -> Iterator[Text]:
+def _rules(executor: WatchedExecutor, whose: str) -> Iterator[Text]:
     for rule in executor.rules:
         stands = "in effect" if rule.in_effect else "true" if rule.holds else "false"
         coming = f", {rule.next} in {max(rule.next_in_s, 0.0):.1f} s" if rule.next else ""
         words = f"{stands} for {rule.since_s:.0f} s{coming}" if rule.armed else "not armed"
         problem = f"  [bold red]{escape(rule.problem)}[/]" if rule.problem else ""
-        yield Text.from_markup(f"rule [bold]{rule.name}[/]  {words}{problem}")
+        yield Text.from_markup(f"rule {whose}[bold]{rule.name}[/]  {words}{problem}")
 
 
 def _values(values: Sequence[tuple[str, Followed]]) -> Table:
@@ -191,12 +206,12 @@ def _opened(executor: WatchedExecutor, name: str) -> Iterator[RenderableType]:
         yield properties
 
 
-def _event(executor: WatchedExecutor) -> Text:
+def _event(executor: WatchedExecutor, whose: str) -> Text:
     event = executor.last_event
     when = datetime.fromtimestamp(event.stamp.sec).astimezone()
     outcome = "done" if event.success else f"refused: {event.message}"
     who = f" by {event.requested_by}" if event.requested_by else ""
-    return Text(f"last change {when:%H:%M:%S}  {event.request}{who}: {outcome}", style="dim")
+    return Text(f"last change {when:%H:%M:%S}  {whose}{event.request}{who}: {outcome}", style="dim")
 
 
 def _footer(selection: Selection) -> Text:

@@ -78,6 +78,18 @@ def test_ten_executors_are_told_apart() -> None:
     ]
 
 
+def test_rules_and_values_of_several_tell_whose_they_are() -> None:
+    rule = RuleInfo(name="lost", armed=True)
+    values = {"pose": Followed(text="x 1", writes=1)}
+    event = ReconfigurationEvent(request="stop control", success=True)
+    facts = {"rules": [rule], "values": values, "last_event": event}
+    lines = shown(known(**facts), known(name="/robot_2/executor", **facts))
+    for whose in ("/robot_1", "/robot_2"):
+        assert any(line.startswith(f"rule {whose} lost") for line in lines)
+        assert any(line.split()[:2] == [whose, "pose"] for line in lines)
+        assert any("last change" in line and f"{whose} stop control" in line for line in lines)
+
+
 def test_rules_values_and_the_last_change() -> None:
     rule = RuleInfo(name="lost", armed=True, holds=True, next="do", next_in_s=0.8, since_s=2.0)
     other = RuleInfo(name="idle")
