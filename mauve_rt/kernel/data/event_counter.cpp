@@ -25,7 +25,7 @@ void put_signal(std::vector<std::byte>& message, EventMessage said) {
 
 }  // namespace
 
-EventCounter::EventCounter(EventMessage said) : Resource("event", type_of(said)), said_(said) {
+EventCounter::EventCounter(EventMessage said) : LoggedResource("event", type_of(said)), said_(said) {
   offer(read);
   offer(raise);
 }
@@ -48,7 +48,7 @@ void EventCounter::Raise::raise(time_ns_t time_ns) noexcept {
     const std::lock_guard lock(owner_.mutex_);
     ++owner_.count_.data;
     owner_.time_ns_ = time_ns;
-    owner_.log_.put(owner_.count_, time_ns);
+    owner_.log(owner_.count_, time_ns);
   }
   owner_.written(time_ns);
 }
@@ -77,13 +77,6 @@ bool EventCounter::peek_sample(std::vector<std::byte>& message, time_ns_t& time_
   else
     put_signal(message, said_);
   return status != DataStatus::none;
-}
-
-bool EventCounter::next_write(std::vector<std::byte>& message, time_ns_t& time_ns) {
-  return log_.next([&](const WrittenValue<EventCount>& raised) {
-    time_ns = raised.time_ns;
-    CdrWriter(message).put(raised.value);
-  });
 }
 
 bool EventCounter::write_sample(std::span<const std::byte> message, time_ns_t time_ns) {

@@ -7,9 +7,8 @@
 
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
-#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -40,7 +39,7 @@ const char* type_of(EventMessage said) MAUVE_RT;
 /// | member            | written by    | under  | hot |
 /// |-------------------|---------------|--------|-----|
 /// | count_, time_ns_  | raise service | mutex_ | yes |
-class EventCounter final : public Resource {
+class EventCounter final : public LoggedResource<EventCount, Resource> {
  public:
   explicit EventCounter(EventMessage said = EventMessage::count);
   void set_name(const std::string& name) override;
@@ -49,10 +48,6 @@ class EventCounter final : public Resource {
   /// What is said of raises not told of yet. [non-rt]
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override;
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override;
-  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
-  void end_log() override { log_.close(mutex_); }
-  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override;
-  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   /// A message that arrives raises the event once, whatever count it carries; false when malformed. [non-rt]
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override;
 
@@ -74,11 +69,12 @@ class EventCounter final : public Resource {
     EventCounter& owner_;
   };
 
+  PiMutex& writers() noexcept override { return mutex_; }
+
   EventMessage said_;
   PiMutex mutex_;
   EventCount count_;
   time_ns_t time_ns_{0};
-  WriteLog<WrittenValue<EventCount>> log_;  // under mutex_
 
  public:
   Read read{*this};

@@ -10,9 +10,8 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/latest_register.hpp"
-#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
-#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -29,18 +28,17 @@ inline constexpr std::uint32_t kLeftBehind = 2;
 /// | register_   | readers, each with a ReaderState        | wait-free                                         |
 /// | register_   | the writer; the watchdog for its zeros  | write_mutex_, free but for a writer that hangs    |
 /// | floor_      | the writer; who takes its end over      | write_mutex_                                      |
-/// | log_        | the writer                              | write_mutex_                                      |
 /// | register_   | the serialized face, and one number for rules, as one more reader | serial_mutex_           |
 template <Described T>
-class LatestValue final : public NewestResource {
+class LatestValue final : public LoggedResource<T, NewestResource> {
  public:
   /// Throws Error (out_of_range). [setup]
   explicit LatestValue(std::uint32_t max_readers = kDefaultMaxReaders)
-      : NewestResource("latest_value", type_name<T>()),
+      : LoggedResource<T, NewestResource>("latest_value", type_name<T>()),
         max_readers_(checked(max_readers)),
         register_(max_readers + 2 + kLeftBehind) {
-    offer(read);
-    offer(write);
+    this->offer(read);
+    this->offer(write);
   }
 
   void set_name(const std::string& name) override {
@@ -54,15 +52,6 @@ class LatestValue final : public NewestResource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
-  void begin_log(std::size_t bytes) override { log_.open(bytes, write_mutex_); }
-  void end_log() override { log_.close(write_mutex_); }
-  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
-    return log_.next([&](const WrittenValue<T>& written) {
-      time_ns = written.time_ns;
-      CdrWriter(message).put(written.value);
-    });
-  }
-  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
     return mauve::find_number<T>(path);
   }
@@ -104,7 +93,7 @@ class LatestValue final : public NewestResource {
         const std::lock_guard lock(owner_.write_mutex_);
         if (!owner_.floor_.admits(time_ns)) return true;
         if (!owner_.register_.write(value, time_ns)) return false;
-        owner_.log_.put(value, time_ns);
+        owner_.log(value, time_ns);
       }
       owner_.written(time_ns);
       return true;
@@ -114,7 +103,7 @@ class LatestValue final : public NewestResource {
         if (!owner_.write_mutex_.try_lock()) return TryWrite::busy;
         const std::lock_guard lock(owner_.write_mutex_, std::adopt_lock);
         if (!owner_.floor_.admits(time_ns) || !owner_.register_.write(value, time_ns)) return TryWrite::done;
-        owner_.log_.put(value, time_ns);
+        owner_.log(value, time_ns);
       }
       owner_.written(time_ns);
       return TryWrite::done;
@@ -135,6 +124,8 @@ class LatestValue final : public NewestResource {
                  .expected = "1 to " + std::to_string(kMostReaders),
                  .found = std::to_string(max_readers)});
   }
+  PiMutex& writers() noexcept override { return write_mutex_; }
+
   DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
     auto value = std::make_unique<T>();
     ReaderState reader{.seen = seen};
@@ -155,7 +146,6 @@ class LatestValue final : public NewestResource {
   PiMutex write_mutex_;
   WriteFloor floor_;
   PiMutex serial_mutex_;
-  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};

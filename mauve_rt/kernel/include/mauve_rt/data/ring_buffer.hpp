@@ -9,9 +9,8 @@
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
-#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
-#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -23,20 +22,19 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 ///
 /// | member                                   | written by           | under  | hot |
 /// |------------------------------------------|----------------------|--------|-----|
-/// | log_                                     | write service        | mutex_ | if any |
 /// | places_, first_, size_, sequence_, lost_ | read, write services | mutex_ | yes |
 template <Described T>
-class RingBuffer final : public Resource {
+class RingBuffer final : public LoggedResource<T, Resource> {
  public:
   /// Throws Error (invalid_argument) without a capacity. [setup]
   explicit RingBuffer(std::size_t capacity, WhenFull when_full = WhenFull::refuse)
-      : Resource("ring_buffer", type_name<T>()), places_(capacity), when_full_(when_full) {
+      : LoggedResource<T, Resource>("ring_buffer", type_name<T>()), places_(capacity), when_full_(when_full) {
     if (capacity == 0) {
       throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
                   {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
     }
-    offer(read);
-    offer(write);
+    this->offer(read);
+    this->offer(write);
   }
 
   void set_name(const std::string& name) override {
@@ -77,15 +75,6 @@ class RingBuffer final : public Resource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
-  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
-  void end_log() override { log_.close(mutex_); }
-  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
-    return log_.next([&](const WrittenValue<T>& written) {
-      time_ns = written.time_ns;
-      CdrWriter(message).put(written.value);
-    });
-  }
-  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::string why_refused(std::span<const std::byte> message) const override {
     const auto value = std::make_unique<T>();
     return CdrReader(message).get(*value)
@@ -125,6 +114,8 @@ class RingBuffer final : public Resource {
     RingBuffer& owner_;
   };
 
+  PiMutex& writers() noexcept override { return mutex_; }
+
   DataStatus pop(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
     const std::lock_guard lock(mutex_);
     if (size_ == 0) {
@@ -146,7 +137,7 @@ class RingBuffer final : public Resource {
       if (!floor_.admits(time_ns)) return true;
       if (!put(value, time_ns)) return false;
     }
-    written(time_ns);
+    this->written(time_ns);
     return true;
   }
   TryWrite try_push(const T& value, time_ns_t time_ns) noexcept {
@@ -155,7 +146,7 @@ class RingBuffer final : public Resource {
       const std::lock_guard lock(mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !put(value, time_ns)) return TryWrite::done;
     }
-    written(time_ns);
+    this->written(time_ns);
     return TryWrite::done;
   }
   bool put(const T& value, time_ns_t time_ns) noexcept {
@@ -170,7 +161,7 @@ class RingBuffer final : public Resource {
     place.time_ns = time_ns;
     place.sequence = ++sequence_;
     ++size_;
-    log_.put(value, time_ns);
+    this->log(value, time_ns);
     return true;
   }
 
@@ -182,7 +173,6 @@ class RingBuffer final : public Resource {
   std::uint64_t sequence_{0};
   std::uint64_t lost_{0};
   WhenFull when_full_;
-  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};

@@ -7,9 +7,8 @@
 
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
-#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
-#include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
@@ -19,13 +18,12 @@ namespace mauve {
 /// |-----------------------------|----------------|--------|-----|
 /// | value_, time_ns_, sequence_ | write service  | mutex_ | yes |
 /// | floor_                      | who takes an end over | mutex_ | yes |
-/// | log_                        | write service  | mutex_ | if any |
 template <Described T>
-class SharedData final : public NewestResource {
+class SharedData final : public LoggedResource<T, NewestResource> {
  public:
-  SharedData() : NewestResource("shared_data", type_name<T>()) {
-    offer(read);
-    offer(write);
+  SharedData() : LoggedResource<T, NewestResource>("shared_data", type_name<T>()) {
+    this->offer(read);
+    this->offer(write);
   }
 
   void set_name(const std::string& name) override {
@@ -36,15 +34,6 @@ class SharedData final : public NewestResource {
     auto value = std::make_unique<T>();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
-  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_); }
-  void end_log() override { log_.close(mutex_); }
-  bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
-    return log_.next([&](const WrittenValue<T>& written) {
-      time_ns = written.time_ns;
-      CdrWriter(message).put(written.value);
-    });
-  }
-  std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
     return mauve::find_number<T>(path);
   }
@@ -104,6 +93,8 @@ class SharedData final : public NewestResource {
     SharedData& owner_;
   };
 
+  PiMutex& writers() noexcept override { return mutex_; }
+
   DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
     auto value = std::make_unique<T>();
     ReaderState reader{.seen = seen};
@@ -118,7 +109,7 @@ class SharedData final : public NewestResource {
     value_ = value;
     time_ns_ = time_ns;
     ++sequence_;
-    log_.put(value, time_ns);
+    this->log(value, time_ns);
     return true;
   }
 
@@ -127,7 +118,6 @@ class SharedData final : public NewestResource {
   T value_{};
   time_ns_t time_ns_{0};
   std::uint64_t sequence_{0};
-  WriteLog<WrittenValue<T>> log_;
 
  public:
   Read read{*this};
