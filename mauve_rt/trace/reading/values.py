@@ -156,8 +156,17 @@ def resource_of(topic: str) -> str:
     return topic.partition(_RESOURCES)[2]
 
 
+def names_of_numbers(trace: "Trace", topics: Iterable[str]) -> dict[str, list[str]]:
+    """For each of these topics whose messages are mauve_msgs/msg/Values: the names of the numbers in them."""
+    suffix = "/names"
+    wanted = {f"{topic}{suffix}" for topic in topics if trace.topics[topic][0] == VALUES_TYPE}
+    told = wanted & {*trace.topics}
+    messages = trace.messages(*told) if told else ()
+    return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in told}
+
+
 def read_samples(trace: "Trace", topics: list[str], left_out: list[str]) -> dict[Field, Samples]:
-    """Samples of all fields of these topics, in one pass; `left_out` gets a sentence for each unreadable one."""
+    """Read all fields of these topics; `left_out` gets a sentence for each topic that is unreadable."""
     if not topics:
         return {}
     try:
@@ -203,13 +212,10 @@ class _Table:
 
 def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
     tables: dict[str, _Table] = {}
-    told: dict[str, list[str]] = {}
-    names = {f"{topic}/names" for topic in topics if trace.topics[topic][0] == VALUES_TYPE}
-    for message in trace.messages(*topics, *(names & {*trace.topics})):
+    told = names_of_numbers(trace, topics)
+    for message in trace.messages(*topics):
         topic = message.topic
-        if topic in names:
-            told[topic.removesuffix("/names")] = list(message.msg.names)
-        elif topic in topics:
+        if topic in topics:
             if topic not in tables:
                 tables[topic] = _Table(message.msg)
             tables[topic].add(message.monotonic_ns, message.msg)

@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from synthetic_traces import MS, ROOT, Pose, periodic_trace, with_values
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace import open as open_trace
+from mauve_rt.trace.export.csv_files import export_csv
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -131,3 +133,14 @@ def record_named(folder: Path) -> Path:
     put(f"{topic}/names", "ValueNames", 4 * MS, type="pkg::Filter", names=["gain", "state[0]"])
     made.stop()
     return folder / "prefix"
+
+
+def test_a_csv_file_of_a_resource_has_its_name_and_a_column_for_each_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(record_named(tmp_path)))
+    assert export_csv(open_trace(tmp_path / "bag"), tmp_path / "csv") == []
+    table = pd.read_csv(tmp_path / "csv" / "topic.executor.values.filter.csv")
+    assert list(table.columns)[2:] == ["stamp.sec", "stamp.nanosec", "gain", "state[0]"]
+    assert table["state[0]"].tolist() == [10.0, 11.0, 12.0]
+    assert table["monotonic_ns"].tolist() == [MS, 2 * MS, 3 * MS]
