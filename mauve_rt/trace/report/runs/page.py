@@ -22,9 +22,9 @@ from mauve_rt.trace.report.runs.tables import (
     values_view,
 )
 from mauve_rt.trace.report.runs.values import ComparedField
-from mauve_rt.trace.report.runs.words import number_text, verdict_on
+from mauve_rt.trace.report.runs.words import verdict_on
 from mauve_rt.trace.report.tables import words_section
-from mauve_rt.trace.report.units import time_text
+from mauve_rt.trace.report.units import number_text, time_text
 from mauve_rt.trace.report.verdict import verdict_html
 
 _OPEN_UP_TO = 6
