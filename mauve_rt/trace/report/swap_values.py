@@ -123,7 +123,8 @@ def _row(value: SwapValue, window: Window, top: float) -> str:
     if len(entries):
         low, high = float(entries["low"].min()), float(entries["high"].max())
         parts.append(svg.path(_steps(entries, window, top, (low, high)), css="value"))
-        for end, y in ((high, top + _PAD - 2), (low, base - 3)) if high > low else ():
+        ends = ((high, top + _PAD - 2), (low, base - 3)) if high > low else ((low, top + _ROW / 2 - 4),)
+        for end, y in ends:
             parts.append(svg.label(LEFT + 3, y, number_text(end), css="tick"))
     return "".join(parts)
 

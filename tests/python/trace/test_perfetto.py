@@ -3,6 +3,8 @@
 import builtins
 import math
 import types
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -307,3 +309,19 @@ def test_each_value_is_a_counter_of_a_group_of_their_own(tmp_path: Path) -> None
 
 def test_a_trace_without_values_has_no_group_for_them(tmp_path: Path) -> None:
     assert "values" not in {track.name for track in exported(started("control"), tmp_path).tracks.values()}
+
+
+def test_a_topic_that_cannot_be_read_is_left_out_and_told(tmp_path: Path) -> None:
+    trace = with_values(trace_of(started("a")), {"/bad": [(MS, Pose(1, 2))], "/beat": [(MS, Pose(7, 8))]})
+    source = trace.message_source
+
+    def messages(topics: tuple[str, ...]) -> Iterator[Message]:
+        if "/bad" in topics:
+            raise TraceError("no whole message")
+        return source(topics)
+
+    path = tmp_path / "trace.pftrace"
+    told = export_perfetto({"robot_1": replace(trace, message_source=messages)}, path)
+    assert told == ["/bad is left out: no whole message"]
+    decoded = Decoded(path)
+    assert decoded.counted[decoded.uuid("/beat.x")] == [(MS, 7.0)]

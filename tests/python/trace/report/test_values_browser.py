@@ -113,9 +113,7 @@ def test_curves_gaps_and_marks_are_drawn(browser: Browser, page: Path, scheme: s
     assert browser.complaints == []
 
 
-def test_the_cursor_of_the_timeline_shows_values_and_that_of_the_values_is_in_the_timeline(
-    browser: Browser, page: Path
-):
+def test_the_cursor_is_common(browser: Browser, page: Path):
     browser.scheme("light")
     browser.open(page)
     assert set(outputs(browser)) == {"\N{EN DASH}"}
