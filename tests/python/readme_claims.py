@@ -725,8 +725,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         f"{_REPORT}_values_browser.py::test_the_cursor_is_common",
     ),
     "The page also lists the values before, during and after each reconfiguration.": (
-        f"{_REPORT}_values.py::test_a_swap_tells_before_after_and_step",
-        f"{_REPORT}_values.py::test_a_swap_tells_values_during_the_blackout_and_where_there_is_none",
+        f"{_REPORT}_values.py::test_a_swap_reports_before_after_and_step",
+        f"{_REPORT}_values.py::test_a_swap_reports_values_during_the_blackout_and_where_there_is_none",
     ),
     "`mauve trace export DIR` writes a counter for each value.": (
         "python/trace/test_perfetto.py::test_each_value_is_a_counter_of_a_group_of_their_own",

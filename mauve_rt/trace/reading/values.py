@@ -160,9 +160,9 @@ def names_of_numbers(trace: "Trace", topics: Iterable[str]) -> dict[str, list[st
     """For each of these topics whose messages are mauve_msgs/msg/Values: the names of the numbers in them."""
     suffix = "/names"
     wanted = {f"{topic}{suffix}" for topic in topics if trace.topics[topic][0] == VALUES_TYPE}
-    told = wanted & {*trace.topics}
-    messages = trace.messages(*told) if told else ()
-    return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in told}
+    present = wanted & {*trace.topics}
+    messages = trace.messages(*present) if present else ()
+    return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in present}
 
 
 def read_samples(trace: "Trace", topics: list[str], left_out: list[str]) -> dict[Field, Samples]:
@@ -212,7 +212,7 @@ class _Table:
 
 def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
     tables: dict[str, _Table] = {}
-    told = names_of_numbers(trace, topics)
+    names = names_of_numbers(trace, topics)
     for message in trace.messages(*topics):
         topic = message.topic
         if topic in topics:
@@ -223,7 +223,7 @@ def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
     for topic, table in tables.items():
         times, columns = table.columns()
         fields = [name for name, _ in table.named]
-        given = told.get(topic, [])
+        given = names.get(topic, [])
         if len(given) == len(fields):
             fields = given
         found |= {

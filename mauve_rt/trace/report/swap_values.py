@@ -12,7 +12,7 @@ from mauve_rt.trace.report.blocks import bullets
 from mauve_rt.trace.report.cycles import Array
 from mauve_rt.trace.report.detail import choose_detail
 from mauve_rt.trace.report.swap_figure import LEFT, RIGHT, WIDTH, Window, axis, window_around
-from mauve_rt.trace.report.units import counted, number_text
+from mauve_rt.trace.report.units import counted, number_text, time_text
 from mauve_rt.trace.report.values import value_entries
 
 MOST_VALUES = 6
@@ -35,8 +35,10 @@ class SwapValue:
     during: Floats
     after: float | None
     """The first value at or after the end of the blackout."""
+    later_ns: int | None
+    """How long after the blackout, where that is beyond the figure."""
     rank: float
-    """Step over the swap, in typical steps before it."""
+    """Step over the swap, in typical steps before it; 0 where the value after it is beyond the figure."""
 
     @property
     def step(self) -> float | None:
@@ -51,7 +53,8 @@ class SwapValue:
         elif len(self.during):
             low, high = (number_text(float(end), digits=_DIGITS) for end in _ends(self.during))
             parts.append(f"{counted(len(self.during), 'value')} from {low} to {high} during")
-        parts.append(_text(self.after, "after"))
+        later = "" if self.later_ns is None else f" ({time_text(self.later_ns)} later)"
+        parts.append(_text(self.after, "after") + later)
         if self.step is not None:
             sign = "+" if self.step > 0 else ""
             parts.append(f"step {sign}{number_text(self.step, digits=_STEP_DIGITS)}")
@@ -61,7 +64,8 @@ class SwapValue:
 def swap_values(analysis: Analysis, one: Reconfiguration) -> list[SwapValue]:
     """Return the values that change most over a swap, relative to their steps before it."""
     values = analysis.trace.values
-    found = [_around(values.name(field), samples, one) for field, samples in values.samples.items()]
+    window = window_around(analysis, one)
+    found = [_around(values.name(field), samples, one, window) for field, samples in values.samples.items()]
     known = [value for value in found if value.before is not None or value.after is not None]
     if len(known) > MOST_VALUES:
         known = sorted(known, key=lambda value: -value.rank)[:MOST_VALUES]
@@ -89,18 +93,20 @@ def values_around_swap(analysis: Analysis, one: Reconfiguration) -> tuple[str, s
     return figure, title + bullets((value.words() for value in found), css="values-words")
 
 
-def _around(name: str, samples: Samples, one: Reconfiguration) -> SwapValue:
+def _around(name: str, samples: Samples, one: Reconfiguration, window: Window) -> SwapValue:
     finite = np.isfinite(samples.values)
     times, values = samples.monotonic_ns[finite], samples.values[finite]
     parked, armed = np.searchsorted(times, (one.parked_ns, max(one.armed_ns, one.parked_ns + 1))).tolist()
     before = float(values[parked - 1]) if parked else None
     after = float(values[armed]) if armed < len(values) else None
-    step = abs(after - before) if before is not None and after is not None else 0.0
+    near = armed < len(times) and times[armed] <= window.end_ns
+    step = abs(after - before) if before is not None and after is not None and near else 0.0
     with np.errstate(over="ignore"):
         steps = np.abs(np.diff(values[max(parked - _COMPARED, 0) : parked]))
     typical = float(np.median(steps)) if len(steps) else 0.0
     rank = step / typical if typical else np.inf if step else 0.0
-    return SwapValue(name, Samples(times, values), before, values[parked:armed], after, rank)
+    later_ns = int(times[armed]) - one.armed_ns if after is not None and not near else None
+    return SwapValue(name, Samples(times, values), before, values[parked:armed], after, later_ns, rank)
 
 
 def _text(value: float | None, when: str) -> str:

@@ -1,5 +1,6 @@
 """Values of resources and topics as curves below the timeline, on its axis (static/values.js)."""
 
+from collections import Counter
 from html import escape
 from typing import Any
 
@@ -20,6 +21,7 @@ MOST_ENTRIES = 13_000
 _ALL_ENTRIES = 150_000
 """Of all curves together: about 2 MB of the page."""
 _DIGITS = 6
+_MOSTLY = 0.5
 _TAIL = 9
 """Characters at the end of a name that are always shown: the field."""
 _VALUE = np.dtype(
@@ -42,12 +44,12 @@ def values_data(analysis: Analysis, instants_ns: Times, columns: Columns) -> dic
     """
     found = _within_reach(analysis)
     names = {field: analysis.trace.values.name(field) for field in found}
-    order = sorted(found, key=lambda field: (not field.of_resource, _is_constant(found[field])))
-    budget = min(MOST_ENTRIES, _ALL_ENTRIES // max(len(order[:MOST_CURVES]), 1))
+    chosen = _chosen(found)
+    budget = min(MOST_ENTRIES, _ALL_ENTRIES // max(len(chosen), 1))
     details: dict[str, Detail] = {}
     shared: dict[str, dict[str, int]] = {}
     curves = []
-    for field in order[:MOST_CURVES]:
+    for field in chosen:
         every = value_entries(found[field])
         if field.topic not in details:
             details[field.topic] = choose_detail([every], instants_ns, budget=budget)
@@ -73,7 +75,7 @@ def values_data(analysis: Analysis, instants_ns: Times, columns: Columns) -> dic
         )
     return {
         "curves": curves,
-        "left_out": [names[field] for field in order[MOST_CURVES:]],
+        "left_out": [names[field] for field in found if field not in chosen],
         "problems": list(analysis.trace.values.problems),
     }
 
@@ -112,9 +114,23 @@ def _within_reach(analysis: Analysis) -> dict[Field, Samples]:
     return found
 
 
-def _is_constant(samples: Samples) -> bool:
-    finite = samples.finite
-    return not len(finite) or bool((finite == finite[0]).all())
+def _chosen(found: dict[Field, Samples]) -> list[Field]:
+    """The values of most interest: those of resources, then those that change, some of each topic."""
+    within: Counter[str] = Counter()
+    interest = {}
+    for field, samples in found.items():
+        finite = samples.finite
+        constant = not len(finite) or bool((finite == finite[0]).all())
+        interest[field] = (
+            not field.of_resource,
+            constant,
+            samples.nan_share > _MOSTLY,
+            "[" in field.name,
+            within[field.topic],
+        )
+        within[field.topic] += 1
+    chosen = set(sorted(found, key=interest.__getitem__)[:MOST_CURVES])
+    return [field for field in found if field in chosen]
 
 
 def _range_text(samples: Samples) -> str:
@@ -126,7 +142,7 @@ def _range_text(samples: Samples) -> str:
 
 
 def _row_name(curve: dict[str, Any]) -> str:
-    gaps = f"{curve['gaps']:,} of them NaN or infinite" if curve["gaps"] else ""
+    gaps = f"{curve['gaps']:,} of them NaN, infinite or missing" if curve["gaps"] else ""
     tip = "\n".join(
         [curve["name"], curve["range"], counted(curve["samples"], "value"), *([gaps] if gaps else [])]
     )
@@ -145,7 +161,8 @@ def _note(described: dict[str, Any]) -> str:
     if curves:
         note = (
             "The curves share axis, zoom and cursor with the timeline. A curve holds each value until the "
-            "next one; its height is scaled to the values in view. A gap is a value that is NaN or infinite."
+            "next one; its height is scaled to the values in view. A gap is a value that is NaN, infinite or "
+            "missing."
         )
     buckets = [curve["bucket"] for curve in curves if curve["bucket"]]
     if buckets:
@@ -157,7 +174,7 @@ def _note(described: dict[str, Any]) -> str:
         )
     if left_out:
         note += (
-            f" Of {len(curves) + len(left_out):,} values {len(curves)} are drawn, those of recorded "
-            f"resources first. Left out: {listed(left_out)}."
+            f" Of {len(curves) + len(left_out):,} values {len(curves)} are drawn: those of recorded "
+            f"resources first, then values of topics that change. Left out: {listed(left_out)}."
         )
     return " ".join([note, *described["problems"]]).strip()

@@ -311,7 +311,7 @@ def test_a_trace_without_values_has_no_group_for_them(tmp_path: Path) -> None:
     assert "values" not in {track.name for track in exported(started("control"), tmp_path).tracks.values()}
 
 
-def test_a_topic_that_cannot_be_read_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_topic_that_cannot_be_read_is_left_out_and_reported(tmp_path: Path) -> None:
     trace = with_values(trace_of(started("a")), {"/bad": [(MS, Pose(1, 2))], "/beat": [(MS, Pose(7, 8))]})
     source = trace.message_source
 

@@ -27,7 +27,7 @@
     text(time) {
       const at = this.last(time);
       if (at < 0) return "\u2013";
-      if (Number.isNaN(this.low[at])) return "not finite";
+      if (Number.isNaN(this.low[at])) return "no number";
       const low = mauve.numberText(this.low[at]);
       return this.number[at] === 1 ? low : low + " to " + mauve.numberText(this.high[at]);
     }
@@ -56,7 +56,7 @@
       new ResizeObserver(() => this.resize()).observe(this.plot);
       this.resize();
       timeline.listeners.push(() => this.draw());
-      timeline.pointed.push(() => this.tell());
+      timeline.pointed.push(() => this.showValues());
     }
 
     get height() {
@@ -78,11 +78,11 @@
       mauve.drawAxis(context, { offset: model.offset, bucket: 0 }, scale, this.height, colours);
       drawEvents(context, model, scale, this.height, colours);
       this.curves.forEach((curve, index) => drawRow(context, curve, AXIS_ROOM + index * ROW, scale, model, colours));
-      this.tell();
+      this.showValues();
     }
 
     // The values at the cursor.
-    tell() {
+    showValues() {
       const time = this.timeline.pointer;
       this.curves.forEach((curve, i) => (this.outputs[i].textContent = time === null ? "\u2013" : curve.text(time)));
     }

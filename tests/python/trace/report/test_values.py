@@ -110,15 +110,29 @@ def test_curves_of_resources_come_first_and_the_note_names_those_left_out():
     described, _ = timeline_data(analysis)
     names = [curve["name"] for curve in described["values"]["curves"]]
     assert len(names) == MOST_CURVES
-    assert names[:3] == ["pose.y", "pose.x", "/many.f00"]  # the constant one after the one that changes
+    assert names[:3] == ["pose.x", "pose.y", "/many.f00"]
     section = values_section(analysis, described["values"])
     assert section is not None
-    assert "Of 29 values 24 are drawn, those of recorded resources first" in section.note
+    assert "Of 29 values 24 are drawn: those of recorded resources first" in section.note
     assert "Left out: /many.f22, /many.f23, /many.f24, /many.f25 and /many.f26." in section.note
     assert "more samples than fit" not in section.note
 
 
-def test_the_note_of_a_long_run_tells_what_is_merged():
+def test_each_topic_has_a_curve_before_elements_of_arrays_gaps_and_constants():
+    at = [EPOCH_NS + n * MS for n in range(3)]
+    many_of = make_dataclass("Many", ["values", "still", "last"])
+    many = [(at_ns, many_of([float(n)] * 16, 7, n)) for n, at_ns in enumerate(at)]
+    topics = {f"/many{index}": many for index in range(3)}
+    gaps = [(at[0], Pose(1, math.nan)), (at[1], Pose(2, math.nan)), (at[2], Pose(3, 1))]
+    described, _ = timeline_data(analyse(with_values(periodic_trace(), {**topics, "/pose": gaps})))
+    names = [curve["name"] for curve in described["values"]["curves"]]
+    assert len(names) == MOST_CURVES
+    assert {"/many0.last", "/many1.last", "/many2.last", "/pose.x", "/many2.values[0]"} <= {*names}
+    assert not {"/many0.still", "/pose.y", "/many0.values[15]"} & {*names}
+    assert names == sorted(names, key=lambda name: name.split(".")[0])
+
+
+def test_the_note_of_a_long_run_reports_merged_samples():
     poses = [(EPOCH_NS + n * MS, Pose(n, n)) for n in range(20_000)]
     analysis = analyse(with_values(long_trace(["c"], 2_000), {POSE: poses}))
     section = values_section(analysis, timeline_data(analysis)[0]["values"])
@@ -138,10 +152,10 @@ def test_gaps_are_counted_in_the_row_and_a_message_of_another_day_does_no_harm()
     section = values_section(analysis, timeline_data(analysis)[0]["values"])
     assert section is not None
     assert '<em class="gaps">1 gap</em>' in section.html
-    assert "1 of them NaN or infinite" in section.html
+    assert "1 of them NaN, infinite or missing" in section.html
 
 
-def test_a_swap_tells_before_after_and_step():
+def test_a_swap_reports_before_after_and_step():
     poses = [(EPOCH_NS, Pose(0.42, 5)), (PARKED_NS + MS, Pose(0.40, 5)), (PARKED_NS + 2 * MS, Pose(9, 9))]
     assert words(swapped({POSE: poses})) == [
         "pose.x: 0.42 before, 0.4 after, step \N{MINUS SIGN}0.02",
@@ -149,7 +163,7 @@ def test_a_swap_tells_before_after_and_step():
     ]
 
 
-def test_a_swap_tells_values_during_the_blackout_and_where_there_is_none():
+def test_a_swap_reports_values_during_the_blackout_and_where_there_is_none():
     poses = [(PARKED_NS + 5_000, Pose(1, math.nan)), (PARKED_NS + 9_000, Pose(3, math.nan))]
     assert words(swapped({POSE: poses, "/late": [(PARKED_NS + MS, Pose(7, math.nan))]})) == [
         "/late.x: none before, 7 after",
@@ -157,6 +171,11 @@ def test_a_swap_tells_values_during_the_blackout_and_where_there_is_none():
     poses.insert(0, (EPOCH_NS, Pose(2, math.nan)))
     assert words(swapped({POSE: poses})) == ["pose.x: 2 before, 2 values from 1 to 3 during, none after"]
     assert words(swapped({POSE: poses[:2]})) == ["pose.x: 2 before, 1 during, none after"]
+
+
+def test_a_swap_reports_how_late_a_value_beyond_its_figure_came():
+    poses = [(EPOCH_NS, Pose(1, 2)), (PARKED_NS + 20_000 + 150 * MS, Pose(2, 2))]
+    assert words(swapped({POSE: poses}))[0] == "pose.x: 1 before, 2 after (150\u202fms later), step +1"
 
 
 def test_a_swap_shows_the_values_that_change_most_relative_to_before():

@@ -130,7 +130,7 @@ def test_the_cursor_is_common(browser: Browser, page: Path):
     x = place(browser, begin + 70.5 * PERIOD_NS)
     browser.mouse("mouseMoved", left + x, top + 60)
     browser.settle()
-    assert outputs(browser)[:2] == ["70", "not finite"]
+    assert outputs(browser)[:2] == ["70", "no number"]
     assert browser.evaluate(crosses) == pytest.approx([x, x], abs=1)
     tip = browser.evaluate("document.getElementById('tip').innerText")
     assert "pose.x" in tip
@@ -178,7 +178,7 @@ def test_a_narrow_window_does_not_scroll_sideways(browser: Browser, page: Path):
     assert browser.complaints == []
 
 
-def test_merged_samples_are_told_as_a_range(browser: Browser, tmp_path: Path):
+def test_merged_samples_are_shown_as_a_range(browser: Browser, tmp_path: Path):
     poses = [(EPOCH_NS + n * MS, Pose(n % 2, n)) for n in range(50_000)]
     path = tmp_path / "report.html"
     write_report(path, with_values(long_trace(["c"], 5_000), {POSE: poses}))
