@@ -193,8 +193,8 @@ def _spoken(topics: list[str]) -> dict[str, str]:
 class _Table:
     """The messages of one topic: times, and a row of numbers each."""
 
-    def __init__(self, message: Any) -> None:
-        self.named = list(_numbers("", message, lambda msg: msg))
+    def __init__(self, message: Any, most_elements: int) -> None:
+        self.named = list(_numbers("", message, lambda msg: msg, most_elements))
         self.times = array("q")
         self._numbers = array("d")
 
@@ -217,7 +217,7 @@ def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
         topic = message.topic
         if topic in topics:
             if topic not in tables:
-                tables[topic] = _Table(message.msg)
+                tables[topic] = _Table(message.msg, max(MOST_ELEMENTS, len(names.get(topic, []))))
             tables[topic].add(message.monotonic_ns, message.msg)
     found: dict[Field, Samples] = {}
     for topic, table in tables.items():
@@ -239,25 +239,20 @@ def _number(get: _Getter, message: Any) -> float:
         return float("nan")
 
 
-def _numbers(name: str, value: Any, get: _Getter) -> Iterator[tuple[str, _Getter]]:
-    """The numeric fields of a message and how to read them; no time stamps."""
+def _numbers(name: str, value: Any, get: _Getter, most_elements: int) -> Iterator[tuple[str, _Getter]]:
+    """The numeric fields of a message and how to read them; no time stamps, no longer arrays."""
     if dataclasses.is_dataclass(value):
         names = [field.name for field in dataclasses.fields(value)]
         if tuple(names) == _TIME:
             return
         for one in names:
-            yield from _numbers(f"{name}.{one}" if name else one, getattr(value, one), _attribute(get, one))
+            path = f"{name}.{one}" if name else one
+            yield from _numbers(path, getattr(value, one), _attribute(get, one), most_elements)
     elif isinstance(value, np.ndarray | list | tuple):
-        yield from _elements(name, value, get)
+        for index, element in enumerate(value if len(value) <= most_elements else ()):
+            yield from _numbers(f"{name}[{index}]", element, _item(get, index), most_elements)
     elif isinstance(value, bool | int | float | np.number | np.bool_):
         yield name, get
-
-
-def _elements(name: str, values: Iterable[Any], get: _Getter) -> Iterator[tuple[str, _Getter]]:
-    elements = list(values)
-    if len(elements) <= MOST_ELEMENTS:
-        for index, element in enumerate(elements):
-            yield from _numbers(f"{name}[{index}]", element, _item(get, index))
 
 
 def _attribute(get: _Getter, name: str) -> _Getter:

@@ -103,7 +103,7 @@ def test_values_of_a_bag_with_names_of_their_own_and_none_of_what_the_executor_r
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(record_named(tmp_path)))
     trace = open_trace(tmp_path / "bag")
-    assert trace.values.names == ("filter.gain", "filter.state[0]")
+    assert trace.values.names == ("filter.gain", *(f"filter.state[{index}]" for index in range(30)))
     assert trace.values["filter.state[0]"].tolist() == [10.0, 11.0, 12.0]
     assert trace.values["filter.gain"].index.tolist() == [MS, 2 * MS, 3 * MS]
 
@@ -127,10 +127,11 @@ def record_named(folder: Path) -> Path:
 
     stamp = types.types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
     topic = "/executor/values/filter"
+    names = ["gain", *(f"state[{index}]" for index in range(30))]
     for number in range(3):
-        numbers = np.array([number / 2, 10.0 + number])
+        numbers = np.array([number / 2, *[10.0 + number] * 30])
         put(topic, "Values", (number + 1) * MS, stamp=stamp, values=numbers)
-    put(f"{topic}/names", "ValueNames", 4 * MS, type="pkg::Filter", names=["gain", "state[0]"])
+    put(f"{topic}/names", "ValueNames", 4 * MS, type="pkg::Filter", names=names)
     made.stop()
     return folder / "prefix"
 
@@ -141,6 +142,6 @@ def test_a_csv_file_of_a_resource_has_its_name_and_a_column_for_each_number(
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(record_named(tmp_path)))
     assert export_csv(open_trace(tmp_path / "bag"), tmp_path / "csv") == []
     table = pd.read_csv(tmp_path / "csv" / "topic.executor.values.filter.csv")
-    assert list(table.columns)[2:] == ["stamp.sec", "stamp.nanosec", "gain", "state[0]"]
+    assert list(table.columns)[2:6] == ["stamp.sec", "stamp.nanosec", "gain", "state[0]"]
     assert table["state[0]"].tolist() == [10.0, 11.0, 12.0]
     assert table["monotonic_ns"].tolist() == [MS, 2 * MS, 3 * MS]
