@@ -73,7 +73,7 @@ def _export(args: argparse.Namespace) -> int:
             from mauve_rt.trace.export.perfetto import export_perfetto  # noqa: PLC0415
 
             out = args.out or Path(f"{name}.pftrace")
-            export_perfetto(traces, out, force=args.force, progress=writing)
+            problems = export_perfetto(traces, out, force=args.force, progress=writing)
     for problem in problems:
         print(f"note: left out: {problem}", file=sys.stderr)
     print(out)

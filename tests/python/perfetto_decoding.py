@@ -7,10 +7,11 @@ from typing import Any
 
 from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 
-BEGIN, END, INSTANT = (
+BEGIN, END, INSTANT, COUNTER = (
     protos.TrackEvent.TYPE_SLICE_BEGIN,
     protos.TrackEvent.TYPE_SLICE_END,
     protos.TrackEvent.TYPE_INSTANT,
+    protos.TrackEvent.TYPE_COUNTER,
 )
 
 
@@ -38,6 +39,7 @@ class Decoded:
         self.primary_clocks: set[int] = set()
         self.events: dict[int, list[Event]] = defaultdict(list)
         self.flows: dict[int, list[tuple[int, bool, Event]]] = defaultdict(list)
+        self.counted: dict[int, list[tuple[int, float]]] = defaultdict(list)
         self._words: dict[int, dict[tuple[str, int], str]] = defaultdict(dict)
         self._defaults: dict[int, Any] = {}
         self._open: dict[int, list[Event]] = defaultdict(list)
@@ -79,6 +81,10 @@ class Decoded:
         defaults = self._defaults[packet.trusted_packet_sequence_id].track_event_defaults
         assert defaults.track_uuid in self.tracks
         assert len(event.extra_counter_values) <= len(defaults.extra_counter_track_uuids)
+        if event.type == COUNTER:
+            assert self.tracks[defaults.track_uuid].HasField("counter")
+            self.counted[defaults.track_uuid].append((packet.timestamp, event.double_counter_value))
+            return
         stack = self._open[defaults.track_uuid]
         if event.type == END:
             ended = stack.pop()  # one that was not begun fails here

@@ -702,6 +702,36 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         "python/cli/test_trace_export.py::test_csv",
     ),
+    "A value is a numeric field of the recorded messages.": (
+        "python/trace/test_values.py::test_numbers_and_short_arrays_are_values_but_no_texts_times_and_long_arrays",
+    ),
+    (
+        "`/beat.data` is the field `data` of the topic `/beat`; `pose.x` is the field `x` of the topic "
+        "`/executor/values/pose`, which has the values of the resource `pose`."
+    ): (
+        "python/trace/test_values.py::test_values_of_resources_come_first_and_are_called_by_the_resource",
+        "python/project/test_readme_examples.py::test_the_python_example_plots_a_value",
+    ),
+    "Its times are those of `trace.frames`: ns of CLOCK_MONOTONIC.": (
+        "python/trace/test_values.py::test_a_value_is_a_series_over_the_clock_of_the_records",
+    ),
+    "`mauve report DIR` draws up to 24 values as curves.": (
+        f"{_REPORT}_values.py::test_curves_of_resources_come_first_and_the_note_names_those_left_out",
+        f"{_REPORT}_values_browser.py::test_curves_gaps_and_marks_are_drawn",
+    ),
+    "The curves share axis, zoom and cursor with the timeline.": (
+        f"{_REPORT}_values_browser.py::test_the_plots_have_the_same_width",
+        f"{_REPORT}_values_browser.py::test_zoom_is_common",
+        f"{_REPORT}_values_browser.py::test_the_cursor_is_common",
+    ),
+    "The page also lists the values before, during and after each reconfiguration.": (
+        f"{_REPORT}_values.py::test_a_swap_reports_before_after_and_step",
+        f"{_REPORT}_values.py::test_a_swap_reports_values_during_the_blackout_and_where_there_is_none",
+    ),
+    "`mauve trace export DIR` writes a counter for each value.": (
+        "python/trace/test_perfetto.py::test_each_value_is_a_counter_of_a_group_of_their_own",
+        "python/cli/test_trace_export.py::test_values_of_a_bag_are_counters",
+    ),
     "`mauve trace export DIR --format csv` writes the same values for a spreadsheet:": (
         "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         "python/cli/test_trace_export.py::test_csv",

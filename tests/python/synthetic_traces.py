@@ -1,7 +1,9 @@
 """Traces of components that never ran, as their reader gives them."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -172,3 +174,22 @@ def long_trace(
         records[component]["sequence"] = np.arange(len(records[component]))
     losses = {name: Loss(len(rows), len(rows), 0, 0) for name, rows in records.items()}
     return Trace(records, names, losses, np.empty((0, 2), np.int64))
+
+
+@dataclass
+class Pose:
+    """A message as a bag yields it."""
+
+    x: float
+    y: float
+
+
+def with_values(trace: Trace, topics: Mapping[str, Sequence[tuple[int, Any]]]) -> Trace:
+    """The trace, with messages of topics: (time in ns of CLOCK_MONOTONIC, message), by time."""
+    every = [Message(topic, at_ns, at_ns, msg) for topic, found in topics.items() for at_ns, msg in found]
+    every.sort(key=lambda message: message.log_time_ns)
+    return replace(
+        trace,
+        topics={topic: ("pkg/msg/Any", len(found)) for topic, found in topics.items()},
+        message_source=lambda wanted: (one for one in every if not wanted or one.topic in wanted),
+    )

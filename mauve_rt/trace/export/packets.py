@@ -16,7 +16,7 @@ Figure = int | bool | str
 
 CLOCK_REALTIME, CLOCK_MONOTONIC = 1, 3  # perfetto.protos.BuiltinClock
 _STATE_CLEARED, _NEEDS_STATE = 1, 2  # TracePacket.SequenceFlags
-_BEGIN, _END, _INSTANT = 1, 2, 3  # TrackEvent.Type
+_BEGIN, _END, _INSTANT, _COUNTER = 1, 2, 3, 4  # TrackEvent.Type
 _TEXT_AT_MOST = 2000
 _INT64 = 2**63
 
@@ -160,6 +160,12 @@ class Track:
         else:
             self._short(self._template(_INSTANT, name, category), time_ns)
 
+    def count(self, time_ns: int, value: float) -> None:
+        """Set the value of a track that is a counter itself."""
+        template = self._template(_COUNTER, "", "")
+        template[1].track_event.double_counter_value = value
+        self._short(template, time_ns)
+
     def _short(self, template: tuple[Any, Any], time_ns: int) -> None:
         trace, packet = template
         packet.timestamp = max(0, int64(time_ns))
@@ -199,7 +205,7 @@ class Track:
             packet.timestamp = 0
             packet.sequence_flags = _NEEDS_STATE
             packet.track_event.type = kind
-            if kind != _END:
+            if kind in (_BEGIN, _INSTANT):
                 packet.track_event.name_iid = self._number("event_names", name)
                 packet.track_event.category_iids.append(self._number("event_categories", category))
         return known

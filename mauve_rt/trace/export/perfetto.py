@@ -4,7 +4,7 @@ Every executor is a process, every component a track of it: states and services 
 time from the nominal to the actual instant, overruns, faults, stops and marks instants with their figures.
 Each reconfiguration is a slice from parked to armed, and a flow from the request to it to the next release.
 A track `requests` has who asked for what, a track `rules` what the executor's rules decided; a counter below
-each component its wake-up latency.
+each component its wake-up latency. A track `values` has a counter for each recorded value.
 
 Timestamps are the records' own, ns of CLOCK_MONOTONIC, which the file declares to be the trace's clock and
 relates to CLOCK_REALTIME by the pairs that the bag has.
@@ -39,8 +39,10 @@ _NS = 1  # CounterDescriptor.Unit
 
 def export_perfetto(
     traces: Mapping[str, Trace], path: Path, *, force: bool = False, progress: Progress = silent
-) -> None:
+) -> list[str]:
     """Write the traces of executors, by the executors' names, as one Perfetto trace.
+
+    Returns sentences: which topics are left out, because their messages cannot be read.
 
     Raises:
         TraceError: the file exists already (unless `force`) or cannot be written; perfetto's Python package
@@ -57,6 +59,7 @@ def export_perfetto(
         for number, (name, trace) in enumerate(traces.items(), start=1):
             flow = _write_executor(file, trace, (number, name), flow, counter)
         counter.tell_end()
+    return [problem for trace in traces.values() for problem in trace.values.problems]
 
 
 def _write_executor(
@@ -82,7 +85,22 @@ def _write_executor(
         track = Track(file, uuid, counter=latency)
         ComponentTrack(trace, component, track, own).draw(counter.of(f"{name}: {component}"))
         counter.add(len(trace.of(component)))
+    _write_values(file, process, trace, rank=len(swaps) + 1)
     return flow
+
+
+def _write_values(file: PacketFile, process: int, trace: Trace, *, rank: int) -> None:
+    """Write a counter for each value on a track `values`; NaN and infinity are left out."""
+    found = trace.values.samples
+    if not found:
+        return
+    group = file.add_track("values", parent=process, sibling_order_rank=rank)
+    for field, samples in found.items():
+        track = Track(file, file.add_track(trace.values.name(field), parent=group, counter={}))
+        finite = np.isfinite(samples.values)
+        times, values = samples.monotonic_ns[finite].tolist(), samples.values[finite].tolist()
+        for time_ns, value in zip(times, values, strict=True):
+            track.count(time_ns, value)
 
 
 def _description(one: ComponentInfo) -> str:

@@ -11,6 +11,7 @@ from mauve_rt.trace.format.message_fields import flat_fields
 from mauve_rt.trace.progress import Progress
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.reading.values import names_of_numbers
 
 _TIMES = ("log_time_ns", "monotonic_ns")
 _NO_NAME = re.compile(r"[^\w.-]")
@@ -20,8 +21,9 @@ def export_topics(trace: Trace, folder: Path, *, progress: Progress) -> list[str
     """Write `topic.NAME.csv` for each topic but the trace's own, `.` in the place of `/` in its name.
 
     A row is a message: its times (CLOCK_REALTIME, CLOCK_MONOTONIC), then a column for each field, as
-    `pose.position.x`. An array is one column, in JSON. What is not valid UTF-8 is escaped. Returns which
-    topics are left out, as a message of theirs cannot be read.
+    `pose.position.x`. An array is one column, in JSON. Each number of mauve_msgs/msg/Values has a column with
+    its name, where the bag has the names. What is not valid UTF-8 is escaped. Returns which topics are left
+    out, as a message of theirs cannot be read.
     """
     if not _problem(trace, (), folder, progress):
         return []
@@ -47,8 +49,9 @@ def _write(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progre
     total = sum(count for _, count in trace.topics.values())
     with ExitStack() as open_files:
         tables: dict[str, _Table] = {}
+        names = names_of_numbers(trace, topics or trace.topics)
         for done, message in enumerate(trace.messages(*topics)):
-            row = dict(flat_fields(message.msg))
+            row = _row(message.msg, names.get(message.topic, []))
             table = tables.get(message.topic)
             if table is None:
                 path = folder / _file_name(message.topic, taken=[file.name for file in folder.iterdir()])
@@ -56,6 +59,14 @@ def _write(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progre
             table.write(message.log_time_ns, message.monotonic_ns, row)
             if done % 1000 == 0:
                 progress(done / total, table.path.name)
+
+
+def _row(message: Any, names: list[str]) -> dict[str, Any]:
+    row = dict(flat_fields(message))
+    if names and len(names) == len(message.values):
+        del row["values"]
+        row |= zip(names, message.values.tolist(), strict=True)
+    return row
 
 
 class _Table:

@@ -18,6 +18,7 @@ from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, Mes
 if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
     from mauve_rt.trace.reading.typed_records import Record
+    from mauve_rt.trace.reading.values import TraceValues
 
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
 
@@ -101,6 +102,13 @@ class Trace:
         from mauve_rt.trace.reading.frames import Frames  # noqa: PLC0415 - pandas takes its time to load
 
         return Frames(self)
+
+    @cached_property
+    def values(self) -> "TraceValues":
+        """Numeric fields of recorded messages over time: `trace.values["pose.x"]` is a pandas Series."""
+        from mauve_rt.trace.reading.values import TraceValues  # noqa: PLC0415 - only who asks reads messages
+
+        return TraceValues(self)
 
     def typed(self, *components: str) -> Iterator["Record"]:
         """Yield the records of these components (all when none is named) by time, as typed values.

@@ -12,6 +12,7 @@ from mauve_rt.trace.report.cycles import UNKNOWN
 from mauve_rt.trace.report.histograms import Values, histogram
 from mauve_rt.trace.report.neighbours import neighbours_in_words
 from mauve_rt.trace.report.swap_figure import blackout_figure, grid_figure, phase_figure
+from mauve_rt.trace.report.swap_values import values_around_swap
 from mauve_rt.trace.report.tables import reconfigurations_table
 from mauve_rt.trace.report.timeline import swap_title
 from mauve_rt.trace.report.units import counted, time_text
@@ -62,11 +63,12 @@ def _panel(analysis: Analysis, swap: Swap, index: int) -> str:
     one = swap.measured
     phase = phase_figure(analysis, one)
     blackout = blackout_figure(swap) if one.blackout_ns else ""
-    wide = f'<div class="scroll">{grid_figure(analysis, one)}{blackout}{phase}</div>'
+    values, values_in_words = values_around_swap(analysis, one)
+    wide = f'<div class="scroll">{grid_figure(analysis, one)}{values}{blackout}{phase}</div>'
     return (
         f'<div class="swap" data-chosen="swap" data-value="{index}"{" hidden" if index else ""}>'
-        f"<p>{prose(_in_words(analysis, swap))}</p>{wide}{neighbours_in_words(analysis, one)}"
-        f"{_before_and_after(analysis, swap)}</div>"
+        f"<p>{prose(_in_words(analysis, swap))}</p>{wide}{values_in_words}"
+        f"{neighbours_in_words(analysis, one)}{_before_and_after(analysis, swap)}</div>"
     )
 
 

@@ -55,6 +55,8 @@ class Detail:
                 merged[name] = np.add.reduceat(entries[name], starts)
             elif name in ("wakeup_ns", "response_ns"):
                 merged[name] = np.maximum.reduceat(entries[name], starts)
+            elif name in ("low", "high"):  # the NaN among them count only where all are
+                merged[name] = (np.fmin if name == "low" else np.fmax).reduceat(entries[name], starts)
         return merged
 
 

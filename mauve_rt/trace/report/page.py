@@ -10,7 +10,7 @@ from mauve_rt.trace.report.blocks import Section, attribute
 STYLES = ("report.css", "figures.css", "timeline.css")
 SCRIPTS = (
     "base.js", "columns.js", "tracks.js", "axis.js", "decisions.js", "draw.js", "timeline.js", "input.js",
-    "hover.js", "jumps.js", "page.js",
+    "hover.js", "values.js", "jumps.js", "page.js",
 )  # fmt: skip
 """In this order: each uses what those before it define."""
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"

@@ -23,6 +23,7 @@ from mauve_rt.trace.report.tables import (
 )
 from mauve_rt.trace.report.timeline import json_for_script, timeline_data
 from mauve_rt.trace.report.timeline_section import timeline_section
+from mauve_rt.trace.report.values import values_section
 from mauve_rt.trace.report.verdict import Verdict, judge, verdict_html
 
 _EVENT_TYPE = "mauve_msgs/msg/ReconfigurationEvent"
@@ -80,7 +81,8 @@ def write_report(
         resources_section,
         losses_section,
     )
-    sections = [*extra, timeline_section(analysis, described)]
+    values = values_section(analysis, described["values"])
+    sections = [*extra, timeline_section(analysis, described), *([values] if values else [])]
     for index, make in enumerate(makers):
         progress(_PACKED + (1 - _PACKED) * index / len(makers), "drawing")
         made = make(analysis)

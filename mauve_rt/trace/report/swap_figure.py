@@ -13,7 +13,7 @@ from mauve_rt.trace.report.scales import linear_ticks
 from mauve_rt.trace.report.units import tick_texts, time_text
 
 WIDTH = 1080.0
-_LEFT, _RIGHT = 170.0, 20.0
+LEFT, RIGHT = 170.0, 20.0
 _ROW, _TALL_ROW = 26.0, 58.0
 _TOP = 30.0
 _MOST_TICKS = 240
@@ -34,7 +34,7 @@ class Window:
     def x(self, time_ns: float) -> float:
         """Return where an instant is."""
         share = (time_ns - self.begin_ns) / (self.end_ns - self.begin_ns)
-        return _LEFT + min(max(share, 0), 1) * (WIDTH - _LEFT - _RIGHT)
+        return LEFT + min(max(share, 0), 1) * (WIDTH - LEFT - RIGHT)
 
     def ticks(self, zero_ns: float, *, count: int = 8) -> Iterator[tuple[float, float]]:
         """Yield places and values of ticks, counted from zero_ns."""
@@ -47,7 +47,7 @@ def grid_figure(analysis: Analysis, one: Reconfiguration) -> str:
     window = window_around(analysis, one)
     others = [name for name in analysis.trace.components if name != one.component][:_OTHERS]
     height = _TOP + _TALL_ROW + len(others) * _ROW + 26
-    parts = [_axis(window, one, height - 22), _grid_lines(analysis, one, window)]
+    parts = [axis(window, one, height - 22), _grid_lines(analysis, one, window)]
     band = max(window.x(one.armed_ns) - window.x(one.parked_ns), 2)
     parts.append(svg.rect(window.x(one.parked_ns) - 1, _TOP - 8, band, height - _TOP - 14, css="blackout"))
     parts.append(_row(analysis, one.component, window, _TOP, _TALL_ROW, css="own"))
@@ -64,7 +64,7 @@ def blackout_figure(swap: Swap) -> str:
     margin_ns = max(one.blackout_ns * 0.25, 200)
     window = Window(one.parked_ns - margin_ns, one.armed_ns + margin_ns)
     top, height = 30.0, 96.0
-    parts = [_axis(window, one, height - 22)]
+    parts = [axis(window, one, height - 22)]
     left, right = window.x(one.parked_ns), window.x(one.armed_ns)
     parts.append(svg.rect(left, top, right - left, 30, css="blackout solid", round_=3))
     at_ns = float(max(one.parked_ns, swap.changed_ns - one.adopt_ns - one.take_ns))
@@ -75,7 +75,7 @@ def blackout_figure(swap: Swap) -> str:
             svg.rect(begin, top + 5, max(end - begin, 1.5), 20, css=f"phase {phase}", tip=tip, round_=2)
         )
         at_ns += took_ns
-    parts.append(svg.label(left - 6, top + 20, _began(one), css="strong", anchor="end"))
+    parts.append(svg.label(left - 6, top + 20, began(one), css="strong", anchor="end"))
     parts.append(svg.label(right + 6, top + 20, "started" if one.after_fault else "armed", css="strong"))
     parts_told = f"adopt {time_text(one.adopt_ns)}, take {time_text(one.take_ns)}"
     told = f"blackout {time_text(one.blackout_ns)}: {parts_told}"
@@ -103,15 +103,13 @@ def phase_figure(analysis: Analysis, one: Reconfiguration, *, releases: int = 40
     def y(error_ns: float) -> float:
         return bottom - (min(max(error_ns, low), high) - low) / span * (bottom - top)
 
-    step = (WIDTH - _LEFT - _RIGHT) / (2 * releases)
+    step = (WIDTH - LEFT - RIGHT) / (2 * releases)
     parts = []
     ticks = linear_ticks(low, low + span, count=4)
     for value, text in zip(ticks, tick_texts(ticks), strict=True):
-        parts.append(
-            svg.line(_LEFT, y(value), WIDTH - _RIGHT, y(value), css="grid-line" if value else "axis")
-        )
-        parts.append(svg.label(_LEFT - 8, y(value) + 4, text, css="tick", anchor="end"))
-    centre = _LEFT + releases * step
+        parts.append(svg.line(LEFT, y(value), WIDTH - RIGHT, y(value), css="grid-line" if value else "axis"))
+        parts.append(svg.label(LEFT - 8, y(value) + 4, text, css="tick", anchor="end"))
+    centre = LEFT + releases * step
     parts.append(svg.line(centre, top - 8, centre, bottom, css="blackout-line"))
     for index, error_ns in zip(chosen, errors, strict=True):
         x = centre + (index - middle + 0.5) * step
@@ -151,13 +149,15 @@ def window_around(analysis: Analysis, one: Reconfiguration) -> Window:
     return Window(first_ns - around, last_ns + around)
 
 
-def _began(one: Reconfiguration) -> str:
+def began(one: Reconfiguration) -> str:
+    """Return what stopped the component: a fault, or the park."""
     return "fault" if one.after_fault else "parked"
 
 
-def _axis(window: Window, one: Reconfiguration, y: float) -> str:
-    zero_ns, zero = one.parked_ns, _began(one)
-    parts = [svg.line(_LEFT, y, WIDTH - _RIGHT, y, css="axis")]
+def axis(window: Window, one: Reconfiguration, y: float) -> str:
+    """Return the time axis of a figure, at a height of the figure; it counts from the park or the fault."""
+    zero_ns, zero = one.parked_ns, began(one)
+    parts = [svg.line(LEFT, y, WIDTH - RIGHT, y, css="axis")]
     ticks = list(window.ticks(zero_ns))
     texts = tick_texts([value for _, value in ticks])
     for (x, value), told in zip(ticks, texts, strict=True):
@@ -185,9 +185,9 @@ def _grid_lines(analysis: Analysis, one: Reconfiguration, window: Window) -> str
 def _row(analysis: Analysis, component: str, window: Window, top: float, height: float, *, css: str) -> str:
     base = top + height - 6
     room = height - (20 if css == "own" else 10)
-    parts = [svg.line(_LEFT, base, WIDTH - _RIGHT, base, css="row-line")]
-    name = svg.shortened(component, _LEFT - 24)
-    parts.append(svg.label(_LEFT - 10, base - room / 2 + 5, name, css="name", anchor="end", tip=component))
+    parts = [svg.line(LEFT, base, WIDTH - RIGHT, base, css="row-line")]
+    name = svg.shortened(component, LEFT - 24)
+    parts.append(svg.label(LEFT - 10, base - room / 2 + 5, name, css="name", anchor="end", tip=component))
     for index, slices in enumerate(analysis.slices[component].values()):
         begins, ends = slices["begin_ns"], slices["begin_ns"] + slices["extent_ns"]
         first, last = np.searchsorted(ends, window.begin_ns), np.searchsorted(begins, window.end_ns)
@@ -211,16 +211,16 @@ def _apart_by_pixels(begin_ns: Times, end_ns: Times, window: Window) -> list[tup
     """Places and widths of intervals; of those that begin within half a pixel only one."""
     if not len(begin_ns):
         return []
-    per_ns = (WIDTH - _LEFT - _RIGHT) / (window.end_ns - window.begin_ns)
-    x = _LEFT + np.clip((begin_ns - window.begin_ns) * per_ns, 0, None)
-    end = np.minimum(_LEFT + (end_ns - window.begin_ns) * per_ns, WIDTH - _RIGHT)
+    per_ns = (WIDTH - LEFT - RIGHT) / (window.end_ns - window.begin_ns)
+    x = LEFT + np.clip((begin_ns - window.begin_ns) * per_ns, 0, None)
+    end = np.minimum(LEFT + (end_ns - window.begin_ns) * per_ns, WIDTH - RIGHT)
     _, first = np.unique(np.round(2 * x), return_index=True)
     return list(zip(x[first].tolist(), np.maximum(end - x, 1)[first].tolist(), strict=True))
 
 
 def _flags(one: Reconfiguration, window: Window) -> str:
     x = window.x(one.parked_ns)
-    parts = [svg.label(x + 6, 14, f"{_began(one)}, blackout {time_text(one.blackout_ns)}", css="strong")]
+    parts = [svg.label(x + 6, 14, f"{began(one)}, blackout {time_text(one.blackout_ns)}", css="strong")]
     if one.nominal_ns is not None:
         end = window.x(one.nominal_ns)
         missed = "" if one.missed_releases is None else f", {one.missed_releases or 'none'} missed"

@@ -12,6 +12,7 @@ from mauve_rt.trace.report.cycles import Array, Times
 from mauve_rt.trace.report.decisions import decision_flags, decision_places
 from mauve_rt.trace.report.detail import BUDGET, Detail, choose_detail
 from mauve_rt.trace.report.markers import Markers, markers_of
+from mauve_rt.trace.report.values import values_data
 
 _WORST = 20
 """Worst wake-ups and responses of each component that the page keeps in full, and can jump to."""
@@ -25,7 +26,8 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
     markers = {component: markers_of(analysis.trace.of(component)) for component in components}
     tracks = [track for name in components for track in analysis.slices[name].values()]
     tracks += [analysis.releases[name] for name in components]
-    detail = choose_detail(tracks, interesting_instants(analysis, markers), budget=budget)
+    instants_ns = interesting_instants(analysis, markers)
+    detail = choose_detail(tracks, instants_ns, budget=budget)
     columns = Columns()
     rows = [_row(analysis, name, markers[name], detail, columns) for name in components]
     described = {
@@ -38,6 +40,7 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
         "jumps": _jumps(analysis, markers),
         "kept": [] if detail.full else (detail.kept_ns - analysis.begin_ns).tolist(),
         "bucket": detail.bucket_ns,
+        "values": values_data(analysis, instants_ns, columns),
         "columns": columns.described,
     }
     return described, columns.data()

@@ -45,7 +45,7 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
         '<button type="button" data-zoom="in" title="zoom in (+)">+</button>'
         '<button type="button" data-zoom="out" title="zoom out (-)">\N{MINUS SIGN}</button>'
         '<button type="button" data-zoom="all" title="show everything (0)">All</button></span></div>'
-        f'<div id="timeline-view" class="timeline" style="--names: {_names_px(analysis)}px" tabindex="0" '
+        f'<div id="timeline-view" class="timeline" style="--names: {names_px(analysis)}px" tabindex="0" '
         'role="application" '
         'aria-label="timeline: arrow keys move, plus and minus zoom, 0 shows everything">'
         '<div class="overview"><canvas></canvas></div>'
@@ -56,7 +56,7 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
     return Section("Timeline", html, note=_note(described), anchor="timeline", wide=True)
 
 
-def _names_px(analysis: Analysis) -> int:
+def names_px(analysis: Analysis) -> int:
     """Width of the column of names: that of the longest one and its period, within limits."""
     longest = max(map(len, analysis.trace.components), default=0)
     return min(max(_CHARACTER_PX * longest + _PERIOD_PX, _NAMES_PX[0]), _NAMES_PX[1])

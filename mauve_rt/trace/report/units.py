@@ -1,5 +1,7 @@
 """Times and counts as a person reads them: three digits, a unit, no ambiguity."""
 
+import math
+
 from mauve_rt import counts
 
 _NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
@@ -48,6 +50,13 @@ def digits(value: float) -> str:
         return f"{int(value)}"
     decimals = 2 if value < _TENS else 1 if value < _HUNDREDS else 0
     return f"{value:,.{decimals}f}"
+
+
+def number_text(value: float | None, *, digits: int = 4) -> str:
+    """Return a number of unknown unit with so many digits; a dash for None and NaN."""
+    if value is None or math.isnan(value):
+        return "\N{EN DASH}"
+    return f"{value:.{digits}g}".replace("-", _MINUS)
 
 
 def share_text(share: float) -> str:

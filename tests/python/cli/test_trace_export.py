@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from perfetto_decoding import Decoded
 
+import mauve_rt.trace
 from mauve_rt.cli.main import main
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.recording.synthetic import SyntheticSource
@@ -61,6 +62,17 @@ def test_perfetto_is_the_default(capsys: pytest.CaptureFixture[str]) -> None:
         event for event in Decoded(Path("bag.pftrace")).of("control", parent="bag") if event.name == "sense"
     ]
     assert [(event.begin_ns, event.end_ns) for event in sensed] == [(1040, 1340)]
+
+
+def test_values_of_a_bag_are_counters() -> None:
+    sample = Path(__file__).parents[3] / "docs/sample/metronome"
+    assert main(["trace", "export", str(sample)]) == 0
+    decoded = Decoded(Path("metronome.pftrace"))
+    beats = decoded.counted[decoded.uuid("/beat.data")]
+    assert [value for _, value in beats] == [*map(float, range(1, 32)), 0.0]
+    assert [time_ns for time_ns, _ in beats] == mauve_rt.trace.open(sample).values[
+        "/beat.data"
+    ].index.tolist()
 
 
 def test_csv(capsys: pytest.CaptureFixture[str]) -> None:

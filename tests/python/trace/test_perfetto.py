@@ -1,7 +1,10 @@
 """Perfetto traces, read back by Perfetto's own classes: tracks, slices, flows, clocks."""
 
 import builtins
+import math
 import types
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from perfetto.protos.perfetto.trace import perfetto_trace_pb2 as protos
 from perfetto_decoding import Decoded, Event
-from synthetic_traces import trace_of
+from synthetic_traces import MS, Pose, trace_of, with_values
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.export.perfetto import export_perfetto
@@ -279,3 +282,46 @@ def test_without_the_package_the_remedy_is_told(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(TraceError, match="pip install --upgrade perfetto"):
         export_perfetto({"x": trace_of(started("a"))}, tmp_path / "x")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_each_value_is_a_counter_of_a_group_of_their_own(tmp_path: Path) -> None:
+    poses = [(MS, Pose(1, 0.25)), (2 * MS, Pose(math.nan, math.inf)), (3 * MS, Pose(-1.5, 2))]
+    trace = with_values(
+        trace_of(started("control")), {"/robot_1/executor/values/pose": poses, "/beat": [(MS, Pose(7, 8))]}
+    )
+    path = tmp_path / "trace.pftrace"
+    assert export_perfetto({"robot_1": trace}, path) == []
+    decoded = Decoded(path)
+    group = decoded.tracks[decoded.uuid("values", parent="robot_1")]
+    assert group.sibling_order_rank > decoded.tracks[decoded.uuid("control")].sibling_order_rank
+    counted = {
+        decoded.tracks[uuid].name: found
+        for uuid, found in decoded.counted.items()
+        if decoded.tracks[uuid].parent_uuid == group.uuid
+    }
+    assert counted == {
+        "pose.x": [(MS, 1.0), (3 * MS, -1.5)],
+        "pose.y": [(MS, 0.25), (3 * MS, 2.0)],
+        "/beat.x": [(MS, 7.0)],
+        "/beat.y": [(MS, 8.0)],
+    }
+
+
+def test_a_trace_without_values_has_no_group_for_them(tmp_path: Path) -> None:
+    assert "values" not in {track.name for track in exported(started("control"), tmp_path).tracks.values()}
+
+
+def test_a_topic_that_cannot_be_read_is_left_out_and_reported(tmp_path: Path) -> None:
+    trace = with_values(trace_of(started("a")), {"/bad": [(MS, Pose(1, 2))], "/beat": [(MS, Pose(7, 8))]})
+    source = trace.message_source
+
+    def messages(topics: tuple[str, ...]) -> Iterator[Message]:
+        if "/bad" in topics:
+            raise TraceError("no whole message")
+        return source(topics)
+
+    path = tmp_path / "trace.pftrace"
+    told = export_perfetto({"robot_1": replace(trace, message_source=messages)}, path)
+    assert told == ["/bad is left out: no whole message"]
+    decoded = Decoded(path)
+    assert decoded.counted[decoded.uuid("/beat.x")] == [(MS, 7.0)]

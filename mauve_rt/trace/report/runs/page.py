@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.trace.reading.values import Samples
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.blocks import Card, Cell, Section, cards, details, paragraph, table
 from mauve_rt.trace.report.histograms import HEIGHT, WIDTH, histogram
@@ -20,10 +21,10 @@ from mauve_rt.trace.report.runs.tables import (
     timing_views,
     values_view,
 )
-from mauve_rt.trace.report.runs.values import ComparedField, Samples
-from mauve_rt.trace.report.runs.words import number_text, verdict_on
+from mauve_rt.trace.report.runs.values import ComparedField
+from mauve_rt.trace.report.runs.words import verdict_on
 from mauve_rt.trace.report.tables import words_section
-from mauve_rt.trace.report.units import time_text
+from mauve_rt.trace.report.units import number_text, time_text
 from mauve_rt.trace.report.verdict import verdict_html
 
 _OPEN_UP_TO = 6

@@ -13,10 +13,9 @@ from mauve_rt.trace.report.runs.words import (
     change_text,
     interval_text,
     mark_text,
-    number_text,
     text_of,
 )
-from mauve_rt.trace.report.units import share_text, time_text
+from mauve_rt.trace.report.units import number_text, share_text, time_text
 
 _NONE = "\N{EN DASH}"
 _MARK = "larger than noise"

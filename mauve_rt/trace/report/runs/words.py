@@ -7,7 +7,7 @@ from mauve_rt.trace.report.runs.compared import ComparedRuns, only_in_one
 from mauve_rt.trace.report.runs.noise import Judged
 from mauve_rt.trace.report.runs.timing import Figure
 from mauve_rt.trace.report.sentences import ATTENTION, GOOD, Sentence
-from mauve_rt.trace.report.units import counted, time_text
+from mauve_rt.trace.report.units import counted, number_text, time_text
 from mauve_rt.trace.report.verdict import Verdict
 
 LEAD = "Do the two runs differ?"
@@ -123,13 +123,6 @@ def mark_text(figure: Figure) -> str:
     if figure.judged is None:
         return figure.remark or _NONE
     return "yes" if figure.judged.differs else "no"
-
-
-def number_text(value: float | None) -> str:
-    """Return a number of unknown unit with four digits."""
-    if value is None or math.isnan(value):
-        return _NONE
-    return f"{value:.4g}".replace("-", _MINUS)
 
 
 def _change(value: float, figure: Figure, judged: Judged) -> str:

@@ -2,7 +2,7 @@
 (function (mauve) {
   "use strict";
 
-  const VIEWS = { u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f8: Float64Array };
+  const VIEWS = { u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f8: Float64Array, float: Float64Array };
 
   async function inflated(base64) {
     const text = atob(base64);

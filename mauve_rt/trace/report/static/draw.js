@@ -236,7 +236,7 @@
     }
   }
 
-  function drawAxis(context, model, scale, height, colours) {
+  mauve.drawAxis = function (context, model, scale, height, colours) {
     const view = { begin: scale.begin + model.offset, end: scale.time(scale.width) + model.offset };
     const axis = mauve.axisTicks(view.begin, view.end, Math.max(2, Math.floor(scale.width / 105)));
     context.font = "11px system-ui, sans-serif";
@@ -263,7 +263,7 @@
       context.font = "600 11px system-ui, sans-serif";
       context.fillText(mauve.baseText(axis.base, view.end - view.begin), 2, 14);
     }
-  }
+  };
 
   // Adopt and take: how long they took is recorded, and an instant just after them.
   function drawPhases(context, swap, scale, top, rowHeight, colours) {
@@ -331,7 +331,7 @@
     const lanes = mauve.AXIS_HEIGHT + model.rows.length * rowHeight;
     const height = lanes + mauve.rulesHeight(model);
     context.clearRect(0, 0, width, height);
-    drawAxis(context, model, scale, height, colours);
+    mauve.drawAxis(context, model, scale, height, colours);
     model.rows.forEach(function (row, index) {
       const top = mauve.AXIS_HEIGHT + index * rowHeight;
       context.fillStyle = colours.line;

@@ -167,27 +167,40 @@
     return { index: row ? index : -1, blocks: found, time };
   };
 
-  mauve.listenForHover = function (timeline) {
-    const plot = timeline.plot;
+  // The timeline's cursor, in one plot.
+  mauve.addCross = function (timeline, plot) {
     const cross = mauve.element("div", "cross");
     const clock = mauve.element("span");
     cross.append(clock);
     plot.append(cross);
-    cross.hidden = true;
+    const place = function () {
+      const { pointer, view, model } = timeline;
+      cross.hidden = pointer === null || pointer < view.begin || pointer > view.end;
+      if (cross.hidden) return;
+      const x = timeline.scale().x(pointer);
+      cross.style.left = x + "px";
+      clock.textContent = mauve.instantText(pointer + model.offset, (view.end - view.begin) / 100);
+      clock.classList.toggle("left", x > timeline.width - 110);
+    };
+    place();
+    timeline.pointed.push(place);
+    timeline.listeners.push(place);
+  };
+
+  mauve.listenForHover = function (timeline) {
+    const plot = timeline.plot;
+    mauve.addCross(timeline, plot);
     plot.addEventListener("pointermove", function (event) {
       const box = plot.getBoundingClientRect();
       const x = event.clientX - box.left;
       const { index, blocks, time } = mauve.tipAt(timeline, x, event.clientY - box.top);
-      cross.hidden = false;
-      cross.style.left = x + "px";
-      clock.textContent = mauve.instantText(time + timeline.model.offset, (timeline.view.end - timeline.view.begin) / 100);
-      clock.classList.toggle("left", x > box.width - 110);
+      timeline.pointAt(time);
       timeline.choose(index);
       if (blocks.length && !plot.classList.contains("dragged")) mauve.showTip(blocks, event);
       else mauve.hideTip();
     });
     plot.addEventListener("pointerleave", function () {
-      cross.hidden = true;
+      timeline.pointAt(null);
       mauve.hideTip();
       timeline.choose(-1);
     });

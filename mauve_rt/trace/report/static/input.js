@@ -6,14 +6,14 @@
   const EDGE = 6; // px around a brush's edge that take hold of it
 
   mauve.listenForInput = function (timeline) {
-    listenToPlot(timeline);
+    mauve.listenToPlot(timeline, timeline.root, timeline.plot);
     listenToOverview(timeline);
-    timeline.root.addEventListener("keydown", (event) => pressed(timeline, event));
   };
 
-  function listenToPlot(timeline) {
-    const plot = timeline.plot;
+  // A plot on the timeline's axis, and what has the keyboard while one works on it.
+  mauve.listenToPlot = function (timeline, root, plot) {
     let grip = null;
+    root.addEventListener("keydown", (event) => pressed(timeline, event));
     plot.addEventListener(
       "wheel",
       function (event) {
@@ -32,7 +32,7 @@
       if (event.button) return;
       grip = { x: event.clientX, begin: timeline.view.begin, end: timeline.view.end };
       plot.setPointerCapture(event.pointerId);
-      timeline.root.focus({ preventScroll: true });
+      root.focus({ preventScroll: true });
     });
     plot.addEventListener("pointermove", function (event) {
       if (!grip) return;
@@ -47,7 +47,7 @@
       });
     }
     plot.addEventListener("dblclick", () => timeline.showAll());
-  }
+  };
 
   // Drag the brush, its edges, or a new one.
   function listenToOverview(timeline) {

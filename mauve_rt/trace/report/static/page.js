@@ -68,6 +68,7 @@
     mauve.timeline = new mauve.Timeline(place, mauve.buildModel(described, columns));
     mauve.listenForInput(mauve.timeline);
     mauve.listenForHover(mauve.timeline);
+    mauve.startValues(mauve.timeline, described.values, columns);
     mauve.listenForJumps(mauve.timeline);
     mauve.openAtMiss(mauve.timeline);
   }

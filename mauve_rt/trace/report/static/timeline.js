@@ -22,6 +22,8 @@
       this.whole = { begin: -MARGIN * model.duration, end: (1 + MARGIN) * model.duration };
       this.view = { ...this.whole };
       this.listeners = [];
+      this.pointer = null; // time under the cursor
+      this.pointed = []; // called when the cursor moves
       root.classList.toggle("dense", this.rowHeight < 40);
       root.style.setProperty("--row", this.rowHeight + "px");
       root.style.setProperty("--axis", mauve.AXIS_HEIGHT + "px");
@@ -39,9 +41,9 @@
 
     resize() {
       const height = mauve.AXIS_HEIGHT + this.model.rows.length * this.rowHeight + mauve.rulesHeight(this.model);
-      this.context = fitted(this.canvas, this.width, height);
+      this.context = mauve.fitted(this.canvas, this.width, height);
       const box = this.overview.parentElement;
-      this.overviewContext = fitted(this.overview, box.clientWidth, box.clientHeight);
+      this.overviewContext = mauve.fitted(this.overview, box.clientWidth, box.clientHeight);
       this.overviewPicture = null;
       this.draw(); // at once: a canvas of a new size is empty, and the frame that asked for it is to show something
     }
@@ -102,6 +104,12 @@
         if (share < 1) requestAnimationFrame(step);
       };
       requestAnimationFrame(step);
+    }
+
+    // Put the cursor of all plots at an instant; null hides it.
+    pointAt(time) {
+      this.pointer = time;
+      for (const listener of this.pointed) listener();
     }
 
     // Mark a row; none when it is negative.
@@ -167,7 +175,7 @@
   };
 
   // A canvas of so many CSS pixels, as fine as the screen.
-  function fitted(canvas, width, height) {
+  mauve.fitted = function (canvas, width, height) {
     const fineness = window.devicePixelRatio || 1;
     canvas.width = Math.max(1, Math.round(width * fineness));
     canvas.height = Math.max(1, Math.round(height * fineness));
@@ -176,5 +184,5 @@
     const context = canvas.getContext("2d");
     context.setTransform(fineness, 0, 0, fineness, 0, 0);
     return context;
-  }
+  };
 })((window.mauve = window.mauve || {}));

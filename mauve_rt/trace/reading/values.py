@@ -1,0 +1,263 @@
+"""Values over a run: each numeric field of the messages of topics that are not the trace's own.
+
+A topic `.../values/NAME` holds the values of the resource NAME. They are called `NAME.FIELD`, as `pose.x`.
+Values of other topics are called by the topic: `/beat.data`.
+"""
+
+import dataclasses
+import difflib
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.reading.decisions import DECISION_TYPE
+from mauve_rt.trace.reading.facts import OWN_TYPES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from mauve_rt.trace.reading.trace import Trace
+
+Floats = npt.NDArray[np.float64]
+
+MOST_ELEMENTS = 16
+"""Of an array whose elements are values; a longer one, as a laser scan, is left out."""
+VALUES_TYPE, NAMES_TYPE = "mauve_msgs/msg/Values", "mauve_msgs/msg/ValueNames"
+NO_VALUES = (
+    *OWN_TYPES,
+    DECISION_TYPE,
+    NAMES_TYPE,
+    "mauve_msgs/msg/ReconfigurationEvent",
+    "mauve_msgs/msg/ArchitectureState",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "rcl_interfaces/msg/Log",
+    "rcl_interfaces/msg/ParameterEvent",
+)
+"""Types of messages that report on the executor and its computer."""
+_RESOURCES = "/values/"
+_TIME = ("sec", "nanosec")
+_Getter = Callable[[Any], Any]
+
+
+class Field(NamedTuple):
+    """Where a value comes from."""
+
+    topic: str
+    name: str
+    """As `pose.position.x`, `ranges[3]`."""
+
+    @property
+    def of_resource(self) -> bool:
+        """Whether the executor recorded the writes to a resource on this topic."""
+        return bool(resource_of(self.topic))
+
+
+class Samples(NamedTuple):
+    """A value over a run."""
+
+    monotonic_ns: npt.NDArray[np.int64]
+    """CLOCK_MONOTONIC, as in the records; never decreases."""
+    values: Floats
+    """NaN where a message lacks the field."""
+
+    @property
+    def finite(self) -> Floats:
+        """The values that are finite numbers."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def nan_share(self) -> float:
+        """Share of values that are not finite, 0 to 1."""
+        return 1 - len(self.finite) / len(self.values) if len(self.values) else 0.0
+
+
+class TraceValues:
+    """The values of a trace by their names; each topic is read once, when one of its values is asked for."""
+
+    def __init__(self, trace: "Trace") -> None:
+        """Read nothing yet."""
+        self._trace = trace
+        self._topics = _spoken(value_topics(trace))
+        self._read: dict[str, dict[Field, Samples]] = {}
+        self._problems: list[str] = []
+
+    def __getitem__(self, name: str) -> "pd.Series[float]":
+        """One value, as `pose.x`: float64 over int64 ns of CLOCK_MONOTONIC, the clock of `Trace.frames`.
+
+        Raises:
+            TraceError: the trace has no such value; the message names the nearest one.
+
+        """
+        import pandas as pd  # noqa: PLC0415 - takes its time to load
+
+        near = [topic for spoken, topic in self._topics.items() if name.startswith(f"{spoken}.")]
+        found = self._samples(near) or {}
+        field = next((one for one in found if self.name(one) == name), None)
+        if field is None:
+            raise TraceError(self._unknown(name))
+        index = pd.Index(found[field].monotonic_ns, name="monotonic_ns")
+        return pd.Series(found[field].values, index, name=name)
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of all values."""
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        """How many values there are."""
+        return len(self.names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all values, those of recorded resources first. Reads all topics."""
+        return tuple(self.name(field) for field in self.samples)
+
+    @property
+    def samples(self) -> dict[Field, Samples]:
+        """All values, those of recorded resources first. Reads all topics."""
+        found = self._samples(self._topics.values())
+        return dict(sorted(found.items(), key=lambda item: not item[0].of_resource))
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Sentences: which of the topics read so far are left out, and why."""
+        return tuple(self._problems)
+
+    def name(self, field: Field) -> str:
+        """What a field is called here: `pose.x` of `/executor/values/pose`, `/beat.data` of `/beat`."""
+        spoken = next((one for one, topic in self._topics.items() if topic == field.topic), field.topic)
+        return f"{spoken}.{field.name}"
+
+    def _samples(self, topics: Iterable[str]) -> dict[Field, Samples]:
+        wanted = list(topics)
+        new = [topic for topic in wanted if topic not in self._read]
+        self._read |= {topic: {} for topic in new}
+        for field, samples in read_samples(self._trace, new, self._problems).items():
+            self._read[field.topic][field] = samples
+        return {field: samples for topic in wanted for field, samples in self._read[topic].items()}
+
+    def _unknown(self, name: str) -> str:
+        nearest = difflib.get_close_matches(name, self.names, 1, 0)
+        if not nearest:
+            return f"value '{name}': the bag has no values. Bind a resource to a topic and record again."
+        return f"value '{name}': not in the bag, which has {len(self):,}; the nearest is '{nearest[0]}'."
+
+
+def value_topics(trace: "Trace") -> list[str]:
+    """Topics with values."""
+    return [topic for topic, (kind, count) in trace.topics.items() if count and kind not in NO_VALUES]
+
+
+def resource_of(topic: str) -> str:
+    """The resource whose writes a topic holds; empty for another topic."""
+    return topic.partition(_RESOURCES)[2]
+
+
+def names_of_numbers(trace: "Trace", topics: Iterable[str]) -> dict[str, list[str]]:
+    """For each of these topics whose messages are mauve_msgs/msg/Values: the names of the numbers in them."""
+    suffix = "/names"
+    wanted = {f"{topic}{suffix}" for topic in topics if trace.topics[topic][0] == VALUES_TYPE}
+    present = wanted & {*trace.topics}
+    messages = trace.messages(*present) if present else ()
+    return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in present}
+
+
+def read_samples(trace: "Trace", topics: list[str], left_out: list[str]) -> dict[Field, Samples]:
+    """Read all fields of these topics; `left_out` gets a sentence for each topic that is unreadable."""
+    if not topics:
+        return {}
+    try:
+        return _samples(trace, topics)
+    except TraceError:
+        found: dict[Field, Samples] = {}
+        for topic in topics:
+            try:
+                found |= _samples(trace, [topic])
+            except TraceError as error:
+                left_out.append(f"{topic} is left out: {error}")
+        return found
+
+
+def _spoken(topics: list[str]) -> dict[str, str]:
+    """Topics by what they are called: a resource by its name, unless two executors have one of that name."""
+    resources = [resource_of(topic) for topic in topics]
+    return {
+        resource if resource and resources.count(resource) == 1 else topic: topic
+        for topic, resource in zip(topics, resources, strict=True)
+    }
+
+
+class _Table:
+    """The messages of one topic: times, and a row of numbers each."""
+
+    def __init__(self, message: Any, most_elements: int) -> None:
+        self.named = list(_numbers("", message, lambda msg: msg, most_elements))
+        self.times = array("q")
+        self._numbers = array("d")
+
+    def add(self, monotonic_ns: int, message: Any) -> None:
+        self.times.append(monotonic_ns)
+        self._numbers.extend(_number(get, message) for _, get in self.named)
+
+    def columns(self) -> tuple[npt.NDArray[np.int64], Floats]:
+        """Times, (n,), and numbers, (fields, n), by time."""
+        times = np.array(self.times, np.int64)
+        numbers = np.array(self._numbers, np.float64).reshape(len(times), len(self.named))
+        order = np.argsort(times, kind="stable")
+        return times[order], np.ascontiguousarray(numbers[order].T)
+
+
+def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
+    tables: dict[str, _Table] = {}
+    names = names_of_numbers(trace, topics)
+    for message in trace.messages(*topics):
+        topic = message.topic
+        if topic in topics:
+            if topic not in tables:
+                tables[topic] = _Table(message.msg, max(MOST_ELEMENTS, len(names.get(topic, []))))
+            tables[topic].add(message.monotonic_ns, message.msg)
+    found: dict[Field, Samples] = {}
+    for topic, table in tables.items():
+        times, columns = table.columns()
+        fields = [name for name, _ in table.named]
+        given = names.get(topic, [])
+        if len(given) == len(fields):
+            fields = given
+        found |= {
+            Field(topic, name): Samples(times, column) for name, column in zip(fields, columns, strict=True)
+        }
+    return found
+
+
+def _number(get: _Getter, message: Any) -> float:
+    try:
+        return float(get(message))
+    except (IndexError, TypeError, OverflowError):  # a sequence that is shorter than in the first message
+        return float("nan")
+
+
+def _numbers(name: str, value: Any, get: _Getter, most_elements: int) -> Iterator[tuple[str, _Getter]]:
+    """The numeric fields of a message and how to read them; no time stamps, no longer arrays."""
+    if dataclasses.is_dataclass(value):
+        names = [field.name for field in dataclasses.fields(value)]
+        if tuple(names) == _TIME:
+            return
+        for one in names:
+            path = f"{name}.{one}" if name else one
+            yield from _numbers(path, getattr(value, one), _attribute(get, one), most_elements)
+    elif isinstance(value, np.ndarray | list | tuple):
+        for index, element in enumerate(value if len(value) <= most_elements else ()):
+            yield from _numbers(f"{name}[{index}]", element, _item(get, index), most_elements)
+    elif isinstance(value, bool | int | float | np.number | np.bool_):
+        yield name, get
+
+
+def _attribute(get: _Getter, name: str) -> _Getter:
+    return lambda message: getattr(get(message), name)
+
+
+def _item(get: _Getter, index: int) -> _Getter:
+    return lambda message: get(message)[index]
