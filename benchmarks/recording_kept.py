@@ -40,9 +40,9 @@ def _side(folder: Path, what: str, by: str, duration_s: float) -> Callable[[int]
             if process.stdout.readline() != b"records\n":
                 raise BenchmarkError("the recording process did not start")
             time.sleep(_SETTLE_S)
-            before, began_s = _cpu_s(process.pid), time.monotonic()
+            before, began_s = cpu_s(process.pid), time.monotonic()
             time.sleep(duration_s)
-            percent = 100 * (_cpu_s(process.pid) - before) / (time.monotonic() - began_s)
+            percent = 100 * (cpu_s(process.pid) - before) / (time.monotonic() - began_s)
             process.kill()
         shutil.rmtree(bag)
         return percent
@@ -50,7 +50,7 @@ def _side(folder: Path, what: str, by: str, duration_s: float) -> Callable[[int]
     return measure
 
 
-def _cpu_s(process: int) -> float:
+def cpu_s(process: int) -> float:
     """CPU time of all its threads but the components', and of its children."""
     total_ns = 0
     tasks = [*Path(f"/proc/{process}/task").iterdir()]

@@ -17,7 +17,7 @@ import machine
 from analysis import analysis_rows
 from command import command_rows
 from document import PAGE, around_figures, write_docs
-from echo import echo_rows
+from echo import echo_rows, watch_rows
 from links import links_rows
 from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
 from mission import mission_rows
@@ -48,6 +48,7 @@ from wakeup_executor import executor_wakeup_rows
 
 BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "wakeup": wakeup_rows,
+    "watch": watch_rows,
     "executor-wakeup": executor_wakeup_rows,
     "echo": echo_rows,
     "deployment": deployment_rows,

@@ -9,6 +9,8 @@ from mauve_rt.errors import MauveError
 from mauve_rt.model.message_text import message_text
 from mauve_rt.model.words import did_you_mean, listed
 
+MOST_VALUES = 256
+"""Of one request."""
 _KINDS = ("read", "write", "event")  # of ports that have a value; a call has none
 
 
@@ -31,7 +33,16 @@ class Values:
         self._runtime = runtime
 
     def read(self, names: Sequence[str]) -> list[Value | MauveError]:
-        """The value of each resource or COMPONENT.PORT; an error where there is none, which says why."""
+        """The value of each resource or COMPONENT.PORT; an error where there is none, which says why.
+
+        Names beyond the first 256 get an error.
+        """
+        beyond = MauveError(
+            f"a request reads at most {MOST_VALUES} values; ask for the others in another one"
+        )
+        return [*self._read_some(names[:MOST_VALUES]), *(beyond for _ in names[MOST_VALUES:])]
+
+    def _read_some(self, names: Sequence[str]) -> list[Value | MauveError]:
         resources = {resource.name: resource for resource in self._runtime.described_resources()}
         components = self._runtime.components() if any(name not in resources for name in names) else []
         found: list[Value | MauveError] = []

@@ -1511,6 +1511,10 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "Every value that a resource holds can be seen.": (
         "ros/executor/test_values.py::test_values_of_every_kind_by_resource_and_by_port",
     ),
+    "The programs that poll are ordinary load on the computer.": (
+        "ros/executor/test_values.py::test_a_look_takes_nothing_away",
+        "bench: , against an idle machine, p",
+    ),
     "Nothing in the architecture file has to change.": (
         "ros/executor/test_values.py::test_a_look_takes_nothing_away",
         "bench: wake-up latency of a 1 kHz component, its value read 100 times a second",

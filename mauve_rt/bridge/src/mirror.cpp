@@ -60,7 +60,11 @@ bool Mirror::send() {
   std::uint64_t sequence = 0;
   if (!resource().peek_sample(message_, time_ns, sequence) || sequence == seen_) return false;
   seen_ = sequence;
-  count(make_message(time_ns) && publish(*publisher_.get(), value_), now, value_);
+  const bool passed = make_message(time_ns) && publish(*publisher_.get(), value_);
+  if (names_)  // a bag of them would lack the names: it has the value itself, where that is recorded
+    count(passed);
+  else
+    count(passed, now, value_);
   return false;
 }
 

@@ -33,8 +33,10 @@ class BoundTopic : public Binding {
   void report(BridgeReport& report) const override;
 
  protected:
-  /// Of a message that went through, or not. [non-rt]
+  /// Of a message that went through, or not; for the log, too. [non-rt]
   void count(bool passed, time_ns_t time_ns, std::span<const std::byte> message);
+  /// Not for the log. [non-rt]
+  void count(bool passed) noexcept { counter_.count(passed); }
   /// Notes why the resource refused a message, unless it has just done so of another one. [non-rt]
   void explain(std::span<const std::byte> message, time_ns_t now);
   virtual std::string full_name() const = 0;

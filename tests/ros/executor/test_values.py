@@ -138,6 +138,14 @@ def test_a_look_takes_nothing_away(running: Any, graph: Any) -> None:
     assert [ask(graph, "queue")[0].data for _ in range(3)] == [first.data] * 3
 
 
+def test_a_request_reads_a_limited_number_of_values(running: Any, graph: Any) -> None:
+    del running
+    reply = graph.ask(ReadValues, f"{NODE}/read_values", names=["place"] * 258)
+    problems = [value.problem for value in reply.values]
+    assert problems[:256] == [""] * 256
+    assert [text.partition(";")[0] for text in problems[256:]] == ["a request reads at most 256 values"] * 2
+
+
 def test_nothing_was_written_yet(running: Any, graph: Any) -> None:
     del running
     scan, words = ask(graph, "scan", "words")
