@@ -19,6 +19,18 @@ void open(rcl_publisher_t& publisher, const rcl_node_t& node, const std::string&
         "the mirror cannot be published", "resource " + resource + ", topic " + name);
 }
 
+/// An instant of CLOCK_MONOTONIC by CLOCK_REALTIME: both are read at once, unless the thread is kept from that each time.
+time_ns_t by_realtime(time_ns_t time_ns) {
+  constexpr time_ns_t kAtOnce = us_to_ns(20);
+  time_ns_t before = monotonic_now_ns();
+  for (int tries = 1;; ++tries) {
+    const time_ns_t realtime = realtime_now_ns();
+    const time_ns_t after = monotonic_now_ns();
+    if (after - before <= kAtOnce || tries == 5) return realtime - (before - time_ns);
+    before = after;
+  }
+}
+
 bool publish(rcl_publisher_t& publisher, std::vector<std::byte>& message) {
   const rcl_serialized_message_t serialized = borrowed(message);
   return went_well(rcl_publish_serialized_message(&publisher, &serialized, nullptr));
@@ -80,7 +92,7 @@ bool Mirror::make_message(time_ns_t time_ns) {
     writer.put(numbers_[*settings_.number]);
     return true;
   }
-  const time_ns_t stamp_ns = realtime_now_ns() - (monotonic_now_ns() - time_ns);
+  const time_ns_t stamp_ns = by_realtime(time_ns);
   writer.put(static_cast<std::int32_t>(stamp_ns / s_to_ns(1)));
   writer.put(static_cast<std::uint32_t>(stamp_ns % s_to_ns(1)));
   writer.put(static_cast<std::uint32_t>(numbers_.size()));
