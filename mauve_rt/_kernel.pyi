@@ -761,7 +761,7 @@ class Host:
 class ValueLog:
     """Every write to the resource of a name, also when another one takes that name. For one thread."""
 
-    def __init__(self, architecture: Architecture, resource: str, *, bytes: int = ...) -> None:
+    def __init__(self, architecture: Architecture, resource: str, *, bytes: int = 1048576) -> None:
         """Keep writes from now on, as many as have room in about so many bytes: 16 to 8,192.
 
         Raises:
