@@ -60,6 +60,7 @@ def _loose_words(sentence: str, quotes: Iterable[str]) -> list[str]:
     quoted = {
         place
         for words in (*quotes, *LINK.findall(sentence))
+        if words in sentence
         for found in re.finditer(re.escape(words), sentence)
         for place in range(*found.span())
     }
