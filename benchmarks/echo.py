@@ -81,7 +81,7 @@ def echo_rows(settings: Settings) -> Iterator[Row]:
             f"{what}, against an idle machine, p{percentile}",
             [(read, idle) for read, _, idle in told],
             unit="us",
-            beside="nobody reads",
+            beside="no reader",
         )
 
 

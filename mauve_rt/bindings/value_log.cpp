@@ -16,7 +16,7 @@ class ValueLog {
       : architecture_(architecture.architecture),
         name_(std::move(resource)),
         bytes_(bytes),
-        resource_(architecture_.hold_resource(name_)) {
+        followed_(architecture_.hold_resource(name_)) {
     begin();
   }
   ~ValueLog() { end(); }
@@ -27,11 +27,11 @@ class ValueLog {
     Writes writes;
     take_rest(writes);
     std::shared_ptr<Resource> present = architecture_.find_resource(name_);
-    if (present != resource_ && !ended_) {
+    if (present != followed_ && !ended_) {
       take_rest(writes);
       leave();
-      resource_ = std::move(present);
-      if (resource_ != nullptr) begin();
+      followed_ = std::move(present);
+      follow();
     }
     return writes;
   }
@@ -46,8 +46,17 @@ class ValueLog {
 
  private:
   void begin() {
+    followed_->begin_log(bytes_);
+    resource_ = followed_;
     lost_before_ = resource_->lost_writes();
-    resource_->begin_log(bytes_);
+  }
+  /// A resource without values has taken the name: there is nothing to keep until another one does.
+  void follow() {
+    try {
+      if (followed_ != nullptr) begin();
+    } catch (const Error&) {
+      resource_ = nullptr;
+    }
   }
   void leave() {
     if (resource_ == nullptr) return;
@@ -65,7 +74,8 @@ class ValueLog {
   Architecture& architecture_;
   const std::string name_;
   const std::size_t bytes_;
-  std::shared_ptr<Resource> resource_;  // nullptr: it was removed, or the log has ended
+  std::shared_ptr<Resource> followed_;  // of that name; nullptr: it was removed
+  std::shared_ptr<Resource> resource_;  // the same while its writes are kept
   std::uint64_t lost_{0};
   std::uint64_t lost_before_{0};  // this log, by the present resource
   bool ended_{false};

@@ -89,7 +89,7 @@ def polled(executor: str, name: str, *, rate_hz: float) -> Iterator[Sample]:
 
     Raises:
         NoValueError: there is none; the executor's reason.
-        NoExecutorError: nobody answers.
+        NoExecutorError: no executor answers.
     """
     from mauve_msgs.srv import ReadValues  # noqa: PLC0415 - ROS takes its time to load
     from mauve_rt.cli.client import connected  # noqa: PLC0415
@@ -142,7 +142,7 @@ class _Text:
     def show(self, sample: Sample, before: Sample | None) -> None:
         from mauve_rt.cli.views import duration  # noqa: PLC0415
 
-        fields = _fields(sample, self._field)  # first: a bad --field is told at once
+        fields = _fields(sample, self._field)  # first: a bad --field is reported at once
         is_new = bool(sample.writes) and (before is None or before.writes != sample.writes)
         if not is_new:
             if not self._told_old:

@@ -7,7 +7,7 @@ import sys
 import termios
 import time
 import tty
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -47,45 +47,64 @@ def main(args: argparse.Namespace) -> int:
     if not args.once and not (sys.stdin.isatty() and sys.stdout.isatty()):
         print("mauve: watch needs a terminal; add --once for one table without it", file=sys.stderr)
         return BAD_USAGE
-    from mauve_rt.cli.client import NoExecutorError, connected  # noqa: PLC0415 - ROS takes its time to load
-    from mauve_rt.cli.views import console  # noqa: PLC0415
-    from mauve_rt.cli.watch_view import Selection, view  # noqa: PLC0415
+    from diagnostic_msgs.msg import DiagnosticArray  # noqa: PLC0415 - ROS takes its time to load
+
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
     from mauve_rt.cli.watched import WatchedExecutor  # noqa: PLC0415
 
     names = [*dict.fromkeys(args.executors)]
     with connected(first=True) as client:
         executors = [WatchedExecutor(client, name, args.value) for name in names]
-        selection = Selection()
+
+        def hear(message: DiagnosticArray) -> None:
+            for executor in executors:
+                executor.take_diagnostics(message)
 
         def look() -> None:
             client.spin()
             for executor in executors:
                 executor.look()
 
-        if args.once:
-            begun_s = time.monotonic()
-            while time.monotonic() < begun_s + _FIGURES_S or (
-                not all(executor.is_there for executor in executors) and time.monotonic() < begun_s + _FIRST_S
-            ):
-                look()
-            missing = [executor.name for executor in executors if not executor.is_there]
-            if missing:
-                raise NoExecutorError(f"no answer from {' and '.join(missing)}; see mauve nodes")
-            console().print(view(executors, selection, has_keys=False))
-            return OK
-        from rich.live import Live  # noqa: PLC0415
+        client.follow(DiagnosticArray, "/diagnostics", hear)  # once: the topic is that of all executors
+        (_print_once if args.once else _show)(executors, look)
+    return OK
 
-        with _keys_at_once(), Live(console=console(), screen=True, auto_refresh=False) as live:
-            shown_s = 0.0
-            while True:
-                look()
-                keys = [*_keys()]
-                if any(not press(key, selection, executors) for key in keys):
-                    return OK
-                is_due = not selection.is_paused and time.monotonic() >= shown_s + _REFRESH_S
-                if keys or is_due:
-                    live.update(view(executors, selection), refresh=True)
-                    shown_s = time.monotonic()
+
+def _print_once(executors: "Sequence[WatchedExecutor]", look: Callable[[], None]) -> None:
+    from mauve_rt.cli.client import NoExecutorError  # noqa: PLC0415
+    from mauve_rt.cli.views import console  # noqa: PLC0415
+    from mauve_rt.cli.watch_view import Selection, view  # noqa: PLC0415
+
+    begun_s = time.monotonic()
+    while time.monotonic() < begun_s + _FIGURES_S or (
+        not all(executor.is_there for executor in executors) and time.monotonic() < begun_s + _FIRST_S
+    ):
+        look()
+    missing = [executor.name for executor in executors if not executor.is_there]
+    if missing:
+        raise NoExecutorError(f"no answer from {' and '.join(missing)}; see mauve nodes")
+    console().print(view(executors, Selection(), has_keys=False))
+
+
+def _show(executors: "Sequence[WatchedExecutor]", look: Callable[[], None]) -> None:
+    """Until a key ends it."""
+    from rich.live import Live  # noqa: PLC0415
+
+    from mauve_rt.cli.views import console  # noqa: PLC0415
+    from mauve_rt.cli.watch_view import Selection, view  # noqa: PLC0415
+
+    selection = Selection()
+    with _keys_at_once(), Live(console=console(), screen=True, auto_refresh=False) as live:
+        shown_s = 0.0
+        while True:
+            look()
+            keys = [*_keys()]
+            if any(not press(key, selection, executors) for key in keys):
+                return
+            is_due = not selection.is_paused and time.monotonic() >= shown_s + _REFRESH_S
+            if keys or is_due:
+                live.update(view(executors, selection), refresh=True)
+                shown_s = time.monotonic()
 
 
 def press(key: str, selection: "Selection", executors: "Sequence[WatchedExecutor]") -> bool:

@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray
-
 from mauve_msgs.msg import ReconfigurationEvent
 from mauve_msgs.srv import ListComponents, ListRules, ReadValues
 from mauve_rt.cli.client import Client
@@ -66,7 +64,6 @@ class WatchedExecutor:
         self._list = client.poll(ListComponents, f"{name}/list_components", every_s=LIST_S)
         self._list_rules = client.poll(ListRules, f"{name}/list_rules", every_s=LIST_S)
         self._read = client.poll(ReadValues, f"{name}/read_values", every_s=VALUES_S)
-        client.follow(DiagnosticArray, "/diagnostics", self._take_diagnostics)
         client.follow(ReconfigurationEvent, f"{name}/events", self._take_event)
 
     @property
@@ -134,7 +131,8 @@ class WatchedExecutor:
             self._decoders[value.type] = Decoder(value.type, value.definition)
         return self._decoders[value.type]
 
-    def _take_diagnostics(self, message: Any) -> None:
+    def take_diagnostics(self, message: Any) -> None:
+        """Take what a DiagnosticArray says of this executor."""
         now_s = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
         prefix = f"{self.name}: "
         for status in message.status:

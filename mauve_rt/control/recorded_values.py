@@ -23,7 +23,7 @@ class RecordedValue(NamedTuple):
 class RecordedValues:
     """A source of messages for a recorder, on one topic for each resource. All but `choose` for one thread.
 
-    A write is kept in a ring of the resource's own, so that its writer waits for nobody; where the ring is
+    A write is kept in a ring of the resource's own, so that its writer never waits; where the ring is
     full, the write is lost and counted.
     """
 

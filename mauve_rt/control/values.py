@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from mauve_rt._kernel import ComponentDescription, ResourceDescription
+from mauve_rt._kernel import ComponentDescription, MessageShape, ResourceDescription
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError
 from mauve_rt.model.message_text import message_text
@@ -103,5 +103,9 @@ def definition_of(resource: ResourceDescription) -> str:
     Raises:
         MauveError: the type is neither a registered C++ struct nor an installed message.
     """
-    shapes = [shape for service in resource.services if service.kind == "read" for shape in service.messages]
-    return message_text(resource.type, shapes)
+    return message_text(resource.type, read_shapes(resource))
+
+
+def read_shapes(resource: ResourceDescription) -> list[MessageShape]:
+    """The C++ structs that the resource's ports read."""
+    return [shape for service in resource.services if service.kind == "read" for shape in service.messages]

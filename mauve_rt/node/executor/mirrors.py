@@ -8,7 +8,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.validate_topic_name import validate_topic_name
 
 from mauve_rt._bridge import FlatNumbers
-from mauve_rt.control.values import Values
+from mauve_rt.control.values import Values, read_shapes
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.model.flat_fields import flat_fields
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ, MAX_MIRROR_HZ, MirrorModel
@@ -56,11 +56,10 @@ class Mirrors:
         if not 0 < rate_hz <= MAX_MIRROR_HZ:
             raise MauveError(f"rate: expected Hz above 0 and at most {MAX_MIRROR_HZ:g}, found {rate_hz:g}")
         resource = self._values.find(name).resource
-        shapes = [shape for each in resource.services if each.kind == "read" for shape in each.messages]
         is_message = message_class(resource.type) is not None
         numbers = None
         if field or not is_message:
-            numbers = FlatNumbers(flat_fields(resource.type, shapes))
+            numbers = FlatNumbers(flat_fields(resource.type, read_shapes(resource)))
         if field and numbers is not None and field not in numbers.names:
             raise MauveError(f"{resource.type} has no number '{field}'; {did_you_mean(field, numbers.names)}")
         mirrored = Mirrored(

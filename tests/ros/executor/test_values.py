@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import PATIENCE_S
 from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64
 
 import mauve_rt.trace
@@ -403,6 +404,36 @@ def test_every_write_is_recorded_in_virtual_time(tmp_path: Path, plugin_prefix: 
     assert_each_write(values, least=199)
     assert values["attitude"][0].round == 1
     assert [message.data for message in values["queue"]] == [0.5, 1.0, 1.5, 2.0, 2.5]
+
+
+def test_a_recording_goes_on_whatever_takes_the_name(
+    running: Any, graph: Any, mauve: Callable[..., Any], tmp_path: Path
+) -> None:
+    """A resource without values, then one with values again."""
+    del running
+    assert mauve("record", "start", NODE, "flight", "--value", "scan", "--value", "latest").returncode == 0
+
+    def become(value: str) -> None:
+        steps = [_step(kind="remove_resource", target="scan")]
+        steps.append(_step(kind="add_resource", target="scan", value=value))
+        reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps)
+        assert reply.success, reply.message
+        begun = ask(graph, "latest")[0].writes
+        graph.spin_until(lambda: ask(graph, "latest")[0].writes > begun + 50, "some flushes")
+
+    become("{kind: executor_tests/Lamp}")
+    become("{kind: shared_data, type: sensor_msgs/msg/LaserScan, topic: {name: scan, direction: subscribe}}")
+    voice = graph.voice(LaserScan, "/robot_1/scan")
+    voice.publish(LaserScan(range_max=7.0))
+    graph.spin_until(lambda: ask(graph, "scan")[0].writes > 0, "the scan")
+    stopped = mauve("record", "stop", NODE)
+    assert stopped.returncode == 0, stopped.stderr
+    assert "ended by itself" not in stopped.stdout
+    values = recorded(tmp_path / "flight")
+    assert [message.range_max for message in values["scan"]] == [7.0]
+    rolls = [2 * message.data for message in values["latest"]]
+    assert rolls == [rolls[0] + number for number in range(len(rolls))]
+    assert len(rolls) > 100
 
 
 @pytest.mark.parametrize(
