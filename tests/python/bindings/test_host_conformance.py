@@ -1,51 +1,16 @@
 """What every host does alike, on threads and in virtual time: each test runs on both."""
 
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from python_parts import ActFsm, CountCore, CountShell, Stage
+from running_host import Running
 
 from mauve_rt._kernel import Deployer, Host, MauveError, SimulatedHost, Simulation, Transaction
 from mauve_rt.trace.format.records import RECORD
 
 MS = 1_000_000
-
-
-class Running:
-    """An architecture of counters on one of the hosts."""
-
-    def __init__(self, stage: Stage, *, simulated: bool) -> None:
-        self.stage = stage
-        self.architecture = stage.architecture
-        self._simulation = Simulation() if simulated else None
-        self._host: Host | None = None
-
-    @property
-    def host(self) -> Host:
-        if self._host is None:
-            simulation, architecture = self._simulation, self.architecture
-            self._host = Deployer(architecture) if simulation is None else simulation.add(architecture)
-        return self._host
-
-    def deploy(self) -> None:
-        self.architecture.configure()
-        self.host.deploy()
-
-    def run_for(self, duration_ns: int) -> None:
-        until = max(self.host.epoch_ns, self.host.now_ns()) + duration_ns
-        if self._simulation is not None:
-            self._simulation.run_until(until)
-            return
-        while self.host.now_ns() < until:
-            time.sleep(1e-3)
-
-    def state(self, name: str) -> str:
-        return self.architecture.component(name).state
-
-    def releases(self, name: str) -> int:
-        return self.architecture.component(name).describe().releases
 
 
 @pytest.fixture(params=["threads", "virtual"])
