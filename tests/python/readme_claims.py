@@ -14,6 +14,7 @@ PAGES_OF_CLAIMS = (
             "basic_elements",
             "components",
             "deployment",
+            "failures_of_peers",
             "faults",
             "performance",
             "replacing",
@@ -32,6 +33,8 @@ PAGES_OF_CLAIMS = (
 
 
 _REPORT = "python/trace/report/test"
+_PEERS = "python/simulation/test_failures_of_peers.py::test_"
+_PEERS_FAULTS = "python/simulation/test_faults_of_peers.py::test_"
 _KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
 
 CLAIMS: dict[str, tuple[str, ...]] = {
@@ -1331,6 +1334,106 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "It warns of a subscription that ordinary publishers will not match, such as one with a "
         "`deadline_ms`."
     ): ("python/cli/test_check.py::test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning",),
+    # ---- failures that users of other frameworks reported
+    (
+        "**Here** the thread that asks for a change configures the new part, and later cleans up the "
+        "old part."
+    ): (f"{_PEERS}a_loop_runs_on_while_a_new_part_takes_long_to_come_and_an_old_one_to_go",),
+    "The component runs on during both.": (
+        f"{_PEERS}a_loop_runs_on_while_a_new_part_takes_long_to_come_and_an_old_one_to_go",
+    ),
+    (
+        "Its own thread only puts the new part in, inside a wait, and the component misses no release for it."
+    ): (
+        f"{_PEERS}a_loop_runs_on_while_a_new_part_takes_long_to_come_and_an_old_one_to_go",
+        "Rule9Replace.AThousandTimesAtRandomPhasesMissesNoRelease",
+    ),
+    "**Here** a list is a snapshot, which the thread of the caller takes.": (
+        f"{_PEERS}a_loop_does_not_wait_for_those_who_list_it_nor_they_for_the_loop",
+    ),
+    "A list does not wait for a component, not even for one that executes.": (
+        f"{_PEERS}a_loop_does_not_wait_for_those_who_list_it_nor_they_for_the_loop",
+    ),
+    "Lists hold no lock that a component waits for.": (
+        f"{_PEERS}a_loop_does_not_wait_for_those_who_list_it_nor_they_for_the_loop",
+    ),
+    "The mechanism is one thread for each component: see": ("Rule5Deployment.ThreadsAreWhatWasAskedFor",),
+    "**Here** one transaction changes a chain.": (
+        f"{_PEERS}a_chain_of_which_one_part_fails_is_not_changed_at_all",
+    ),
+    (
+        "If one part refuses, the error names the step, and no component changes: the old chain runs "
+        "on with its old references."
+    ): (f"{_PEERS}a_chain_of_which_one_part_fails_is_not_changed_at_all",),
+    "The mechanism is that all components agree before the first one changes: see": (
+        f"{_PEERS}a_chain_of_which_one_part_fails_is_not_changed_at_all",
+    ),
+    (
+        "**Here** the kernel writes the output that the shell of the failed component declares for "
+        "this case, zero unless declared otherwise."
+    ): (f"{_PEERS_FAULTS}after_a_fault_those_behind_read_the_declared_output_and_run_on",),
+    "The next component reads this value at once, and runs on.": (
+        f"{_PEERS_FAULTS}after_a_fault_those_behind_read_the_declared_output_and_run_on",
+    ),
+    "The others of the chain run on, too, since not every chain has to stop.": (
+        f"{_PEERS_FAULTS}after_a_fault_those_behind_read_the_declared_output_and_run_on",
+    ),
+    "Where a chain has to stop, a rule stops it in one transaction: see": (
+        f"{_PEERS_FAULTS}a_rule_stops_the_whole_chain_after_a_fault_of_one",
+    ),
+    "**Here** the place of a `stop` among the steps of a transaction has no effect.": (
+        f"{_PEERS}a_controller_that_stays_reads_one_reference_and_then_the_other",
+    ),
+    (
+        "All steps take effect at one instant T: before T the component that stays reads the old "
+        "reference, from T on the new one."
+    ): (f"{_PEERS}a_controller_that_stays_reads_one_reference_and_then_the_other",),
+    "This component misses no release.": (
+        f"{_PEERS}a_controller_that_stays_reads_one_reference_and_then_the_other",
+    ),
+    "may read the declared output of the stopped component.": (
+        "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
+    ),
+    "**Here** a fallback belongs to one component.": (f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",),
+    "A fault puts in the fallback core of the failed component alone, at the next instant of its grid.": (
+        f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",
+    ),
+    "Components that read from the same resource keep their cores and miss no release.": (
+        f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",
+    ),
+    "The mechanism is a core that is kept prepared in its component: see": (
+        f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",
+    ),
+    "**Here** a stop and a start keep the data of a core, so a core could do the same.": (
+        f"{_PEERS}a_start_keeps_the_data_of_the_core_and_a_step_configure_clears_them",
+    ),
+    "Each start begins in the initial state of the": (
+        f"{_PEERS}a_controller_that_starts_again_begins_where_the_joint_is",
+    ),
+    (
+        "A core that reads the measured position in that state commands this position from the first "
+        "instant on."
+    ): (f"{_PEERS}a_controller_that_starts_again_begins_where_the_joint_is",),
+    "Or a step `configure` before the start clears the data.": (
+        f"{_PEERS}a_start_keeps_the_data_of_the_core_and_a_step_configure_clears_them",
+    ),
+    (
+        "**Here** a new core with a `take` goes on from the last command of the old core, and misses "
+        "no release."
+    ): (f"{_PEERS}a_core_that_takes_over_goes_on_with_the_command_of_the_one_before",),
+    "**Here** nothing goes back unless the component declares a `fallback` core.": (
+        f"{_PEERS_FAULTS}a_new_core_that_fails_is_reported_and_what_runs_then_is_what_was_declared",
+    ),
+    (
+        "Without a fallback, the component is `FAULTED`, its output is the declared one, and a start "
+        "is refused until the component is repaired."
+    ): (f"{_PEERS_FAULTS}a_new_core_that_fails_is_reported_and_what_runs_then_is_what_was_declared",),
+    "With a fallback, each list names the core that runs, and keeps the reason of the fault.": (
+        f"{_PEERS_FAULTS}a_new_core_that_fails_is_reported_and_what_runs_then_is_what_was_declared",
+    ),
+    "The takeover is an event: see": (
+        "ros/simulation/test_executor.py::test_a_fallback_core_that_took_over_is_an_event",
+    ),
     # ---- write a core
     "In C++ (`mauve_examples/tutorials/metronome.hpp` and `accelerando.hpp`): a shell, a core, an fsm.": (
         "python/project/test_readme_examples.py::test_listings_stand_in_the_sources",
@@ -1677,6 +1780,31 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "Users of ros2_control and dora reported these failures.",
+    "A test re-enacts each failure with components in the place of controllers.",
+    "Some failures are repaired there since; the links lead to the reports.",
+    "the loop activated the controllers itself, and some activations made it overrun.",
+    "a tool asked for the list of controllers every second, and the control loop missed cycles.",
+    "one controller of a chain failed to activate.",
+    "The other controllers of the chain followed a reference of zero, which nearly destroyed the robot.",
+    "a controller failed in its update and was deactivated.",
+    "The other controllers of the chain went on with an invalid reference.",
+    "one request activated some controllers and deactivated the controller before them.",
+    "The order was not the one that the user needed, and a controller that stayed active read NaN.",
+    "A component that is",
+    (
+        "after a failure of one controller, the fallbacks of all controllers of its chain were "
+        "activated, and were in conflict over resources."
+    ),
+    "a controller was activated a second time, after another controller.",
+    "It could send the command that was left from the first time.",
+    "a trajectory controller was activated after another controller had moved the joints.",
+    "The robot shook, although no command was sent.",
+    "The author of the core writes `take`: see",
+    "a reloaded operator may fail.",
+    "The proposal was to go back to the old operator.",
+    "A reviewer objected that a user may miss the warning, and think that the new version runs.",
+    "The mechanism is [prepare, commit, retire](replacing.md).",
     "The messages are:",
     "| value | topic |",
     "| key | effect |",

@@ -294,9 +294,6 @@ def test_a_controller_that_starts_again_begins_where_the_joint_is(running: Runni
     check_that_no_release_is_lost(running, of(log, "Joint"), "joint")
 
 
-# ---- ros-controls/ros2_controllers #1594: a joint that another controller has moved shakes on activation
-
-
 class ArmShell(Shell):
     command = write_port(Float64, on_stop="hold")
 
@@ -322,6 +319,28 @@ class Holds(Moves):
     """Stays where it is."""
 
     step = 0.0
+
+
+def test_a_start_keeps_the_data_of_the_core_and_a_step_configure_clears_them(
+    running: Running, log: list[Execution]
+):
+    running.stage.add("arm", ArmShell, Moves)
+    running.stage.share("command", SharedData(Float64), "arm.command.write")
+    running.deploy()
+    running.run_until(lambda: len(log) > 5)
+    running.host.commit(Transaction().stop("arm"))
+    last, executed = log[-1].value, len(log)
+    running.host.commit(Transaction().start("arm"))
+    running.run_until(lambda: len(log) > executed + 5)
+    assert log[executed].value == last + Moves.step
+    running.host.commit(Transaction().stop("arm"))
+    executed = len(log)
+    running.host.commit(Transaction().configure("arm").start("arm"))
+    running.run_until(lambda: len(log) > executed)
+    assert log[executed].value == Moves.step
+
+
+# ---- ros-controls/ros2_controllers #1594: a joint that another controller has moved shakes on activation
 
 
 def test_a_core_that_takes_over_goes_on_with_the_command_of_the_one_before(
