@@ -1394,6 +1394,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "may read the declared output of the stopped component.": (
         "Rule10Commit.ALateOneTakesTheChangeAtTheEndOfItsState",
     ),
+    "When this component has written, the second one connects the reader.": (
+        f"{_PEERS}a_controller_follows_a_planner_that_has_written_since_its_start",
+    ),
     "**Here** a fallback belongs to one component.": (f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",),
     "A fault puts in the fallback core of the failed component alone, at the next instant of its grid.": (
         f"{_PEERS_FAULTS}only_the_one_that_failed_falls_back",
@@ -1780,6 +1783,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "The other direction needs two transactions.",
+    "The first one starts the component that writes the reference.",
+    "With one transaction, a reader that executes first reads once the output that was left by the stop.",
     "Users of ros2_control and dora reported these failures.",
     "A test re-enacts each failure with components in the place of controllers.",
     "Some failures are repaired there since; the links lead to the reports.",

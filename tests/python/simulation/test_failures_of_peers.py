@@ -15,6 +15,7 @@ from controller_chains import (
     Execution,
     Noted,
     Planner,
+    PlannerShell,
     chain,
     check_that_no_release_is_lost,
     of,
@@ -198,6 +199,38 @@ def test_a_controller_that_stays_reads_one_reference_and_then_the_other(
     # A drive that is late on threads may read what the planner left: the declared zero, and never NaN.
     assert before <= ({Planner.value} if running.simulated else {Planner.value, 0.0})
     check_that_no_release_is_lost(running, of(log, "Controller"), "drive")
+
+
+@pytest.fixture
+def unchained(running: Running) -> Running:
+    """The drive, which executes before the planner in each instant, follows the teleoperation."""
+    stage = running.stage
+    for name, shell, core in (
+        ("drive", ControllerShell, Controller),
+        ("planner", PlannerShell, Planner),
+        ("teleop", HoldingShell, Teleop),
+    ):
+        stage.add(name, shell, core)
+    stage.share("planner", SharedData(Float64), "planner.reference.write")
+    stage.share("teleop", SharedData(Float64), "teleop.reference.write", "drive.reference.read")
+    stage.share("drive", SharedData(Float64), "drive.command.write")
+    running.deploy()
+    running.run_until(lambda: value_of(running, "drive") == Teleop.value)
+    running.host.commit(Transaction().stop("planner"))
+    return running
+
+
+def test_a_controller_follows_a_planner_that_has_written_since_its_start(
+    unchained: Running, log: list[Execution]
+):
+    """Two transactions: the planner starts, and when it has written, the drive reads it."""
+    running, begin = unchained, len(log)
+    running.host.commit(Transaction().start("planner"))
+    running.run_until(lambda: value_of(running, "planner") == Planner.value)
+    chain_it = Transaction().disconnect("drive", "reference")
+    running.host.commit(chain_it.connect("drive", "reference", "planner", "read"))
+    running.run_until(lambda: value_of(running, "drive") == Planner.value)
+    assert {execution.value for execution in of(log[begin:], "Controller")} <= {Teleop.value, Planner.value}
 
 
 # ---- ros-controls/ros2_controllers #1231: activated again, a controller sends a command of before
