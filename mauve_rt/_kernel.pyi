@@ -85,6 +85,7 @@ class FieldShape:
     is_array: Final[bool]
     is_fixed: Final[bool]  # an array of exactly `size`, not of at most
     size: Final[int]
+    offset: Final[int]  # in bytes, within its struct
     fields: Final[list[FieldShape]]  # of a message within the message
 
 @final
@@ -124,6 +125,7 @@ class ShellDescription:
     name: Final[str]
     ports: Final[list[PortDescription]]
     properties: Final[list[PropertyDescription]]
+    bytes: Final[int]  # of its class; 0: not written in C++
 
 @final
 class ServiceDescription:
@@ -234,6 +236,8 @@ class StepReport:
     released_ns: Final[int]  # the instant of the release that followed
     instant_ns: Final[int]  # T: the component executes with the change from this instant on
     release_ns: Final[int]  # nominal instant of the release that followed
+    taken: Final[list[str]]  # state fields that the new core took over
+    left: Final[list[str]]  # state fields that it did not, with the reason
 
 NOT_MEASURED: Final[int]
 
@@ -380,6 +384,12 @@ def given_resource_kinds() -> list[ResourceKind]:
     """The kinds that the kernel gives, in their order."""
 
 @final
+class PluginGeneration:
+    """Entries of a registry that are not in force: after begin_generation() those of before."""
+
+    def __init__(self) -> None: ...
+
+@final
 class PluginRegistry:
     def __init__(self) -> None: ...
     def load_library(self, path: str) -> None:
@@ -387,6 +397,17 @@ class PluginRegistry:
 
         A second call for one path does nothing.
         """
+    def begin_generation(self, number: int, replaced: PluginGeneration) -> None:
+        """Lets what is added take the place of entries of the same name, until end_generation()."""
+    def end_generation(self) -> None: ...
+    def drop(self, kind: str, name: str) -> None:
+        """Within a generation: takes out what the new code has no more."""
+    def exchange(self, other: PluginGeneration) -> None:
+        """Puts the kept entries in force and keeps those that go out."""
+    def generation_of(self, kind: str, name: str) -> int:
+        """1 as first loaded; 0: there is no such entry."""
+    def type_shapes(self) -> list[MessageShape]:
+        """The structs of the registered data types."""
     def add_python_core(self, name: str, shell: str, factory: Callable[[ShellView], object]) -> None:
         """factory(shell_view) -> core object.
 

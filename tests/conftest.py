@@ -3,12 +3,18 @@
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rebuilt_package import RebuiltPackage, compile_plugin, install_package, precompile, search_first
 
 from mauve_rt import _kernel
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.model.generations import CodeGenerations
+from mauve_rt.model.loaded_code import LoadedCode
+from mauve_rt.model.plugins import PluginLoader
 
 PLUGINS = Path(__file__).parent / "plugins"
 INSTALLED = (
@@ -33,6 +39,43 @@ def _install_plugins(prefix: Path, package: str) -> None:
         ],
         check=True,
     )
+
+
+@pytest.fixture(scope="session")
+def rebuilt_headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The precompiled headers of packages that tests build again."""
+    return precompile(tmp_path_factory.mktemp("headers"))
+
+
+@pytest.fixture(scope="session")
+def first_build(tmp_path_factory: pytest.TempPathFactory, rebuilt_headers: Path) -> Path:
+    """The library of reload_tests as it is loaded first."""
+    library = tmp_path_factory.mktemp("reload_tests") / "libreload_tests.so"
+    compile_plugin(rebuilt_headers, PLUGINS / "reload_tests.cpp", library)
+    return library
+
+
+@pytest.fixture
+def rebuilt(
+    tmp_path: Path, rebuilt_headers: Path, first_build: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RebuiltPackage]:
+    """The package reload_tests, which a test builds again; searched first."""
+    package = install_package(tmp_path, rebuilt_headers, first_build)
+    package.build_other()
+    for name, value in search_first(package).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.syspath_prepend(str(package.modules))
+    loaded = LoadedCode()  # another test's package of the same name has nothing to do with this one
+    for owner, name, value in (
+        (Runtime, "registry", _kernel.PluginRegistry()),
+        (PluginLoader, "_loaded", loaded),
+        (PluginLoader, "_sources", {}),
+        (PluginLoader, "generations", CodeGenerations(loaded)),
+    ):
+        monkeypatch.setattr(owner, name, value)
+    yield package
+    for name in [name for name in sys.modules if name.startswith("reload_tests_")]:
+        del sys.modules[name]
 
 
 @pytest.fixture(scope="session")

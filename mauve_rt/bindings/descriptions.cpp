@@ -147,6 +147,7 @@ void bind_descriptions(py::module_& module) {
       .def_property_readonly("is_fixed",
                              [](const FieldShape& self) { return self.arity == FieldArity::fixed; })
       .def_readonly("size", &FieldShape::size)
+      .def_readonly("offset", &FieldShape::offset)
       .def_readonly("fields", &FieldShape::fields);
   py::class_<MessageShape>(module, "MessageShape")
       .def_readonly("type", &MessageShape::type)
@@ -181,7 +182,8 @@ void bind_descriptions(py::module_& module) {
   py::class_<ShellDescription>(module, "ShellDescription")
       .def_readonly("name", &ShellDescription::name)
       .def_readonly("ports", &ShellDescription::ports)
-      .def_readonly("properties", &ShellDescription::properties);
+      .def_readonly("properties", &ShellDescription::properties)
+      .def_readonly("bytes", &ShellDescription::bytes);
   py::class_<ServiceDescription>(module, "ServiceDescription")
       .def_readonly("name", &ServiceDescription::name)
       .def_readonly("kind", &ServiceDescription::kind)

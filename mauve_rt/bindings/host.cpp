@@ -128,7 +128,9 @@ void bind_reports(py::module_& module) {
       .def_readonly("shift_ns", &StepReport::shift_ns)
       .def_readonly("released_ns", &StepReport::released_ns)
       .def_readonly("instant_ns", &StepReport::instant_ns)
-      .def_readonly("release_ns", &StepReport::release_ns);
+      .def_readonly("release_ns", &StepReport::release_ns)
+      .def_readonly("taken", &StepReport::taken)
+      .def_readonly("left", &StepReport::left);
   py::class_<RealtimeStatus>(module, "RealtimeStatus")
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);

@@ -2,6 +2,9 @@
 // Cores written in Python. Their methods run on the component's own thread under the interpreter's lock.
 #include "python_core.hpp"
 
+#include <algorithm>
+#include <cstring>
+
 namespace mauve::bindings {
 
 PythonCore::~PythonCore() {
@@ -57,7 +60,54 @@ void PythonCore::take(CoreBase& old) noexcept {
       if (py::hasattr(object(), "take")) object().attr("take")(object_of(old));
     });
   } catch (const std::exception& failure) {
-    take_failure_ = std::make_unique<std::string>(std::string("take failed: ") + failure.what());
+    note_failure(failure);
+  }
+}
+
+void PythonCore::note_failure(const std::exception& failure) noexcept {
+  if (take_failure_ != nullptr) return;  // the first one is the cause
+  take_failure_ = std::make_unique<std::string>(std::string("take failed: ") + failure.what());
+}
+
+std::vector<StateField> PythonCore::state_fields() {
+  return in_python([this] {
+    if (cells_) return fields_;
+    make();
+    cells_.set(py::module_::import("mauve_rt.parts.state_fields").attr("StateCells")(object()));
+    constexpr std::size_t kAlignment = 8;
+    std::size_t size = 0;
+    for (const py::handle& field : cells_.get().attr("fields"))
+      size += (field.cast<py::tuple>()[2].cast<std::size_t>() + kAlignment - 1) / kAlignment * kAlignment;
+    block_.resize(size);
+    std::byte* place = block_.data();
+    for (const py::handle& each : cells_.get().attr("fields")) {
+      const auto field = each.cast<py::tuple>();
+      const auto bytes = field[2].cast<std::size_t>();
+      fields_.push_back({field[0].cast<std::string>(), field[1].cast<std::string>(), place, bytes});
+      place += (bytes + kAlignment - 1) / kAlignment * kAlignment;
+    }
+    return fields_;
+  });
+}
+
+bool PythonCore::store_state() noexcept {
+  try {
+    return on_component([this] {
+      const auto stored = cells_.get().attr("store")().cast<py::tuple>();
+      const std::string_view block = stored[0].cast<std::string_view>();
+      std::memcpy(block_.data(), block.data(), std::min(block.size(), block_.size()));
+      return stored[1].cast<bool>();
+    });
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+void PythonCore::load_state() noexcept {
+  try {
+    on_component([this] { cells_.get().attr("load")(to_bytes(block_)); });
+  } catch (const std::exception& failure) {
+    note_failure(failure);
   }
 }
 

@@ -152,9 +152,17 @@ void bind_registry(py::module_& module) {
              return made;
            }),
            py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"));
+  py::class_<PluginGeneration, std::shared_ptr<PluginGeneration>>(module, "PluginGeneration")
+      .def(py::init<>());
   py::class_<PluginRegistry>(module, "PluginRegistry")
       .def(py::init<>())
       .def("load_library", &PluginRegistry::load_library, py::arg("path"))
+      .def("begin_generation", &PluginRegistry::begin_generation, py::arg("number"), py::arg("replaced"))
+      .def("end_generation", &PluginRegistry::end_generation)
+      .def("drop", &PluginRegistry::drop, py::arg("kind"), py::arg("name"))
+      .def("exchange", &PluginRegistry::exchange, py::arg("other"))
+      .def("generation_of", &PluginRegistry::generation_of, py::arg("kind"), py::arg("name"))
+      .def("type_shapes", &PluginRegistry::type_shapes)
       .def(
           "add_python_core",
           [](PluginRegistry& self, const std::string& name, const std::string& shell, py::object factory) {
@@ -202,7 +210,8 @@ void bind_registry(py::module_& module) {
           [](const PluginRegistry& self, const std::string& name) {
             const py::gil_scoped_release release;  // ports have locks of their own
             const auto shell = self.make_shell(name);
-            return ShellDescription{name, describe_ports(*shell), describe_properties(*shell)};
+            return ShellDescription{name, describe_ports(*shell), describe_properties(*shell),
+                                    shell->bytes()};
           },
           py::arg("name"))
       .def(

@@ -123,6 +123,7 @@ struct ShellDescription {
   std::string name;
   std::vector<PortDescription> ports;
   std::vector<PropertyDescription> properties;
+  std::size_t bytes{0};  // of its class; 0: not written in C++
 };
 
 /// An architecture with the registry it makes its parts from.

@@ -1,6 +1,7 @@
 """What `mauve list` prints: what runs, which cores, what is connected; three tables that 80 columns hold."""
 
 from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 from rich import box
@@ -72,10 +73,22 @@ def _components(reply: Any) -> Table:
 
 def _cores(reply: Any) -> Table:
     table = _table("component", "core, others it takes")
+    table.add_column("generation", no_wrap=True)
+    table.add_column("built", no_wrap=True)
     for component in reply.components:
         others = component.alternatives if component.reconfigurable else ["(protected)"]
-        table.add_row(component.name, "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)]))
+        cores = "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)])
+        table.add_row(component.name, cores, str(component.generation or "-"), _built(component.built_ns))
     return table
+
+
+def _built(built_ns: int) -> str:
+    """When the code of a core was built: the time of today, else the date."""
+    if built_ns == 0:
+        return "-"
+    built = datetime.fromtimestamp(built_ns / 1e9, tz=UTC).astimezone()
+    is_of_today = built.date() == datetime.now(tz=UTC).astimezone().date()
+    return built.strftime("%H:%M:%S" if is_of_today else "%Y-%m-%d %H:%M")
 
 
 def _connections(reply: Any) -> Table:

@@ -106,6 +106,26 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     _add_phase_timeout(parser)
 
 
+def _add_reload(parser: argparse.ArgumentParser) -> None:
+    add_executor_and_json(parser)
+    targets = parser.add_argument(
+        "target",
+        nargs="*",
+        help="package or component whose code is loaded anew (default: all that was rebuilt)",
+    )
+    completed_by(targets, complete_components)
+    parser.add_argument(
+        "--back", action="store_true", help="put the code of before the last reload in force again"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="try and check the new code in a process of its own only"
+    )
+    _add_record(parser)
+    _add_timeout(parser)
+    _add_force(parser)
+    _add_phase_timeout(parser)
+
+
 def _add_set(parser: argparse.ArgumentParser) -> None:
     add_executor_and_json(parser)
     name = parser.add_argument("property", type=_property, help="COMPONENT.PROPERTY, e.g. control.max_speed")
@@ -195,6 +215,21 @@ def _reconfigure(args: argparse.Namespace) -> int:
     )
 
 
+def _reload(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import Reload  # noqa: PLC0415
+
+    return _request(
+        args,
+        Reload,
+        "reload",
+        targets=args.target,
+        back=args.back,
+        dry_run=args.dry_run,
+        commit_timeout_s=args.timeout,
+        force=args.force,
+    )
+
+
 def _set(args: argparse.Namespace) -> int:
     from mauve_msgs.msg import ReconfigurationStep  # noqa: PLC0415
     from mauve_msgs.srv import Reconfigure  # noqa: PLC0415
@@ -226,7 +261,7 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
     if args.json:
         print_json(reply)
     elif reply.success:
-        print("\n  ".join([reply.message, *report_lines(reply.report)]))
+        print("\n  ".join([reply.message, *getattr(reply, "loaded", ()), *report_lines(reply.report)]))
     else:
         print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
     return OK if reply.success else REFUSED
@@ -371,6 +406,7 @@ VERBS = (
         _replace_core,
     ),
     Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
+    Verb("reload", "load rebuilt code into a running executor, or go back", _add_reload, _reload),
     Verb("events", "show the reconfigurations of an executor as they happen", add_executor_and_json, _events),
     Verb("nodes", "list the executors that can be reached", _add_json, _nodes),
     Verb(

@@ -65,8 +65,12 @@ def report_lines(report: Sequence[Any]) -> list[str]:
                 facts.append("the next release has not come yet")
         elif step.instant_ns != none and step.release_ns == none and step.remark:
             facts.append(step.remark)  # the component is late
+        if step.taken:
+            facts.append(f"took over {', '.join(step.taken)}")
         if step.phase_actual_ns != none:
             facts.append(_next_release(step))
+        if step.left:
+            facts.append(f"not taken over: {'; '.join(step.left)}")
         if len(report) > 1:
             subject = f"{step.component}: " if step.component else ""
             lines.append(f"{subject}{step.step}" + (f": {', '.join(facts)}" if facts else ""))

@@ -3,7 +3,7 @@
 import math
 
 from mauve_rt._kernel import ComponentDescription
-from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Request
+from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, ReloadOrder, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
@@ -14,6 +14,7 @@ MAX_TEXT = 1000
 MAX_VALUE = 20_000
 MAX_STEPS = 100
 MAX_TOPICS = 100
+MAX_TARGETS = 100
 MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
 MIN_SPLIT_BYTES = 100_000
 
@@ -38,6 +39,9 @@ def check_form(request: Request) -> None:
         raise RefusalError(Code.INVALID, f"the value of a step is longer than {MAX_VALUE} characters")
     if request.recording is not None:
         _check_recording(request.recording)
+        return
+    if request.reload is not None:
+        _check_reload(request.reload)
         return
     if not 1 <= len(request.steps) <= MAX_STEPS:
         found = f"of {len(request.steps)} steps" if request.steps else "without a step"
@@ -73,6 +77,12 @@ def check_revision(request: Request, runtime: Runtime) -> None:
     if request.expected_revision not in (0, revision):
         text = f"the architecture is at revision {revision}, the request expected {request.expected_revision}"
         raise RefusalError(Code.WRONG_REVISION, f"{text}; read ~/state, then ask again")
+
+
+def _check_reload(order: ReloadOrder) -> None:
+    if len(order.targets) > MAX_TARGETS or any(len(text) > MAX_TEXT for text in order.targets):
+        text = f"expected at most {MAX_TARGETS} targets, and none longer than {MAX_TEXT} characters"
+        raise RefusalError(Code.INVALID, text)
 
 
 def _check_recording(order: RecordingOrder) -> None:

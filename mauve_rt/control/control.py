@@ -10,16 +10,19 @@ from mauve_rt._kernel import (
     Committed,
     ComponentDescription,
     ResourceDescription,
+    Transaction,
     monotonic_ns,
 )
 from mauve_rt.control.checks import check_form, check_revision, check_state, check_time
 from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.reloads import Reload
 from mauve_rt.control.reports import Following, message_of, reports_of
 from mauve_rt.control.requests import (
     Code,
     Outcome,
     RecordingOrder,
     RefusalError,
+    ReloadOrder,
     Report,
     Request,
     RequestLog,
@@ -159,6 +162,8 @@ class Control:
             check_form(request)
             if request.recording is not None:
                 outcome = self._order(request, request.recording)
+            elif request.reload is not None:
+                outcome = self._reload(request, request.reload, parts, kernel_revision=kernel_revision)
             else:
                 outcome = self._carry_out(request, parts, kernel_revision=kernel_revision)
         except RefusalError as refusal:
@@ -168,7 +173,7 @@ class Control:
         except BaseException as error:  # noqa: BLE001 - whatever it is, it must not cost the requester the answer
             outcome = Outcome(code=Code.PREPARE_FAILED, message=internal_error_text(error))
         after = self._runtime.observe(
-            changed_since=revision if outcome.success and request.steps and not request.dry_run else None
+            changed_since=revision if outcome.success and _is_change(request, outcome) else None
         )
         return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core).cut()
 
@@ -186,28 +191,62 @@ class Control:
             if not request.dry_run:
                 return self._start_or_stop(step, request)
         with self._bound(plan.bound, dry_run=request.dry_run):
-            committed = self._commit(plan, request, kernel_revision=kernel_revision)
+            committed = self._commit(plan.transaction, request, kernel_revision=kernel_revision)
         if request.dry_run:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
         self._runtime.declare(added=plan.added, removed=plan.removed)
         self._taken = plan.taken
+        return self._followed(Outcome(code=Code.OK, message=""), committed, request.steps)
+
+    def _reload(
+        self,
+        request: Request,
+        order: ReloadOrder,
+        parts: Sequence[ComponentDescription],
+        *,
+        kernel_revision: int,
+    ) -> Outcome:
+        check_time(request, self._runtime)
+        reload = Reload(self._runtime, order, parts)
+        found = reload.load(dry_run=request.dry_run)
+        if reload.generation is None:
+            prefix = "dry run: would be accepted; " if request.dry_run else ""
+            return Outcome(code=Code.OK, message=prefix + found)
+        steps, transaction = reload.steps()
+        try:
+            committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
+        except BaseException:
+            reload.undo()
+            raise
+        reload.commit()
+        outcome = Outcome(
+            code=Code.OK, message=reload.message(steps), loaded=reload.generation.loaded, report=()
+        )
+        return outcome if committed is None else self._followed(outcome, committed, tuple(steps))
+
+    def _followed(self, outcome: Outcome, committed: Committed, steps: tuple[Step, ...]) -> Outcome:
+        """The outcome with the report of its change, which may lack the releases that follow."""
         measured = committed.report()
-        report, pending = reports_of(request.steps, measured), None
-        if not measured.is_complete and (timeout_ns := self._phase_timeout_of(request)) > 0:
-            pending = Following(committed, request.steps, monotonic_ns() + timeout_ns)
-        message = message_of(request.steps, measured)
-        return Outcome(code=Code.OK, message=message, report=report, pending=pending)
+        pending = None
+        if not measured.is_complete and (timeout_ns := self._phase_timeout_of(steps)) > 0:
+            pending = Following(committed, steps, outcome.message, monotonic_ns() + timeout_ns)
+        return replace(
+            outcome,
+            message=message_of(steps, measured, outcome.message),
+            report=reports_of(steps, measured),
+            pending=pending,
+        )
 
     def _still_taken(self, parts: Sequence[ComponentDescription]) -> dict[str, int]:
         there = {*self._runtime.resources(), *(part.name for part in parts)}
         return {name: taken for name, taken in self._taken.items() if name in there}
 
-    def _commit(self, plan: Plan, request: Request, *, kernel_revision: int) -> Committed:
+    def _commit(self, transaction: Transaction, request: Request, *, kernel_revision: int) -> Committed:
         try:
-            plan.transaction.by(request.author)
+            transaction.by(request.author)
             return self._runtime.host.make(
-                plan.transaction,
+                transaction,
                 dry_run=request.dry_run,
                 expected_revision=kernel_revision if request.expected_revision else 0,
                 commit_timeout_ns=_timeout_ns(request),
@@ -250,9 +289,9 @@ class Control:
         outside.remove(bound.removed)
         outside.attach(opened)
 
-    def _phase_timeout_of(self, request: Request) -> int:
+    def _phase_timeout_of(self, steps: Sequence[Step]) -> int:
         """Of a property alone nobody wants to know the phase."""
-        only_properties = all(step.kind == "set_property" for step in request.steps)
+        only_properties = all(step.kind == "set_property" for step in steps)
         return 0 if only_properties else self._phase_timeout_ns
 
     def _start_or_stop(self, step: Step, request: Request) -> Outcome:
@@ -267,6 +306,10 @@ class Control:
             message = f"component '{step.target}' is started"
         self._runtime.architecture.note_author(step.target, "state", request.author)
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
+
+
+def _is_change(request: Request, outcome: Outcome) -> bool:
+    return bool(request.steps or outcome.report) and not request.dry_run
 
 
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:

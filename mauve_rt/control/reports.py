@@ -15,6 +15,7 @@ class Following:
 
     committed: Committed
     steps: tuple[Step, ...]
+    done: str  # what was done, in words; empty: as the steps say
     until_ns: int
 
     def look(self, outcome: Outcome, *, wait_ns: int) -> Outcome:
@@ -24,17 +25,17 @@ class Following:
         is_over = measured.is_complete or left_ns <= wait_ns
         return replace(
             outcome,
-            message=message_of(self.steps, measured),
+            message=message_of(self.steps, measured, self.done),
             report=reports_of(self.steps, measured),
             pending=None if is_over else outcome.pending,
         )
 
 
-def message_of(steps: tuple[Step, ...], measured: TransactionReport) -> str:
+def message_of(steps: tuple[Step, ...], measured: TransactionReport, done: str = "") -> str:
     """What was done, in one line, and which components are known to have missed releases for it."""
     # Every step of a component tells of all that it missed.
     missed = {report.component: report for report in measured.steps if report.missed_releases > 0}
-    return "; ".join([_done(steps, measured), *(_missed(report) for report in missed.values())])
+    return "; ".join([done or _done(steps, measured), *(_missed(report) for report in missed.values())])
 
 
 def _missed(report: StepReport) -> str:
@@ -93,4 +94,6 @@ def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: b
         remark=measured.remark,
         instant_ns=measured.instant_ns,
         release_ns=measured.release_ns,
+        taken=tuple(measured.taken),
+        left=tuple(measured.left),
     )

@@ -19,6 +19,7 @@ __all__ = [
     "Outcome",
     "RecordingOrder",
     "RefusalError",
+    "ReloadOrder",
     "Report",
     "Request",
     "RequestLog",
@@ -60,6 +61,7 @@ class RefusalError(Exception):
         self.code = code
 
 
+BY_RELOAD = "reload by "  # how the author begins of a reload's changes
 BY_RULE = "rule "  # how the author begins of what a rule does
 
 
@@ -82,11 +84,23 @@ class RecordingOrder:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ReloadOrder:
+    """Load code anew, or go back; as mauve_msgs/srv/Reload."""
+
+    targets: tuple[str, ...] = ()  # packages and components; none: all that was rebuilt
+    back: bool = False
+
+    def __str__(self) -> str:
+        return cut(" ".join(("reload", *self.targets)) + " back" * self.back, _LONGEST_WORDS)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Request:
-    """What somebody asked for, whichever service it came by: steps, or an order to the recording."""
+    """What somebody asked for, by any service: steps, an order to the recording, or a reload."""
 
     steps: tuple[Step, ...] = ()
     recording: RecordingOrder | None = None
+    reload: ReloadOrder | None = None
     request_id: str = ""
     expected_revision: int = 0
     requested_by: str = ""
@@ -102,6 +116,8 @@ class Request:
     def __str__(self) -> str:
         if self.recording is not None:
             return str(self.recording)
+        if self.reload is not None:
+            return str(self.reload) + " (dry run)" * self.dry_run
         words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
         return words + " by force" * self.force + " (dry run)" * self.dry_run
 
@@ -115,7 +131,7 @@ class Request:
         """Who makes the change, for `mauve list` and for rules that look whether they did it."""
         if self.rule:
             return f"{BY_RULE}{self.rule}"
-        who = self.requested_by or "a request"
+        who = (BY_RELOAD if self.reload is not None else "") + (self.requested_by or "a request")
         return cut(f"{who}: {self.cause}" if self.cause else who, SHOWN_STEP)
 
     def texts(self) -> Iterator[str]:
@@ -125,6 +141,8 @@ class Request:
             yield from (step.kind, step.target, step.name, step.value)
         if self.recording is not None:
             yield from (self.recording.bag, *self.recording.topics, *self.recording.values)
+        if self.reload is not None:
+            yield from self.reload.targets
 
     def digest(self) -> bytes:
         """Of its contents: equal where two requests are, for all that anybody will ever see."""
@@ -147,6 +165,8 @@ class Report:
     remark: str = ""
     instant_ns: int = NOT_MEASURED
     release_ns: int = NOT_MEASURED
+    taken: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +180,7 @@ class Outcome:
     from_core: str = ""
     to_core: str = ""
     bag: str = ""  # of an order to the recording
+    loaded: tuple[str, ...] = ()  # of a reload: libraries and modules
     pending: "Pending | None" = field(default=None, compare=False, repr=False)  # what its report lacks still
     replayed: bool = field(default=False, compare=False)  # the first outcome of a repeated request_id
 

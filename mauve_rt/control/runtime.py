@@ -292,6 +292,12 @@ class Runtime:
                 self._declared = self._with_cores(declared, PluginLoader(self.registry, self.index))
             yield PluginLoader(self.registry, self.index)
 
+    def code_of(self, core: str) -> tuple[int, int]:
+        """The generation of a core's code, and when its file was written (ns since 1970; 0: not known)."""
+        loader = PluginLoader(self.registry, self.index)
+        source = loader.source_of("core", core)
+        return self.registry.generation_of("core", core), PluginLoader.built_ns(source)
+
     def declared(self, component: str) -> ComponentModel | None:
         """What the file, or the request that added it, says of a component; None while it is being added."""
         declared = self._declared.get(component)
@@ -302,6 +308,12 @@ class Runtime:
         model, declared = self._model, self._declared.get(component)
         everybodys = DiagnosticsModel() if model is None else model.diagnostics
         return everybodys if declared is None else everybodys.overridden_by(declared.model.diagnostics)
+
+    def loaded_anew(self) -> None:
+        """Code was loaded anew: look up again which shell each core was written for."""
+        declared = {name: known.model for name, known in self._declared.items()}
+        with self.loading() as loader:
+            self._declared = self._with_cores(declared, loader)
 
     def declare(self, *, added: Mapping[str, ComponentModel], removed: Collection[str]) -> None:
         """Note what a transaction added and removed."""

@@ -27,9 +27,16 @@ _MAX_PRIORITY = 255
 
 
 def component_info(
-    component: ComponentDescription, *, alternatives: list[str], authors: Mapping[str, str]
+    component: ComponentDescription,
+    *,
+    alternatives: list[str],
+    authors: Mapping[str, str],
+    code: tuple[int, int] = (0, 0),
 ) -> Any:
-    """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element."""
+    """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element.
+
+    `code`: generation of the core's code, and when it was built.
+    """
     return ComponentInfo(
         name=component.name,
         shell=component.shell,
@@ -53,6 +60,8 @@ def component_info(
         **_state_age(component),
         structural=[item.name for item in component.properties if item.structural],
         deadline_ns=component.deadline_ns,
+        generation=code[0],
+        built_ns=code[1],
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
@@ -87,7 +96,12 @@ def component_infos(runtime: Runtime) -> list[Any]:
 def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription]) -> list[Any]:
     authors = runtime.authors()
     return [
-        component_info(part, alternatives=runtime.cores_of(part), authors=authors.get(part.name, {}))
+        component_info(
+            part,
+            alternatives=runtime.cores_of(part),
+            authors=authors.get(part.name, {}),
+            code=runtime.code_of(part.core),
+        )
         for part in components
     ]
 
@@ -155,7 +169,8 @@ def architecture_state(
 
 def step_reports(outcome: Outcome) -> list[Any]:
     """StepReport of every step."""
-    return [StepReport(**vars(report)) for report in outcome.report]
+    lists = [(report, {"taken": list(report.taken), "left": list(report.left)}) for report in outcome.report]
+    return [StepReport(**{**vars(report), **of_state}) for report, of_state in lists]
 
 
 def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:

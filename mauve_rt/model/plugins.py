@@ -13,14 +13,15 @@ a process import anything else.
 """
 
 import importlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from mauve_rt._kernel import PluginRegistry
+from mauve_rt._kernel import PluginRegistry, given_resource_kinds
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
-from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp, module_files
+from mauve_rt.model.generations import CodeGenerations, Generation, Name, Source
+from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp
 from mauve_rt.model.words import did_you_mean, nearest, shown
 from mauve_rt.parts import ament_index
 
@@ -151,7 +152,8 @@ class PluginLoader:
 
     # One for the process, as libraries and modules are.
     _loaded = LoadedCode()
-    _sources: ClassVar[dict[tuple[str, str], str]] = {}  # of what was loaded; the index may list it no longer
+    _sources: ClassVar[dict[Name, str]] = {}  # of what was loaded; the index may list it no longer
+    generations = CodeGenerations(_loaded)
 
     def __init__(self, registry: PluginRegistry, index: PluginIndex) -> None:
         self.registry = registry
@@ -187,6 +189,8 @@ class PluginLoader:
             raise PluginError(f"{kind} '{name}': {change}", element=name, remedy=REMEDY)
         if name in self.registry.names(kind):
             return
+        if text := self.generations.outdated.get((kind, name)):
+            raise PluginError(f"{kind} '{name}': {text}", element=name, remedy="build its package, reload it")
         if plugin is None:
             raise self._not_installed(kind, name)
         before = self._registered()
@@ -194,13 +198,69 @@ class PluginLoader:
             self._add_python_part(plugin)
         else:
             self._load_library(plugin)
-        self._sources.update(dict.fromkeys(self._registered() - before, plugin.source))
+        self._note_sources(before, plugin.source)
         if name not in self.registry.names(kind):
             remedy = "correct the package's list of plug-ins"
             raise PluginError(f"{plugin.library} has no {kind} '{name}'", element=name, remedy=remedy)
 
-    def _registered(self) -> set[tuple[str, str]]:
-        return {(kind, name) for kind in KINDS for name in self.registry.names(kind)}
+    def loaded_sources(self) -> list[Source]:
+        """The libraries and modules that plug-ins were loaded from, with what they register."""
+        names: dict[str, set[Name]] = {}
+        for name, source in self._sources.items():
+            names.setdefault(source, set()).add(name)
+        return [
+            Source(target=target, names=frozenset(found), is_python=not target.endswith(".so"))
+            for target, found in names.items()
+        ]
+
+    def source_of(self, kind: str, name: str) -> str:
+        """The library or module that a plug-in was loaded from; empty: it was not."""
+        return self._sources.get((kind, name), "")
+
+    @classmethod
+    def built_ns(cls, source: str) -> int:
+        """When the newest loaded file of a library or module was written, ns since 1970; 0: not known."""
+        return cls._loaded.built_ns(source)
+
+    def reload(
+        self, sources: Collection[Source], *, in_use: Collection[Name], dry_run: bool = False
+    ) -> Generation | None:
+        """Try and load the code of these sources anew; it is in force for the registry then.
+
+        `in_use`: parts that components have now. Returns None after a dry run.
+
+        Raises:
+            PluginError: nothing has changed then.
+        """
+        before = self._registered()
+        generation = self.generations.load(
+            tuple(sources),
+            self.registry,
+            in_use=in_use,
+            in_python={(plugin.kind, plugin.name) for plugin in self.index if plugin.is_python},
+            add_python_parts=self._add_parts_of,
+            dry_run=dry_run,
+        )
+        if generation is not None:
+            for source in sources:
+                self._note_sources(before, source.target)
+        return generation
+
+    def _note_sources(self, before: set[Name], source: str) -> None:
+        self._sources.update(
+            (name, source) for name in self._registered() - before if name not in self._sources
+        )
+
+    def _add_parts_of(self, module: str, loaded: Any) -> None:
+        """Register the parts of a module that was loaded anew, as far as they were loaded before."""
+        for plugin in self.index:
+            if plugin.source == module and (plugin.kind, plugin.name) in self._sources:
+                self._register_python(plugin, _class_of(plugin, loaded))
+
+    def _registered(self) -> set[Name]:
+        """What libraries and modules have registered. The given kinds of resources come with a first type."""
+        given = {("resource", kind.name) for kind in given_resource_kinds()}
+        return {(kind, name) for kind in KINDS for name in self.registry.names(kind)} - given
 
     def _not_installed(self, kind: str, name: str) -> PluginError:
         if package := self.missing_package(name):
@@ -238,8 +298,11 @@ class PluginLoader:
     def _add_python_part(self, plugin: Plugin) -> None:
         if plugin.shell:
             self.require("shell", plugin.shell)
-        part = _python_class(plugin)
-        self._loaded.note(plugin.source, module_files(plugin.source))
+        part = _python_class(plugin, self.generations)
+        self._loaded.note(plugin.source, self.generations.module_files(plugin.source))
+        self._register_python(plugin, part)
+
+    def _register_python(self, plugin: Plugin, part: Any) -> None:
         if plugin.kind == "core":
             from mauve_rt.parts.cores import core_factory  # noqa: PLC0415
 
@@ -252,11 +315,24 @@ class PluginLoader:
             self.registry.resource(plugin.name, part)
 
 
-def _python_class(plugin: Plugin) -> Any:
-    module_name, _, class_name = plugin.target.partition(":")
+def _python_class(plugin: Plugin, generations: CodeGenerations) -> Any:
     try:
         importlib.invalidate_caches()  # it may have been installed a moment ago
-        found = getattr(importlib.import_module(module_name), class_name)
+        module = generations.module_of(plugin.source) or importlib.import_module(plugin.source)
+    except BaseException as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
+        text = f"{plugin.kind} '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
+        raise PluginError(text, element=plugin.name) from None
+    return _class_of(plugin, module)
+
+
+def _class_of(plugin: Plugin, module: Any) -> Any:
+    """The class of a plug-in in its module.
+
+    Raises:
+        PluginError: there is none, or one of another base.
+    """
+    try:
+        found = getattr(module, plugin.target.partition(":")[2])
     except BaseException as error:  # noqa: BLE001 - whatever a module of somebody else raises on import
         text = f"{plugin.kind} '{plugin.name}': cannot load {plugin.target}: {exception_text(error)}"
         raise PluginError(text, element=plugin.name) from None

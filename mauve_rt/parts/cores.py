@@ -20,7 +20,7 @@ What they raise is a fault of the component, with its traceback; all others run 
 is a plain `Core`; list it in the package's `mauve_rt_plugins` (see `mauve_rt.model.plugins`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, get_args
 
 from mauve_rt._kernel import PartFactory, ShellView
@@ -49,6 +49,10 @@ class Core(Configurable, Generic[ShellT]):
     """The time that adopt and take need together. A change with less left before the next release waits for
     the next wait. An adopt that takes longer is refused. After a longer adopt and take the component is
     FAULTED. 0: none is declared, and no time is checked."""
+
+    state_fields: ClassVar[Mapping[str, str]] = {}
+    """Attributes that a core which replaces this one takes over, with types: {"integral": "float64"}. Each is
+    copied before take, where the other core, in Python or C++, has a field of the same name and type."""
 
     _shell_class: ClassVar[type[Any]] = Shell
 

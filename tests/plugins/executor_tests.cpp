@@ -78,6 +78,8 @@ struct StepReport {
   mauve::BoundedString<128> remark;
   std::int64_t instant_ns{};
   std::int64_t release_ns{};
+  mauve::BoundedVector<mauve::BoundedString<64>, 4> taken;
+  mauve::BoundedVector<mauve::BoundedString<64>, 4> left;
 };
 
 struct Stop {
@@ -123,7 +125,7 @@ MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request
            requested_by, cause, component, timeout_s, force)
 MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
            missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
-           release_ns)
+           release_ns, taken, left)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
            instance_id, revision, report)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")

@@ -83,6 +83,8 @@ struct Report {
   mauve::BoundedString<16> remark;
   std::int64_t instant_ns{};
   std::int64_t release_ns{};
+  mauve::BoundedVector<mauve::BoundedString<64>, 4> taken;
+  mauve::BoundedVector<mauve::BoundedString<64>, 4> left;
 };
 
 struct Large {
@@ -106,7 +108,7 @@ MAUVE_TYPE(misfits::TriggerResponse, "std_srvs/srv/Trigger_Response", message, s
 MAUVE_CALL_TYPE(misfits::Trigger, "std_srvs/srv/Trigger")
 MAUVE_TYPE(misfits::Report, "mauve_msgs/msg/StepReport", step, component_name, prepare_ns, blackout_ns,
            missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
-           release_ns)
+           release_ns, taken, left)
 MAUVE_TYPE(misfits::Large, "misfits/Large", data)
 
 namespace misfits {

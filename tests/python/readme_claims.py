@@ -26,7 +26,7 @@ PAGES_OF_CLAIMS = (
     ),
     *(
         f"docs/howto/{name}.md"
-        for name in ("install", "operate", "record_and_report", "see_values", "write_a_core")
+        for name in ("install", "operate", "record_and_report", "reload_code", "see_values", "write_a_core")
     ),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
@@ -36,6 +36,8 @@ _REPORT = "python/trace/report/test"
 _PEERS = "python/simulation/test_failures_of_peers.py::test_"
 _PEERS_FAULTS = "python/simulation/test_faults_of_peers.py::test_"
 _KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
+
+_RELOAD = "python/control/test_reload.py::test"
 
 CLAIMS: dict[str, tuple[str, ...]] = {
     # ---- the beginning
@@ -585,10 +587,143 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "A class installed meanwhile is found": (
         "ros/executor/test_plugins_installed_anew.py::test_a_core_installed_meanwhile_is_taken",
     ),
-    "Code that was rebuilt since the executor loaded it is refused until it starts anew.": (
+    "Rebuilt code is [loaded by `mauve reload`](reload_code.md).": (
+        "ros/executor/test_reload.py::test_the_commands_of_the_page",
+    ),
+    # ---- rebuilt code
+    "mauve reload /robot_1/executor # all code that was rebuilt since it was loaded": (
+        "ros/executor/test_reload.py::test_the_commands_of_the_page",
+    ),
+    "mauve reload /robot_1/executor my_robot # one package; a component's name serves as well": (
+        "ros/executor/test_reload.py::test_the_commands_of_the_page",
+        f"{_RELOAD}_a_module_comes_with_the_modules_that_it_uses",
+    ),
+    "mauve list /robot_1/executor # the generation of each core, and when it was built": (
+        "ros/executor/test_reload.py::test_the_commands_of_the_page",
+    ),
+    "mauve reload /robot_1/executor --back # the code of before": (
+        "ros/executor/test_reload.py::test_the_commands_of_the_page",
+        f"{_RELOAD}_there_is_a_way_back_and_forward_again",
+    ),
+    "A reload reads the lists of plug-ins again.": (
+        "ros/executor/test_reload.py::test_a_core_that_is_new_in_the_package",
+    ),
+    "It loads each rebuilt library as a private copy, in addition to the old one.": (
+        f"{_RELOAD}_the_file_may_be_overwritten_while_its_copy_runs",
+    ),
+    "A build may overwrite the file at any time.": (
+        f"{_RELOAD}_the_file_may_be_overwritten_while_its_copy_runs",
+    ),
+    (
+        "A rebuilt Python module is loaded under a name of its own, together with the modules of "
+        "the workspace that it uses."
+    ): (f"{_RELOAD}_a_module_comes_with_the_modules_that_it_uses",),
+    "One transaction then replaces the parts of all components that use the code.": (
+        f"{_RELOAD}_rebuilt_code_is_put_in_force",
+        "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "`adopt` and `take` are called as in any replacement, and no release is missed.": (
+        f"{_RELOAD}_rebuilt_code_is_put_in_force",
+        "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "Each reload makes a **generation**.": (f"{_RELOAD}_there_is_a_way_back_and_forward_again",),
+    "Nothing that was loaded is ever closed, so `--back` needs no build.": (
+        f"{_RELOAD}_there_is_a_way_back_and_forward_again",
+    ),
+    "`mauve reload` goes forward again, to the code on the disk.": (
+        f"{_RELOAD}_there_is_a_way_back_and_forward_again",
+    ),
+    (
+        "Until a reload, a request for a part of rebuilt code is refused: the old code never runs "
+        "under the name of the new code."
+    ): (
+        f"{_RELOAD}_a_core_of_rebuilt_code_is_not_taken_without_a_reload",
         "ros/executor/test_plugins_installed_anew.py::test_a_library_that_was_rebuilt_is_told",
         "ros/executor/test_plugins_installed_anew.py::test_a_python_module_that_was_changed_is_told",
     ),
+    "Two builds of a class may have different layouts.": (
+        "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "So a core sees nothing of a core of another generation but its state fields:": (
+        "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "A core takes over each field of the same name and type from the core that it replaces.": (
+        f"{_RELOAD}_rebuilt_code_is_put_in_force",
+        f"{_RELOAD}_from_cpp_to_python_and_back_the_state_goes_along",
+    ),
+    "The two cores may be of different builds, or one in C++ and one in Python.": (
+        f"{_RELOAD}_rebuilt_code_is_put_in_force",
+        f"{_RELOAD}_from_cpp_to_python_and_back_the_state_goes_along",
+    ),
+    "The names of C++ members lose the `_` at their end.": ("Handover.CopiesTheFieldsOfTheSameNameAndType",),
+    "The reply lists the fields that are taken over, and those that do not fit, with the reason.": (
+        f"{_RELOAD}_state_that_does_not_fit_is_told",
+        "Handover.CopiesTheFieldsOfTheSameNameAndType",
+    ),
+    "The fields are copied before `take` is called.": (
+        f"{_RELOAD}_state_that_does_not_fit_is_told",
+        "Handover.CopiesTheFieldsOfTheSameNameAndType",
+    ),
+    (
+        "A field is a number, an array of numbers, a bounded text, or a trivially copyable struct "
+        "of `MAUVE_TYPE`."
+    ): (
+        "Handover.CopiesTheFieldsOfTheSameNameAndType",
+        "Handover.TakesNoStructOfAnotherLayout",
+    ),
+    "The type of a struct includes its layout.": (
+        "Handover.CopiesTheFieldsOfTheSameNameAndType",
+        "Handover.TakesNoStructOfAnotherLayout",
+    ),
+    "`adopt` and `take` see a core of another generation as one of no known C++ type.": (
+        "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "A property that nobody has set takes the default of the new shell.": (
+        f"{_RELOAD}_there_is_a_way_back_and_forward_again",
+    ),
+    "All other properties keep their values, and all ports their connections.": (
+        f"{_RELOAD}_a_property_that_was_set_keeps_its_value",
+        f"{_RELOAD}_another_shell_comes_with_its_component",
+    ),
+    "A process of its own tries the new code first.": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    "Each of these is refused before anything changes:": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    (
+        "| crashes, or does not end, when it is loaded | `crashed (SIGSEGV: ...)`, `does not end "
+        "within 10 s` |"
+    ): (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+        "python/model/test_plugin_trial.py::test_static_initialiser_that_does_not_end",
+    ),
+    "| lacks a symbol | `undefined symbol: ...` |": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    "| is a file that a build still writes | `wait for the end of the build` |": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    ("| was built against another version of MAUVE RT | `built against another version of MAUVE RT` |"): (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    "| has another layout of a data type | `its layout has changed`, with the field |": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    "| lacks a part that a component has | `is gone from the new code` |": (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    ("| has a shell without a port that is connected | `the new shell lacks a port that is connected` |"): (
+        f"{_RELOAD}_what_does_not_fit_is_refused_before_anything_changes",
+    ),
+    (
+        "A core of another library that was compiled for the old members of a changed shell is "
+        "refused as well, until its package is built and reloaded."
+    ): (f"{_RELOAD}_cores_of_other_libraries_have_to_be_built_with_a_changed_shell",),
+    "A resource keeps the code that it was made with; the reply names such resources.": (
+        f"{_RELOAD}_a_resource_keeps_its_code",
+    ),
+    "`--dry-run` only tries and checks the code.": (f"{_RELOAD}_a_dry_run_changes_nothing",),
     "**Lifecycle.** The executor is a managed node.": (
         "ros/executor/test_process.py::test_lifecycle_step_by_step",
     ),
@@ -1783,6 +1918,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "| new code | message |",
     "The other direction needs two transactions.",
     "The first one starts the component that writes the reference.",
     "With one transaction, a reader that executes first reads once the output that was left by the stop.",

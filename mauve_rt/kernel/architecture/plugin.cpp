@@ -27,12 +27,6 @@ const auto& require_entry(const Entries& entries, const std::string& name, Error
        .remedy = "check the name, and that its package is installed and lists it among its plug-ins"});
 }
 
-template <typename Entries, typename Key, typename Entry>
-void add_entry(Entries& entries, const Key& key, const std::string& shown, Entry entry) {
-  if (entries.emplace(key, std::move(entry)).second) return;
-  throw Error(ErrorCode::duplicate_name, "the plug-in is registered twice", {.element = shown});
-}
-
 /// Makes a part by what its package registered, whatever that throws.
 template <typename Make>
 auto made(const std::string& what, Make&& make) -> decltype(make()) {
@@ -66,6 +60,32 @@ PropertyValue checked(const ResourceParameter& parameter, const PropertyValue& v
   }
 }
 
+[[noreturn]] void throw_twice(const std::string& shown) {
+  throw Error(ErrorCode::duplicate_name, "the plug-in is registered twice", {.element = shown});
+}
+
+std::string version_of(const PluginAbi& abi) {
+  const std::string version(abi.version.data());
+  return version.empty() ? "an unknown version" : version;
+}
+
+/// Throws Error (plugin): compiled against headers of MAUVE RT that do not go with this kernel.
+void check_abi(void* library, const std::string& path) {
+  constexpr PluginAbi ours = plugin_abi();
+  using Describe = void (*)(PluginAbi&);
+  auto describe = reinterpret_cast<Describe>(dlsym(library, "mauve_plugin_abi"));
+  PluginAbi theirs;
+  if (describe != nullptr) describe(theirs);
+  const bool is_of_this_version = theirs.version == ours.version || theirs.version.front() == '\0';
+  if (theirs.layout == ours.layout && is_of_this_version) return;
+  const bool is_of_another_version = describe != nullptr && !is_of_this_version;
+  throw Error(ErrorCode::plugin, "the library was built against another version of MAUVE RT",
+              {.element = path,
+               .expected = version_of(ours),
+               .found = is_of_another_version ? version_of(theirs) : "headers of another build",
+               .remedy = "rebuild its package against this version"});
+}
+
 std::vector<std::string> names_of(const std::vector<ResourceParameter>& parameters) {
   std::vector<std::string> names;
   names.reserve(parameters.size());
@@ -74,6 +94,30 @@ std::vector<std::string> names_of(const std::vector<ResourceParameter>& paramete
 }
 
 }  // namespace
+
+template <typename Made>
+Made PluginRegistry::entry_of(const std::map<std::string, Made>& entries, const std::string& name,
+                              ErrorCode code, const std::string& what) const {
+  const std::lock_guard lock(mutex_);
+  return require_entry(entries, name, code, what);
+}
+
+template <typename Made>
+void PluginRegistry::add(std::map<std::string, Made> PluginRegistry::* entries, const std::string& name,
+                         const std::string& shown, Made entry) {
+  const std::lock_guard lock(mutex_);
+  auto& all = this->*entries;
+  entry.generation = generation_;
+  const auto before = all.find(name);
+  if (replaced_ != nullptr) {
+    auto& kept = replaced_->of(all);
+    if (kept.contains(name)) throw_twice(shown);
+    kept.emplace(name, before == all.end() ? nullptr : std::make_unique<Made>(std::move(before->second)));
+  } else if (before != all.end()) {
+    throw_twice(shown);
+  }
+  all.insert_or_assign(name, std::move(entry));
+}
 
 PluginRegistry::PluginRegistry() {
   const auto add = [this]<typename Given>(Given) {
@@ -96,12 +140,14 @@ std::vector<ResourceKind> PluginRegistry::given_resource_kinds() {
 }
 
 void PluginRegistry::load_library(const std::string& path) {
+  const std::lock_guard lock(mutex_);
   if (libraries_.contains(path)) return;
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
     throw Error(ErrorCode::plugin, std::string("the plug-in library does not load: ") + dlerror(),
                 {.element = path, .remedy = "install its package, or rebuild it against this version"});
   }
+  check_abi(library, path);
   using Register = void (*)(PluginRegistry&);
   auto register_plugins = reinterpret_cast<Register>(dlsym(library, "mauve_register_plugins"));
   if (register_plugins == nullptr) {
@@ -120,14 +166,14 @@ void PluginRegistry::load_library(const std::string& path) {
 }
 
 void PluginRegistry::add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory) {
-  add_entry(shells_, name, "shell " + name, Entry<Shell>{"", std::move(factory)});
+  add(&PluginRegistry::shells_, name, "shell " + name, Entry<Shell>{"", std::move(factory)});
 }
 void PluginRegistry::add_core(const std::string& name, const std::string& shell_name, CoreFactory factory) {
-  add_entry(cores_, name, "core " + name, Entry<CoreBase>{shell_name, std::move(factory)});
+  add(&PluginRegistry::cores_, name, "core " + name, Entry<CoreBase>{shell_name, std::move(factory)});
 }
 void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_name,
                              std::function<std::unique_ptr<FsmBase>()> factory) {
-  add_entry(fsms_, name, "fsm " + name, Entry<FsmBase>{shell_name, std::move(factory)});
+  add(&PluginRegistry::fsms_, name, "fsm " + name, Entry<FsmBase>{shell_name, std::move(factory)});
 }
 void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
   const std::string name = kind.name;
@@ -139,36 +185,119 @@ void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
     throw Error(ErrorCode::plugin, "a parameter cannot have that name",
                 {.element = "resource " + name, .expected = "none of " + join(taken), .found = parameter});
   }
-  add_entry(resources_, name, "resource " + name, KindEntry{std::move(kind), {{"", std::move(factory)}}});
+  add(&PluginRegistry::resources_, name, "resource " + name,
+      KindEntry{std::move(kind), {{"", std::move(factory)}}});
 }
 
+void PluginRegistry::begin_generation(int number, std::shared_ptr<PluginGeneration> replaced) {
+  const std::lock_guard lock(mutex_);
+  generation_ = number;
+  replaced_ = std::move(replaced);
+}
+
+void PluginRegistry::end_generation() noexcept {
+  const std::lock_guard lock(mutex_);
+  generation_ = 1;
+  replaced_ = nullptr;
+  version_.fetch_add(1, std::memory_order_release);
+}
+
+void PluginRegistry::drop(const std::string& kind, const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  const auto keep = [&](auto& entries) {
+    const auto found = entries.find(name);
+    if (found == entries.end() || replaced_ == nullptr) return;
+    auto entry = std::make_unique<std::decay_t<decltype(found->second)>>(std::move(found->second));
+    replaced_->of(entries).emplace(name, std::move(entry));
+    entries.erase(found);
+  };
+  if (kind == "shell") keep(shells_);
+  if (kind == "core") keep(cores_);
+  if (kind == "fsm") keep(fsms_);
+  if (kind == "resource") keep(resources_);
+}
+
+void PluginRegistry::exchange(PluginGeneration& other) {
+  const std::lock_guard lock(mutex_);
+  const auto swap = [&other]<typename Made>(std::map<std::string, Made>& entries) {
+    for (auto& [name, kept] : other.of(entries)) {
+      auto back = std::move(kept);
+      const auto found = entries.find(name);
+      kept = found == entries.end() ? nullptr : std::make_unique<Made>(std::move(found->second));
+      if (back != nullptr) {
+        entries.insert_or_assign(name, std::move(*back));
+      } else if (found != entries.end()) {
+        entries.erase(found);
+      }
+    }
+  };
+  swap(shells_);
+  swap(cores_);
+  swap(fsms_);
+  swap(resources_);
+  version_.fetch_add(1, std::memory_order_release);
+}
+
+int PluginRegistry::generation_of(const std::string& kind, const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto in = [&name](const auto& entries) {
+    const auto found = entries.find(name);
+    return found == entries.end() ? 0 : found->second.generation;
+  };
+  if (kind == "shell") return in(shells_);
+  if (kind == "core") return in(cores_);
+  if (kind == "fsm") return in(fsms_);
+  return kind == "resource" ? in(resources_) : 0;
+}
+
+std::vector<MessageShape> PluginRegistry::type_shapes() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<MessageShape> shapes;
+  shapes.reserve(ports_.size());
+  for (const auto& [type, factories] : ports_) shapes.push_back(factories.shape());
+  return shapes;
+}
+
+namespace {
+
+/// By a copy of its entry: the factory is user code, and others may load meanwhile.
+template <typename Entry>
+auto make_part(const Entry& entry, const std::string& kind, const std::string& name) {
+  auto part = made(kind + " " + name, entry.make);
+  part->set_implementation(name);
+  part->set_generation(entry.generation);
+  return part;
+}
+
+}  // namespace
+
 std::unique_ptr<Shell> PluginRegistry::make_shell(const std::string& name) const {
-  auto shell = made("shell " + name, require_entry(shells_, name, ErrorCode::unknown_shell, "shell").make);
-  shell->set_implementation(name);
-  return shell;
+  return make_part(entry_of(shells_, name, ErrorCode::unknown_shell, "shell"), "shell", name);
 }
 std::unique_ptr<CoreBase> PluginRegistry::make_core(const std::string& name) const {
-  auto core = made("core " + name, require_entry(cores_, name, ErrorCode::unknown_core, "core").make);
-  core->set_implementation(name);
-  return core;
+  return make_part(entry_of(cores_, name, ErrorCode::unknown_core, "core"), "core", name);
 }
 std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const {
-  auto fsm = made("fsm " + name, require_entry(fsms_, name, ErrorCode::unknown_fsm, "fsm").make);
-  fsm->set_implementation(name);
-  return fsm;
+  return make_part(entry_of(fsms_, name, ErrorCode::unknown_fsm, "fsm"), "fsm", name);
 }
 
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,
                                                         const ResourceParameters& given) const {
-  const ResourceKind& known = resource_kind(kind);
-  const auto& factories = resources_.at(kind).factories;
-  const auto factory = factories.find(type);
-  if (factory == factories.end()) throw_not_of_type(known, type);
+  ResourceFactory make;
+  {
+    const std::lock_guard lock(mutex_);
+    const ResourceKind known = resource_kind(kind);
+    const auto& factories = resources_.at(kind).factories;
+    const auto factory = factories.find(type);
+    if (factory == factories.end()) throw_not_of_type(known, type);
+    make = factory->second;
+  }
   const ResourceParameters parameters = checked_parameters(kind, given);
-  return made(kind + " " + type, [&] { return factory->second(parameters); });
+  return made(kind + " " + type, [&] { return make(parameters); });
 }
 
-const ResourceKind& PluginRegistry::resource_kind(const std::string& name) const {
+ResourceKind PluginRegistry::resource_kind(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
   if (const auto found = resources_.find(name); found != resources_.end()) return found->second.kind;
   throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
               {.element = "kind " + name,
@@ -179,7 +308,7 @@ const ResourceKind& PluginRegistry::resource_kind(const std::string& name) const
 
 ResourceParameters PluginRegistry::checked_parameters(const std::string& kind,
                                                       const ResourceParameters& given) const {
-  const auto& known = resource_kind(kind).parameters;
+  const std::vector<ResourceParameter> known = resource_kind(kind).parameters;
   ResourceParameters all;
   for (const ResourceParameter& parameter : known) {
     const auto told = given.find(parameter.name);
@@ -240,6 +369,7 @@ std::unique_ptr<PortBase> PluginRegistry::make_port(PortKind kind, const std::st
                  .found = std::string(to_string(kind)) + " of " + type,
                  .remedy = "declare call ports in a C++ shell"});
   }
+  const std::lock_guard lock(mutex_);
   const auto found = ports_.find(type);
   if (found == ports_.end()) throw_unknown_type(type);
   return kind == PortKind::read ? found->second.read(name) : found->second.write(name, output);
@@ -253,19 +383,21 @@ void PluginRegistry::throw_unknown_type(const std::string& type) const {
                .remedy = "check the name, and that a package registers it among its plug-ins"});
 }
 
-const std::string& PluginRegistry::core_shell(const std::string& name) const {
-  return require_entry(cores_, name, ErrorCode::unknown_core, "core").shell;
+std::string PluginRegistry::core_shell(const std::string& name) const {
+  return entry_of(cores_, name, ErrorCode::unknown_core, "core").shell;
 }
-const std::string& PluginRegistry::fsm_shell(const std::string& name) const {
-  return require_entry(fsms_, name, ErrorCode::unknown_fsm, "fsm").shell;
+std::string PluginRegistry::fsm_shell(const std::string& name) const {
+  return entry_of(fsms_, name, ErrorCode::unknown_fsm, "fsm").shell;
 }
 
 std::size_t PluginRegistry::value_bytes(const std::string& type) const {
+  const std::lock_guard lock(mutex_);
   const auto found = ports_.find(type);
   return found != ports_.end() ? found->second.value_bytes : 0;
 }
 
 std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
+  const std::lock_guard lock(mutex_);
   std::set<std::string> found;
   const auto add_keys = [&found](const auto& entries) {
     for (const auto& [name, entry] : entries) found.insert(name);

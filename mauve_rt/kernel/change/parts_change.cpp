@@ -121,6 +121,7 @@ void PartsChange::prepare_parts() {
   if (parts_.core != nullptr) {
     what_ = parts_.core->description();
     component_.bind_and_configure(*parts_.core, shell, fsm, binding_);
+    if (!afresh_) handover_ = std::make_unique<Handover>(component_.core(), *parts_.core);
   } else {
     CoreBase& core = component_.core();
     what_ = core.description();
@@ -157,13 +158,14 @@ void PartsChange::find_kept_waits() {
 
 bool PartsChange::adopt() {
   if (afresh_ || unready_) return true;
-  if (parts_.core != nullptr) return parts_.core->adopt(*component_.parts_.core);
-  return kept_core_ == component_.parts_.core.get();  // else a fallback took its place meanwhile
+  // Else a fallback took the place of the core meanwhile.
+  if (parts_.core != nullptr) return handover_->is_from(*component_.parts_.core) && handover_->adopt();
+  return kept_core_ == component_.parts_.core.get();
 }
 
 void PartsChange::take() noexcept {
   if (parts_.core != nullptr) {
-    if (!afresh_ && !unready_) parts_.core->take(*component_.parts_.core);
+    if (!afresh_ && !unready_) handover_->take();
     std::swap(parts_.core, component_.parts_.core);
     component_.task_.set_fallen_back(is_fallback_);
     component_.core_name_.store(core_name_, std::memory_order_relaxed);

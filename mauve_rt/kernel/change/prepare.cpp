@@ -183,6 +183,11 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   Preview preview;
   preview.begin(change.parts->shell(), draft);
   change.parts->prepare();
+  if (const Handover* handover = change.parts->handover()) {
+    StepReport& report = reports_[static_cast<std::size_t>(draft.core_step - 1)];
+    report.taken = handover->taken();
+    report.left = handover->left();
+  }
 }
 
 void TransactionCommit::Work::prepare_wiring(Change& change) {

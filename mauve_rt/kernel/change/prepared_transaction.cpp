@@ -62,6 +62,10 @@ class PreparedTransaction::State {
   /// Once false, false for ever. A change that is under way may still be refused.
   bool is_unchanged() const MAUVE_RT {
     if (basis.is_structural && architecture.commit_gate().structure() != basis.structure) return false;
+    if (const PluginRegistry* registry = architecture.registry(); registry != nullptr) {
+      if (registry->version() != basis.code)
+        return false;  // its new parts may be of code that was loaded anew
+    }
     return std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
       return touched.component->change_mark().changes() == touched.changes;
     });

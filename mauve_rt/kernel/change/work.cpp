@@ -118,6 +118,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
   }
   begin(std::move(transaction));
   Basis basis;
+  if (const PluginRegistry* registry = architecture_.registry()) basis.code = registry->version();
   try {
     draft_steps();
     require_preparable();
@@ -379,10 +380,11 @@ void TransactionCommit::Work::publish() {
 }
 
 /// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced
-/// or a structural property was set that it may have read.
+/// or a structural property was set that it may have read, or its code was loaded anew.
 void TransactionCommit::Work::renew_fallback(Change& change) {
   Component& component = *change.draft->component;
-  const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
+  const bool is_outdated =
+      change.parts->restarts() || change.draft->sets_structural() || component.has_outdated_fallback();
   std::unique_ptr<CoreBase> out = change.parts->give_back_core();
   const std::string& fallback = component.fallback_implementation();
   if (!component.is_configured()) return;
@@ -418,6 +420,12 @@ void TransactionCommit::Work::retire() {
 
 /// Whoever waits for the report keeps nothing that others may take away meanwhile.
 void TransactionCommit::Work::keep_for_report() {
+  for (const Change& change : changes_) {
+    const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
+    if (handover == nullptr || handover->is_whole()) continue;
+    reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
+        "a field of the old core could not be read at the change: its value is that of the preparation");
+  }
   changes_.clear();
   listener_changes_.clear();
   actions_.clear();

@@ -34,6 +34,7 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
     std::vector<Touched> touched{};
     bool is_structural{false};
     std::uint32_t structure{0};
+    std::uint32_t code{0};  // the registry's version
   };
   /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
   Basis prepare_for_later(Transaction transaction);

@@ -339,4 +339,13 @@ void FsmBase::cleanup_hook() {
   sporadic_ = false;
 }
 
+void FsmBase::require_same_generation(const CoreBase& core) const {
+  if (generation() == core.generation()) return;
+  throw Error(ErrorCode::type_mismatch, "the fsm was compiled for another build of the core's class",
+              {.element = description(),
+               .expected = core.description() + " of generation " + std::to_string(generation()),
+               .found = "generation " + std::to_string(core.generation()),
+               .remedy = "build and reload both, or write the fsm for a base class of the core"});
+}
+
 }  // namespace mauve

@@ -472,9 +472,25 @@ void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
   fallback_.reset();
   if (out == nullptr || fallback_name_.empty() || out->implementation() != fallback_name_) return;
   out->cleanup();
+  if (auto rebuilt = rebuilt_core(*out)) out = std::move(rebuilt);
   fallback_core_ = std::move(out);
   prepare_fallback();
   if (task_.has_thread()) prefault_allocated();
+}
+
+std::unique_ptr<CoreBase> Component::rebuilt_core(const CoreBase& core) const {
+  const PluginRegistry* registry = require_listed().registry();
+  if (registry == nullptr) return nullptr;
+  const int generation = registry->generation_of("core", core.implementation());
+  if (generation == 0 || generation == core.generation()) return nullptr;
+  return registry->make_core(core.implementation());
+}
+
+bool Component::has_outdated_fallback() const {
+  const PluginRegistry* registry = require_listed().registry();
+  if (registry == nullptr || spare_ == nullptr) return false;
+  const int generation = registry->generation_of("core", fallback_name_);
+  return generation != 0 && generation != spare_->generation();
 }
 
 void Component::update_listening(const FsmBase& fsm) {

@@ -15,6 +15,7 @@ from mauve_msgs.srv import (
     Mirror,
     ReadValues,
     Reconfigure,
+    Reload,
     ReplaceCore,
     Start,
     StartRecording,
@@ -22,7 +23,7 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.control.control import Control
-from mauve_rt.control.requests import Code, Outcome, RecordingOrder, Report, Request
+from mauve_rt.control.requests import Code, Outcome, RecordingOrder, ReloadOrder, Report, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values
 from mauve_rt.errors import MauveError
@@ -95,6 +96,7 @@ class Services:
             (Start, "~/start", _start),
             (ReplaceCore, "~/replace_core", _replace_core),
             (Reconfigure, "~/reconfigure", _reconfigure),
+            (Reload, "~/reload", _reload),
             (StartRecording, "~/start_recording", _start_recording),
             (StopRecording, "~/stop_recording", _stop_recording),
         ):
@@ -137,7 +139,8 @@ class Services:
         outcome = self._control.handle(request)
         if not outcome.replayed:
             self._untold.events.append(self._state.take_down(request, outcome))
-            if outcome.success and any(STEP_KINDS[step.kind].changes_parameters for step in request.steps):
+            changes = any(STEP_KINDS[step.kind].changes_parameters for step in request.steps)
+            if outcome.success and (changes or request.reload is not None):
                 self._follow()
         return outcome
 
@@ -232,6 +235,8 @@ class Services:
             response.report = step_reports(outcome)
             if hasattr(response, "bag"):
                 response.bag = outcome.bag
+            if hasattr(response, "loaded"):
+                response.loaded = list(outcome.loaded)
             return response
 
         return handle
@@ -268,6 +273,11 @@ def _replace_core(ros: Any) -> Request:
 def _reconfigure(ros: Any) -> Request:
     steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
     return Request(steps=steps, dry_run=ros.dry_run, rule=ros.rule, **_commit(ros), **_common(ros))
+
+
+def _reload(ros: Any) -> Request:
+    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back)
+    return Request(reload=order, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
 
 
 def _start_recording(ros: Any) -> Request:

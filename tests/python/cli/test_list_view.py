@@ -34,6 +34,8 @@ def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
         overruns=2,
         alternatives=["p/Other"],
         reconfigurable=True,
+        generation=3,
+        built_ns=86_400 * 10**9,
     )
     protected = ComponentInfo(
         name="robot",
@@ -46,7 +48,12 @@ def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
     assert _line(lines, "guidance") == ["guidance", "RUNNING", "100", "ms", "60", "0,1", "7", "2"]
     assert _line(lines, "robot") == ["robot", "FAULTED", "-", "-", "any", "0", "0"]
     cores = [line.split() for line in lines if "p/" in line]
-    assert cores == [["guidance", "p/Core"], ["p/Other"], ["robot", "p/Robot"]]
+    assert cores == [
+        ["guidance", "p/Core", "3", cores[0][3], cores[0][4]],
+        ["p/Other"],
+        ["robot", "p/Robot", "-", "-"],
+    ]
+    assert cores[0][3] in ("1970-01-01", "1970-01-02"), "of another day the date"
     assert "(protected)" in "".join(lines)
     assert lines[-2:] == ["robot: range_error: [off] the map", "revision 5"]
 

@@ -150,6 +150,8 @@ def test_the_report_of_a_late_component_has_the_instant_and_no_release() -> None
         remark="it is late",
         instant_ns=7_000_001,
         release_ns=NOT_MEASURED,
+        taken=["sum"],
+        left=[],
     )
     measured: Any = SimpleNamespace(steps=[late], prepare_ns=5, blackout_ns=0, is_complete=False)
     (report,) = reports_of((Step("set_property", "a", "x", "1"),), measured)

@@ -183,6 +183,13 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "systemd-analyze verify": (UNIT_FILES,),
         "Description=MAUVE RT supervisor": (UNIT_FILES,),
     },
+    "docs/howto/reload_code.md": {
+        "mauve reload /robot_1/executor --back": (
+            "ros/executor/test_reload.py::test_the_commands_of_the_page",
+        ),
+        "MAUVE_STATE(integral_": ("python/control/test_reload.py::test_the_state_fields_of_the_page",),
+        "state_fields = {": ("python/control/test_reload.py::test_the_state_fields_of_the_page",),
+    },
     "docs/howto/uninstall.md": {
         "rm -rf .venv build install": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),
         "# bags and reports of scripts/demo": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),

@@ -20,6 +20,7 @@ OWN = {"mauve_rt", "mauve_examples", "mauve_msgs"}
 MODULES = {
     "argcomplete": ("python3-argcomplete", "argcomplete"),
     "catkin_pkg": ("python3-catkin-pkg-modules", "catkin-pkg"),
+    "elftools": ("", "pyelftools"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "lz4": ("", "mcap"),  # comes with it
@@ -38,7 +39,7 @@ MODULES = {
     "zstandard": ("", "mcap"),  # comes with it
 }
 # rosdep has no key; where they are used they say how to get them
-OPTIONAL = {"lz4", "mcap", "perfetto", "rosbags", "zstandard"}
+OPTIONAL = {"elftools", "lz4", "mcap", "perfetto", "rosbags", "zstandard"}
 # Of CMake's packages that rosdep calls otherwise: its keys (rosdep/base.yaml); none if nothing is installed.
 CMAKE_PACKAGES: dict[str, set[str]] = {
     "GTest": {"gtest", "google-mock"},

@@ -2,21 +2,62 @@
 // Plug-ins: shells, cores, fsms, resources and data types by name, from libraries opened at run time.
 #pragma once
 
+#include <array>
+#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mauve_rt/architecture/given_resources.hpp"
+#include "mauve_rt/data/message_shape.hpp"
 #include "mauve_rt/data/port.hpp"
+#include "mauve_rt/parts/core.hpp"
+#include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/parts/property.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {
 
-/// What the process knows how to make. Filled by libraries, asked by architectures. One thread at a
-/// time. All functions [non-rt].
+/// By which a library was compiled: what it and the kernel have to agree on.
+struct PluginAbi {
+  std::array<char, 32> version{};  // of MAUVE RT; empty: compiled without its CMake target
+  std::uint64_t layout{0};         // of the classes that a part derives from and uses
+};
+
+/// As the including code is compiled. [non-rt]
+consteval PluginAbi plugin_abi() {
+#ifdef MAUVE_RT_VERSION
+  constexpr std::string_view version = MAUVE_RT_VERSION;
+#else
+  constexpr std::string_view version;
+#endif
+  PluginAbi abi;
+  for (std::size_t i = 0; i + 1 < abi.version.size() && i < version.size(); ++i) abi.version[i] = version[i];
+  for (const std::size_t size :
+       {sizeof(Shell), sizeof(CoreBase), sizeof(FsmBase), sizeof(Resource), sizeof(PortBase), sizeof(State),
+        sizeof(PropertyBase), sizeof(ServiceBase), sizeof(CoreBinding), sizeof(Component)}) {
+    abi.layout = abi.layout * 1099511628211U + size;
+  }
+  return abi;
+}
+
+/// Entries of a registry that others have taken the place of, and the names that there were not before. Keep it as long as
+/// the registry: parts of the old code may still be in force.
+class PluginGeneration;
+
+/// What the process knows how to make. Filled by libraries, asked by architectures. All functions [non-rt], from any thread;
+/// who loads and who exchanges: one at a time.
+///
+/// | member       | written by           | read by | under  |
+/// | ------------ | -------------------- | ------- | ------ |
+/// | version_     | who loads, exchanges | anyone  | its own |
+/// | the others   | who loads, exchanges | anyone  | mutex_ |
 class PluginRegistry {
  public:
   using CoreFactory = std::function<std::unique_ptr<CoreBase>()>;
@@ -28,10 +69,29 @@ class PluginRegistry {
   /// Opens a library (RTLD_NOW | RTLD_LOCAL) and registers what it has; it is never closed. A second call
   /// does nothing. Throws Error (plugin) with the loader's words.
   void load_library(const std::string& path);
+  /// From now on what is added takes the place of entries of the same kind and name, which `replaced` keeps; until
+  /// end_generation(). `number` is the generation() of what the new entries make. Types that are known stay as they are: their
+  /// layouts must be equal.
+  void begin_generation(int number, std::shared_ptr<PluginGeneration> replaced);
+  void end_generation() noexcept;
+  /// Within a generation: a shell, core, fsm or resource that the new code has no more.
+  void drop(const std::string& kind, const std::string& name);
+  /// Puts the kept entries back in force and keeps those that go out; a second time undoes that.
+  void exchange(PluginGeneration& other);
+  /// Grows with each generation and exchange: what was made before may be of other code. [rt]
+  std::uint32_t version() const MAUVE_RT { return version_.load(std::memory_order_acquire); }
+  /// Of the entry: 1, or that of begin_generation(); 0: there is none. `kind`: "shell", "core", "fsm" or "resource".
+  int generation_of(const std::string& kind, const std::string& name) const;
+  /// The structs of the registered data types, as this process holds them.
+  std::vector<MessageShape> type_shapes() const;
 
   template <typename ShellType>
   void shell(const std::string& name) {
-    add_shell(name, [] { return std::make_unique<ShellType>(); });
+    add_shell(name, [] {
+      auto shell = std::make_unique<ShellType>();
+      shell->set_bytes(sizeof(ShellType));
+      return shell;
+    });
   }
   /// `shell_name`: the shell it was written for.
   template <typename CoreType>
@@ -57,6 +117,7 @@ class PluginRegistry {
   /// A data type: makes ports possible, and the given kinds of resources that can be of it.
   template <Described T>
   void type() {
+    const std::lock_guard lock(mutex_);
     // Ports of the C++ type that the resources are of, whoever else registers the name later.
     if (add_given<T>(type_name<T>())) ports_.insert_or_assign(type_name<T>(), data_ports<T>());
   }
@@ -64,6 +125,7 @@ class PluginRegistry {
   /// The type of a ROS service: makes clients of it possible. Ports and offered calls need no registration.
   template <DescribedCall S>
   void call_type() {
+    const std::lock_guard lock(mutex_);
     add_given<S>(std::string(CallTraits<S>::name));
   }
 
@@ -87,7 +149,7 @@ class PluginRegistry {
   /// The given kinds, in their order. [non-rt]
   static std::vector<ResourceKind> given_resource_kinds();
   /// Throws Error: unknown_resource.
-  const ResourceKind& resource_kind(const std::string& name) const;
+  ResourceKind resource_kind(const std::string& name) const;
   /// All parameters of a kind: as given, else as they are unless told.
   /// Throws Error: unknown_resource, invalid_argument (one is missing, or the kind has none such), type_mismatch,
   /// out_of_range.
@@ -98,8 +160,8 @@ class PluginRegistry {
   std::unique_ptr<PortBase> make_port(PortKind kind, const std::string& type, const std::string& name,
                                       const OutputOptions& output = {}) const;
 
-  const std::string& core_shell(const std::string& name) const;
-  const std::string& fsm_shell(const std::string& name) const;
+  std::string core_shell(const std::string& name) const;
+  std::string fsm_shell(const std::string& name) const;
   /// What a value of a registered data type takes, in bytes; 0 when it is none.
   std::size_t value_bytes(const std::string& type) const;
   /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
@@ -107,15 +169,21 @@ class PluginRegistry {
   std::vector<std::string> names(const std::string& kind) const;
 
  private:
+  friend class PluginGeneration;
+
   template <typename Product>
   struct Entry {
     std::string shell;
     std::function<std::unique_ptr<Product>()> make;
+    int generation{1};
   };
+  template <typename Product>
+  using Entries = std::map<std::string, Entry<Product>>;
   struct PortFactories {
     std::unique_ptr<PortBase> (*read)(const std::string& name);
     std::unique_ptr<PortBase> (*write)(const std::string& name, const OutputOptions& output);
     std::size_t value_bytes;
+    MessageShape (*shape)();
   };
   template <Described T>
   static PortFactories data_ports() {
@@ -125,13 +193,24 @@ class PluginRegistry {
             [](const std::string& name, const OutputOptions& output) -> std::unique_ptr<PortBase> {
               return std::make_unique<WritePort<T>>(name, output);
             },
-            sizeof(T)};
+            sizeof(T), message_shape<T>};
   }
 
   struct KindEntry {
     ResourceKind kind;
     std::map<std::string, ResourceFactory> factories;  // by type
+    int generation{1};
   };
+  using Kinds = std::map<std::string, KindEntry>;
+
+  /// A copy: others may be put in its place meanwhile. Throws Error.
+  template <typename Made>
+  Made entry_of(const std::map<std::string, Made>& entries, const std::string& name, ErrorCode code,
+                const std::string& what) const;
+  /// Registers it; within a generation in the place of the one there was.
+  template <typename Made>
+  void add(std::map<std::string, Made> PluginRegistry::* entries, const std::string& name,
+           const std::string& shown, Made entry);
 
   /// Every given kind that can be of the type, of data or of calls; false: it was registered before.
   template <typename Type>
@@ -150,12 +229,35 @@ class PluginRegistry {
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
   [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const;
 
+  mutable std::recursive_mutex mutex_;  // a library registers its parts under it
   std::set<std::string> libraries_;
-  std::map<std::string, Entry<Shell>> shells_;
-  std::map<std::string, Entry<CoreBase>> cores_;
-  std::map<std::string, Entry<FsmBase>> fsms_;
-  std::map<std::string, KindEntry> resources_;  // by kind
+  Entries<Shell> shells_;
+  Entries<CoreBase> cores_;
+  Entries<FsmBase> fsms_;
+  Kinds resources_;                             // by kind
   std::map<std::string, PortFactories> ports_;  // by type
+  // acquire/release: who sees the new number finds the new entries
+  std::atomic<std::uint32_t> version_{0};
+  int generation_{1};                           // of what is added
+  std::shared_ptr<PluginGeneration> replaced_;  // while a generation is loaded
+};
+
+class PluginGeneration {
+ private:
+  friend class PluginRegistry;
+
+  template <typename Made>
+  using Kept = std::map<std::string, std::unique_ptr<Made>>;  // nullptr: there is none of the name
+
+  Kept<PluginRegistry::Entry<Shell>>& of(PluginRegistry::Entries<Shell>& /*kind*/) { return shells_; }
+  Kept<PluginRegistry::Entry<CoreBase>>& of(PluginRegistry::Entries<CoreBase>& /*kind*/) { return cores_; }
+  Kept<PluginRegistry::Entry<FsmBase>>& of(PluginRegistry::Entries<FsmBase>& /*kind*/) { return fsms_; }
+  Kept<PluginRegistry::KindEntry>& of(PluginRegistry::Kinds& /*kind*/) { return resources_; }
+
+  Kept<PluginRegistry::Entry<Shell>> shells_;
+  Kept<PluginRegistry::Entry<CoreBase>> cores_;
+  Kept<PluginRegistry::Entry<FsmBase>> fsms_;
+  Kept<PluginRegistry::KindEntry> resources_;
 };
 
 }  // namespace mauve
@@ -163,7 +265,10 @@ class PluginRegistry {
 /// Opens the registration function of a plug-in library, once a library:
 ///   MAUVE_PLUGINS(registry) { registry.core<MyCore>("my_package/MyCore", "my_package/MyShell"); }
 // NOLINTBEGIN(bugprone-macro-parentheses): a parameter's name cannot stand in parentheses
-#define MAUVE_PLUGINS(registry)                                                  \
-  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins( \
+#define MAUVE_PLUGINS(registry)                                                                    \
+  extern "C" __attribute__((visibility("default"))) void mauve_plugin_abi(mauve::PluginAbi& abi) { \
+    abi = mauve::plugin_abi();                                                                     \
+  }                                                                                                \
+  extern "C" __attribute__((visibility("default"))) void mauve_register_plugins(                   \
       mauve::PluginRegistry& registry)
 // NOLINTEND(bugprone-macro-parentheses)

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "mauve_rt/base/rt.hpp"
+
 namespace mauve {
 
 /// Something that is configured before use and cleaned up after. All functions [non-rt].
@@ -45,6 +47,14 @@ class ConfigurablePart : public Configurable {
   /// As of the base. [non-rt]
   void configure() final { Configurable::configure(); }
   void cleanup() final { Configurable::cleanup(); }
+
+  /// Of the code that it was made by: 1 as the process found it first, more of code that was loaded anew (PluginRegistry). [rt]
+  int generation() const MAUVE_RT { return generation_; }
+  /// [setup]
+  void set_generation(int generation) noexcept { generation_ = generation; }
+
+ private:
+  int generation_{1};
 };
 
 }  // namespace mauve

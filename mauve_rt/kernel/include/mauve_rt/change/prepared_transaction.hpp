@@ -30,8 +30,8 @@ const char* to_string(PreparedOutcome outcome) MAUVE_RT;
 /// and the architecture outlive it. Unless commit() answers `committed` nothing was changed.
 ///
 /// It is stale once another change of a component that it touches was committed, or once one of these was started, stopped
-/// or faulted; where it adds, removes, wires, or replaces a shell or an fsm, once any change did that; and once the host was
-/// shut down. While an ordinary change of a component that it touches is under way, from its draft to its end, it is stale as
+/// or faulted; where it adds, removes, wires, or replaces a shell or an fsm, once any change did that; once code was loaded
+/// anew; and once the host was shut down. While an ordinary change of a component that it touches is under way, from its draft to its end, it is stale as
 /// well: what hooks read then is not to be exchanged beneath them. It is current again when that one was refused.
 ///
 /// commit() waits for nobody's preparation. It waits, until its time-out, for no more than: an ordinary commit under way,

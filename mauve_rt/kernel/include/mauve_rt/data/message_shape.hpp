@@ -2,6 +2,7 @@
 // What a C++ struct says of the message it stands for, to be held against the message's own definition.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -24,6 +25,7 @@ struct FieldShape {
   std::size_t text_capacity{};  // of a string: its most characters; 0: any number
   FieldArity arity{FieldArity::one};
   std::size_t size{};                // of an array
+  std::size_t offset{};              // of the member within its struct
   std::vector<FieldShape> fields{};  // of a message within the message
 };
 
@@ -87,8 +89,10 @@ struct ShapeOf<BoundedVector<T, N>> {
 };
 
 template <typename Class, typename Member>
-FieldShape shape_of(Member Class::* /*member*/) {
-  return ShapeOf<Member>::get();
+FieldShape shape_of(Member Class::* member) {
+  FieldShape shape = ShapeOf<Member>::get();
+  shape.offset = static_cast<std::size_t>(std::bit_cast<std::ptrdiff_t>(member));  // Itanium C++ ABI, 2.3
+  return shape;
 }
 
 /// The next name of "x, y, z", taken off its front.

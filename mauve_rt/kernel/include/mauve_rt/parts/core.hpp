@@ -4,11 +4,13 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/parts/shell.hpp"
+#include "mauve_rt/parts/state_fields.hpp"
 
 namespace mauve {
 
@@ -28,9 +30,22 @@ class CoreBase : public ConfigurablePart {
   /// Moves the old core's newest state over; cannot fail. [rt] as far as the core is. On the same thread, between the last
   /// execution of the old core and the first one of this core.
   virtual void take(CoreBase& /*old*/) noexcept {}
+  /// The members that are copied from the old core of the same field name and type, before take: MAUVE_STATE writes this. The
+  /// addresses stay valid as long as the core. Cores of different generations (of a library that was loaded anew) get no more of
+  /// each other: adopt and take see a core of no type that they know. [non-rt], while the core may run.
+  virtual std::vector<StateField> state_fields() { return {}; }
   /// The time adopt and take need together, held against them. [rt] An adopt that takes longer refuses the change, after a
   /// longer take the component is FAULTED. With less left before a release, adopt waits for the one after. 0: none declared.
   virtual time_ns_t budget_ns() const MAUVE_RT { return 0; }
+
+  // Of a core whose state fields are copies of values that stand elsewhere, e.g. in Python.
+
+  /// Brings the fields up to date; false: one of them still has an earlier value. [rt] as far as the core is.
+  virtual bool store_state() noexcept { return true; }
+  /// Has been given new values of its fields. [rt] as far as the core is.
+  virtual void load_state() noexcept {}
+  /// Whether adopt and take look no C++ type up in the old core. [non-rt]
+  virtual bool is_dynamic() const noexcept { return false; }
 
   /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }
@@ -61,11 +76,11 @@ class Core : public CoreBase {
   using shell_type = ShellType;
 
   bool bind_shell(Shell& shell) noexcept override {
-    shell_ = dynamic_cast<ShellType*>(&shell);
+    shell_ = shell_as<ShellType>(shell);
     return shell_ != nullptr;
   }
   bool accepts(const Shell& shell) const noexcept override {
-    return dynamic_cast<const ShellType*>(&shell) != nullptr;
+    return shell_as<ShellType>(const_cast<Shell&>(shell)) != nullptr;
   }
 
  protected:
@@ -79,6 +94,7 @@ class Core : public CoreBase {
 /// it has.
 class DynamicCore : public CoreBase {
  public:
+  bool is_dynamic() const noexcept override { return true; }
   /// The number of a method, or -1 when the core has none of that name. [non-rt]
   virtual int find_method(std::string_view name) const = 0;
   /// Runs an action; may throw. [rt] as far as the core is.

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <typeinfo>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
@@ -170,6 +171,8 @@ class FsmBase : public ConfigurablePart {
   std::string description() const override { return "fsm " + implementation_; }
 
  protected:
+  /// Throws Error (type_mismatch): fsm and core are of two builds. [non-rt]
+  void require_same_generation(const CoreBase& core) const;
   /// Declare states and transitions here; shell properties are set by then. [setup]
   virtual void define() = 0;
 
@@ -218,10 +221,12 @@ class Fsm : public FsmBase {
   using core_type = CoreType;
 
   bool bind_shell(Shell& shell) noexcept override {
-    shell_ = dynamic_cast<ShellType*>(&shell);
+    shell_ = shell_as<ShellType>(shell);
     return shell_ != nullptr;
   }
   CoreBinding bind_core(CoreBase& core) const override {
+    // Its methods, compiled into the fsm, are those of its own build; virtual ones of a base class are the core's.
+    if (typeid(core) == typeid(CoreType)) require_same_generation(core);
     if (auto* typed = dynamic_cast<CoreType*>(&core))
       return {.object = typed, .dynamic = nullptr, .method_slots = {}};
     if (auto* dynamic = dynamic_cast<DynamicCore*>(&core)) return bind_dynamic(*dynamic);

@@ -2,8 +2,10 @@
 // Shell: ports and properties, the only part of a component that is visible from outside.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <typeinfo>
 #include <vector>
 
 #include "mauve_rt/base/configurable.hpp"
@@ -36,6 +38,9 @@ class Shell : public ConfigurablePart {
   void set_implementation(std::string name) { implementation_ = std::move(name); }
   /// package/Class [rt]
   const std::string& implementation() const MAUVE_RT { return implementation_; }
+  /// The size of its class, where a registry made it; 0: not known. [setup]
+  void set_bytes(std::size_t bytes) noexcept { bytes_ = bytes; }
+  std::size_t bytes() const noexcept { return bytes_; }
   std::string description() const override { return "shell " + implementation_; }
 
  protected:
@@ -99,6 +104,7 @@ class Shell : public ConfigurablePart {
 
   std::vector<std::unique_ptr<PortBase>> ports_;
   std::vector<std::unique_ptr<PropertyBase>> properties_;
+  std::size_t bytes_{0};
   std::string implementation_;
 };
 
@@ -112,5 +118,14 @@ struct LargestMessage {
 LargestMessage largest_message(const Shell& shell);
 /// The stack that a thread needs for a core that keeps what it reads and what it writes there. [non-rt]
 std::size_t stack_bytes_for(const LargestMessage& largest) noexcept;
+
+/// The shell as the type that a core or an fsm was written for; nullptr: it is another one, or of that name but compiled with
+/// other members (its library was loaded anew, and the caller's was not built again). [non-rt]
+template <typename ShellType>
+ShellType* shell_as(Shell& shell) noexcept {
+  const bool is_exact = typeid(shell) == typeid(ShellType);
+  if (is_exact && shell.bytes() != 0 && shell.bytes() != sizeof(ShellType)) return nullptr;
+  return dynamic_cast<ShellType*>(&shell);
+}
 
 }  // namespace mauve

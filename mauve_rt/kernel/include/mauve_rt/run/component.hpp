@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/task.hpp"
@@ -35,6 +36,8 @@ struct StepReport {
   time_ns_t released_ns{kNotMeasured};  // the instant of the release that followed
   time_ns_t instant_ns{kNotMeasured};   // T: the component executes with the change from this instant on
   time_ns_t release_ns{kNotMeasured};   // nominal instant of the release that followed
+  std::vector<std::string> taken{};     // state fields that the new core took over
+  std::vector<std::string> left{};      // state fields that it did not, with the reason
 };
 
 struct CommitTimeouts {
@@ -81,6 +84,8 @@ class PartsChange final : public CommitAction {
   /// And it is the fallback. [setup]
   void be_fallback() noexcept { afresh_ = is_fallback_ = true; }
 
+  /// What the new core takes over; nullptr: none, or it takes nothing. [non-rt]
+  const Handover* handover() const noexcept { return handover_.get(); }
   /// The core that is not in force now. [setup]
   CoreBase* core() noexcept { return parts_.core.get(); }
   /// Gives away the core that is not in force now. [non-rt]
@@ -104,7 +109,8 @@ class PartsChange final : public CommitAction {
   time_ns_t period_ns_{0};
   std::vector<KeptWait> kept_waits_{};
   bool restarts_;
-  const CoreBase* kept_core_{nullptr};  // the one that the binding was made for, when it stays
+  std::unique_ptr<Handover> handover_{};  // from the core that ran when it was prepared
+  const CoreBase* kept_core_{nullptr};    // the one that the binding was made for, when it stays
   std::uint32_t core_name_{0};
   bool afresh_{false};
   bool unready_{false};
@@ -276,6 +282,8 @@ class Component final : public Configurable {
   /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
   /// `out`: the core that was replaced, which may be the fallback itself.
   void renew_fallback(std::unique_ptr<CoreBase> out);
+  /// Whether the code of the fallback was loaded anew since it was made. [non-rt]
+  bool has_outdated_fallback() const;
 
   /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
   void update_listening() { update_listening(*parts_.fsm); }
@@ -307,6 +315,8 @@ class Component final : public Configurable {
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();
+  /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.
+  std::unique_ptr<CoreBase> rebuilt_core(const CoreBase& core) const;
   void check_fallback(const Shell& shell, const FsmBase& fsm) const;
 
   std::string name_;

@@ -1,0 +1,323 @@
+"""Generations of code: rebuilt code is tried, compared, and loaded in addition to the old code.
+
+Nothing that is loaded is ever closed, so a way back costs no build. A generation is all that one reload has
+loaded. Its parts are in force for the registry: whatever is made from then on is of the newest generation.
+"""
+
+import itertools
+import os
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from mauve_rt._kernel import PluginGeneration, PluginRegistry
+from mauve_rt.errors import PluginError
+from mauve_rt.model.code_layouts import check_types, is_same_shell
+from mauve_rt.model.loaded_code import LoadedCode, Stamps
+
+PART_KINDS = ("shell", "core", "fsm", "resource")
+_FIRST = 1
+_NUMBERS = itertools.count(
+    _FIRST + 1
+)  # of this process: copies and modules of a generation have it in their names
+
+Name = tuple[str, str]
+"""Kind and name of a plug-in."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A library or a module that was loaded, with what it registers."""
+
+    target: str
+    names: frozenset[Name]
+    is_python: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generation:
+    """What one reload has loaded. `kept`: the entries of the registry that are not in force."""
+
+    number: int
+    sources: tuple[str, ...]
+    names: frozenset[Name]
+    loaded: tuple[str, ...]  # libraries and modules
+    outdated: tuple[Name, ...]  # of other libraries, compiled for a shell as it was
+    kept: PluginGeneration
+    stamps: Stamps
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Candidate:
+    number: int
+    sources: tuple[Source, ...]
+    libraries: tuple[Path, ...]  # copies and what they need, in the order to open
+    plugins: frozenset[str]  # file names of the copies that register plug-ins
+    modules: Mapping[str, tuple[str, ...]]  # module: packages of the generation
+    stamps: Stamps
+    outdated: tuple[Name, ...]  # of other libraries, written for a shell as it was
+
+
+class CodeGenerations:
+    """The generations of one process. Not thread-safe: for who holds the registry."""
+
+    def __init__(self, loaded: LoadedCode) -> None:
+        self._loaded = loaded
+        self._history: list[Generation] = []
+        self._gone_back: dict[str, Generation] = {}
+        self._copied: set[Path] = set()  # libraries of which the first one is no longer in force
+        self._packages: dict[str, tuple[int, tuple[str, ...]]] = {}  # by top-level package
+        self.outdated: dict[Name, str] = {}
+
+    def rebuilt(self, sources: Iterable[Source]) -> dict[str, list[Path]]:
+        """The files that were changed since they were loaded, by source; none of a source that was not.
+
+        Raises:
+            PluginError: a file is no complete library.
+        """
+        found = {}
+        for source in sources:
+            files = self._loaded.changed_files(source.target, self._needed(source))
+            if files or source.target in self._gone_back:
+                found[source.target] = files
+        return found
+
+    def load(
+        self,
+        sources: Sequence[Source],
+        registry: PluginRegistry,
+        *,
+        in_use: Collection[Name],
+        in_python: Collection[Name],
+        add_python_parts: Any,
+        dry_run: bool = False,
+    ) -> Generation | None:
+        """Try rebuilt code in a process of its own, then load it and put it in force in the registry.
+
+        `in_use`: parts that components have now, which the new code has to have, too.
+        `in_python`: parts that are no C++ classes. `add_python_parts(module, loaded_module)` registers the
+        parts of a Python module.
+
+        Returns None after a dry run.
+
+        Raises:
+            PluginError: nothing has changed for this process then, but for code that nobody calls.
+        """
+        import tempfile  # noqa: PLC0415 - needed by a reload only
+
+        with tempfile.TemporaryDirectory(prefix="mauve_rt_") as folder:
+            candidate = self._try(sources, registry, in_use=in_use, in_python=in_python, folder=Path(folder))
+            if dry_run:
+                return None
+            kept = PluginGeneration()
+            registry.begin_generation(candidate.number, kept)
+            before = dict(self._packages)
+            try:
+                self._open(candidate, registry, add_python_parts)
+            except BaseException:
+                registry.end_generation()
+                registry.exchange(kept)
+                self._packages = before
+                raise
+            registry.end_generation()
+        return self._keep(candidate, kept)
+
+    def undo(self, generation: Generation, registry: PluginRegistry) -> None:
+        """Put the code of before in force again: a generation that was loaded last is forgotten."""
+        registry.exchange(generation.kept)
+        self._history.remove(generation)
+
+    def commit(self, generation: Generation) -> None:
+        """The generation's parts run: its files are the loaded ones now."""
+        self._loaded.renew(generation.stamps)
+        for source in generation.sources:
+            self._gone_back.pop(source, None)
+        for name in generation.names:
+            self.outdated.pop(name, None)
+        text = "it was compiled for a shell that has other members by now"
+        self.outdated.update(dict.fromkeys(generation.outdated, text))
+
+    def last(self, sources: Collection[str]) -> Generation | None:
+        """The newest generation in force that has loaded one of these sources."""
+        return next((each for each in reversed(self._history) if {*each.sources} & {*sources}), None)
+
+    def go_back(self, generation: Generation, registry: PluginRegistry) -> None:
+        """Put the entries that a generation took the place of in force again."""
+        registry.exchange(generation.kept)
+
+    def went_back(self, generation: Generation) -> None:
+        """The parts of before run again; a reload loads what the disk has."""
+        self._history.remove(generation)
+        for name in generation.outdated:
+            self.outdated.pop(name, None)
+        self._gone_back.update(dict.fromkeys(generation.sources, generation))
+
+    def module_of(self, module: str) -> ModuleType | None:
+        """A module of a package that was loaded anew, in its newest generation; None: of no such package."""
+        from mauve_rt.model.module_generations import load_module  # noqa: PLC0415
+
+        number, packages = self._packages.get(module.partition(".")[0], (_FIRST, ()))
+        return load_module(module, generation=number, packages=packages) if number != _FIRST else None
+
+    def module_files(self, module: str) -> list[Path]:
+        """The files of a loaded module, of its package, and of the other packages that it uses."""
+        return [file for files in self._dependencies(module).values() for file in files]
+
+    def _needed(self, source: Source) -> list[Path]:
+        """Libraries or files of other packages that it was loaded with."""
+        if source.is_python:
+            return self.module_files(source.target)
+        from mauve_rt.model.library_copies import loaded_dependencies  # noqa: PLC0415
+
+        return loaded_dependencies(Path(source.target)) if Path(source.target).is_file() else []
+
+    def _dependencies(self, module: str) -> dict[str, list[Path]]:
+        from mauve_rt.model.module_dependencies import module_dependencies  # noqa: PLC0415
+        from mauve_rt.model.module_generations import generation_name, plain_name  # noqa: PLC0415
+
+        number, _ = self._packages.get(module.partition(".")[0], (_FIRST, ()))
+        found: dict[str, list[Path]] = {}
+        for package, files in module_dependencies(generation_name(module, number)).items():
+            found.setdefault(plain_name(package), []).extend(files)
+        return found
+
+    def _try(
+        self,
+        sources: Sequence[Source],
+        registry: PluginRegistry,
+        *,
+        in_use: Collection[Name],
+        in_python: Collection[Name],
+        folder: Path,
+    ) -> _Candidate:
+        from mauve_rt.model.plugin_trial import try_plugins  # noqa: PLC0415
+
+        number = next(_NUMBERS)
+        libraries = [source for source in sources if not source.is_python]
+        stamps = Stamps([file for source in sources for file in {*self._own(source), *self._needed(source)}])
+        copies = self._copies(libraries, folder=folder, number=number)
+        modules = {source.target: self._to_load(source) for source in sources if source.is_python}
+        answer = try_plugins(copies, list(modules.items()), generation=number)
+        stale = [file for file, was in stamps.files.items() if Stamps([file]).files[file] != was]
+        if stale:
+            remedy = "wait for the end of the build, then reload again"
+            raise PluginError(f"{stale[0]} was written while it was tried", remedy=remedy)
+        names = frozenset().union(*(source.names for source in sources))
+        _check_kept(answer, frozenset().union(*(source.names for source in libraries)), in_use)
+        check_types(answer["types"], registry, names)
+        outdated = [name for name in _outdated(answer, names, registry) if name not in in_python]
+        _check_not_in_use(outdated, in_use)
+        return _Candidate(
+            number=number,
+            sources=tuple(sources),
+            libraries=tuple(copies),
+            plugins=frozenset(_copied_name(Path(source.target), number) for source in libraries),
+            modules=modules,
+            stamps=stamps,
+            outdated=tuple(outdated),
+        )
+
+    def _own(self, source: Source) -> list[Path]:
+        return [] if source.is_python else [Path(source.target)]
+
+    def _copies(self, libraries: Sequence[Source], *, folder: Path, number: int) -> list[Path]:
+        if not libraries:
+            return []
+        from mauve_rt.model.library_copies import copy_libraries, loaded_dependencies  # noqa: PLC0415
+
+        wanted = {Path(source.target) for source in libraries}
+        for source in libraries:
+            needed = loaded_dependencies(Path(source.target))
+            changed = {*self._loaded.changed_files(source.target, needed), *self._copied} & {*needed}
+            wanted |= {file for file in needed if file in changed or changed & {*loaded_dependencies(file)}}
+        return copy_libraries(sorted(wanted), folder=folder, generation=number)
+
+    def _to_load(self, source: Source) -> tuple[str, ...]:
+        """The packages that are loaded anew for a module: its own, and those on the way to a changed file."""
+        own = source.target.partition(".")[0]
+        found = self._dependencies(source.target)
+        changed = {
+            package for package, files in found.items() if self._loaded.changed_files(source.target, files)
+        }
+        changed |= {package for package in found if self._packages.get(package, (_FIRST, ()))[0] != _FIRST}
+        leading = {package for package in found if changed & {*self._dependencies(package)}}
+        return tuple(sorted({own, *changed, *leading}))
+
+    def _open(self, candidate: _Candidate, registry: PluginRegistry, add_python_parts: Any) -> None:
+        import ctypes  # noqa: PLC0415
+
+        from mauve_rt.model.module_generations import load_module  # noqa: PLC0415
+
+        for library in candidate.libraries:
+            if library.name in candidate.plugins:
+                registry.load_library(str(library))
+            else:
+                ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_LOCAL)
+        for module, packages in candidate.modules.items():
+            for package in packages:
+                self._packages[package] = (candidate.number, packages)
+            loaded = load_module(module, generation=candidate.number, packages=packages)
+            add_python_parts(module, loaded)
+        for kind, name in {name for source in candidate.sources for name in source.names}:
+            if kind in PART_KINDS and registry.generation_of(kind, name) != candidate.number:
+                registry.drop(kind, name)
+        for kind, name in candidate.outdated:
+            registry.drop(kind, name)
+
+    def _keep(self, candidate: _Candidate, kept: PluginGeneration) -> Generation:
+        for source in candidate.sources:
+            if source.is_python:
+                for file, stamp in Stamps(self.module_files(source.target)).files.items():
+                    candidate.stamps.files.setdefault(file, stamp)
+        copied = {library.name for library in candidate.libraries}
+        files = {file for file in candidate.stamps.files if _copied_name(file, candidate.number) in copied}
+        self._copied |= files
+        generation = Generation(
+            number=candidate.number,
+            sources=tuple(source.target for source in candidate.sources),
+            names=frozenset().union(*(source.names for source in candidate.sources)),
+            loaded=(*map(str, sorted(files)), *candidate.modules),
+            outdated=candidate.outdated,
+            kept=kept,
+            stamps=candidate.stamps,
+        )
+        self._history.append(generation)
+        return generation
+
+
+def _copied_name(library: Path, number: int) -> str:
+    stem, dot, rest = library.name.partition(".")
+    return f"{stem}@{number}{dot}{rest}"
+
+
+def _check_kept(answer: Mapping[str, Any], names: Collection[Name], in_use: Collection[Name]) -> None:
+    for kind, name in sorted({*names} & {*in_use}):
+        if kind in PART_KINDS and name not in answer["names"].get(kind, ()):
+            raise PluginError(
+                f"{kind} '{name}' is gone from the new code, and a component has it",
+                element=name,
+                remedy="replace it first, or bring it back",
+            )
+
+
+def _check_not_in_use(outdated: Collection[Name], in_use: Collection[Name]) -> None:
+    for kind, name in sorted({*outdated} & {*in_use}):
+        text = f"{kind} '{name}' was compiled for the shell as it was, and a component has it"
+        raise PluginError(text, element=name, remedy="build its package, too, then reload both")
+
+
+def _outdated(answer: Mapping[str, Any], names: Collection[Name], registry: PluginRegistry) -> list[Name]:
+    """Cores and fsms of other libraries, compiled for a shell that has other members now."""
+    changed = {
+        name
+        for name, shell in answer["shells"].items()
+        if name in registry.names("shell") and not is_same_shell(shell, registry.describe_shell(name))
+    }
+    return [
+        (kind, name)
+        for kind, shell_of in (("core", registry.core_shell), ("fsm", registry.fsm_shell))
+        for name in registry.names(kind)
+        if (kind, name) not in names and shell_of(name) in changed
+    ]

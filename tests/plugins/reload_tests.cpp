@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A package of plug-ins that the tests of reloads build in several variants, each by macros of its own.
+#include <cstdlib>
+#include <stdexcept>
+
+#include "mauve_rt/mauve_rt.hpp"
+
+#ifndef STEP
+#define STEP 1.0
+#endif
+#ifndef GAIN
+#define GAIN 1.0
+#endif
+
+namespace reload_tests {
+
+/// One for the process by the C++ standard: old and new code of one library must not share it.
+inline double step = STEP;
+
+struct Sum {
+  double data{};
+};
+
+struct Number {
+#ifdef OTHER_LAYOUT
+  float data{};
+#else
+  double data{};
+#endif
+};
+
+#ifdef CRASH
+const int crash = [] {
+  std::abort();
+  return 0;
+}();
+#endif
+#ifdef HANG
+const int hang = [] {
+  for (volatile bool goes_on = true; goes_on;) {
+  }
+  return 0;
+}();
+#endif
+#ifdef MISSING
+int missing();
+const int used = missing();
+#endif
+
+}  // namespace reload_tests
+
+MAUVE_TYPE(reload_tests::Sum, "std_msgs/msg/Float64", data)
+MAUVE_TYPE(reload_tests::Number, "reload_tests/Number", data)
+
+namespace reload_tests {
+
+struct LoopShell : mauve::Shell {
+#ifdef OTHER_SHELL
+  mauve::Property<double>& limit = property("limit", 10.0);
+  mauve::ReadPort<Sum>& bias = read_port<Sum>("bias").optional();
+#endif
+  mauve::Property<double>& gain = property("gain", GAIN);
+#ifdef WITHOUT_PORT
+  mauve::WritePort<Sum>& level = write_port<Sum>("level");
+#else
+  mauve::WritePort<Sum>& sum = write_port<Sum>("sum");
+#endif
+};
+
+class Loop : public mauve::Core<LoopShell> {
+#ifdef OTHER_STATE
+  MAUVE_STATE(sum_, rounds_, history_)
+  std::array<double, 4> history_{};
+  std::int32_t rounds_{0};
+#else
+  MAUVE_STATE(sum_, rounds_)
+  std::int64_t rounds_{0};
+#endif
+  double sum_{0.0};
+
+ public:
+  void act() {
+    sum_ += step * shell().gain.value();
+    ++rounds_;
+#ifdef THROWS
+    throw std::runtime_error("the new code is broken");
+#endif
+#ifndef WITHOUT_PORT
+    shell().sum.write({sum_});
+#endif
+  }
+};
+
+/// Of a library of its own, which is not built again.
+class Other : public Loop {};
+
+/// Without values.
+struct Box : mauve::Resource {
+  Box() : Resource("reload_tests/Box", "") {}
+};
+
+class LoopFsm : public mauve::Fsm<LoopShell, Loop> {
+  void define() override {
+    auto& act = execution("act", "act", &Loop::act);
+    auto& pause = wait("pause", mauve::ms_to_ns(1));
+    next(act, pause);
+    next(pause, act);
+    set_initial(act);
+  }
+};
+
+}  // namespace reload_tests
+
+#ifdef OTHER_LIBRARY
+MAUVE_PLUGINS(registry) {
+  registry.core<reload_tests::Other>("reload_tests/Other", "reload_tests/LoopShell");
+}
+#else
+MAUVE_PLUGINS(registry) {
+  registry.type<reload_tests::Sum>();
+  registry.type<reload_tests::Number>();
+  registry.shell<reload_tests::LoopShell>("reload_tests/LoopShell");
+#ifndef WITHOUT_CORE
+  registry.core<reload_tests::Loop>("reload_tests/Loop", "reload_tests/LoopShell");
+#endif
+  registry.fsm<reload_tests::LoopFsm>("reload_tests/LoopFsm", "reload_tests/LoopShell");
+  registry.resource<reload_tests::Box>("reload_tests/Box");
+#ifdef NEW_CORE
+  registry.core<reload_tests::Other>("reload_tests/New", "reload_tests/LoopShell");
+#endif
+}
+#endif

@@ -1,0 +1,339 @@
+"""Rebuilt code is put in force by one transaction, or refused before anything changes.
+
+On threads and in virtual time.
+"""
+
+import os
+import struct
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from page_blocks import blocks
+from pages import PAGES
+from rebuilt_package import RebuiltPackage, compile_plugin
+
+from mauve_rt._kernel import ComponentDescription, Simulation
+from mauve_rt.api import Core
+from mauve_rt.control.control import Control
+from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, ReloadOrder, Request, Step
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.interfaces.descriptions import component_infos
+from mauve_rt.model import load_architecture
+from mauve_rt.parts.state_fields import StateCells
+
+MS = 1_000_000
+FILE = """\
+mauve: 1
+components:
+  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
+         alternatives: [reload_tests/PyLoop, reload_tests/Other]}
+  twin: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm}
+  python: {shell: reload_tests/LoopShell, core: reload_tests/PyLoop, fsm: reload_tests/LoopFsm}
+resources:
+  sum: {kind: shared_data, type: std_msgs/msg/Float64}
+  box: {kind: reload_tests/Box}
+  others: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 2}
+connections:
+  - [loop.sum, sum.write]
+  - [twin.sum, others.write]
+  - [python.sum, others.write]
+"""
+
+
+@dataclass
+class World:
+    """An architecture at work, with a clock that the test lets run."""
+
+    runtime: Runtime
+    control: Control
+    run: Callable[[int], None]  # so many milliseconds
+
+    def reload(self, *targets: str, back: bool = False, dry_run: bool = False) -> Outcome:
+        return self._handle(Request(reload=ReloadOrder(targets=targets, back=back), dry_run=dry_run))
+
+    def ask(self, *steps: Step) -> Outcome:
+        return self._handle(Request(steps=steps))
+
+    def _handle(self, request: Request) -> Outcome:
+        outcome = self.control.handle(request)
+        self.run(5)
+        while outcome.pending is not None:
+            outcome = outcome.pending.look(outcome, wait_ns=100 * MS)
+        return outcome
+
+    def part(self, name: str = "loop") -> ComponentDescription:
+        return next(part for part in self.runtime.components() if part.name == name)
+
+    def sum(self) -> tuple[float, int]:
+        """What the loop wrote last, and how many times it wrote."""
+        data, number, _ = self.runtime.host.read_resource("sum")
+        return struct.unpack_from("<d", data, 4)[0], number
+
+    def mean_step(self) -> float:
+        """By how much the loop adds at each release."""
+        self.run(3)  # a change that was decided is taken
+        before, first = self.sum()
+        while self.sum()[1] < first + 10:
+            self.run(10)
+        after, last = self.sum()
+        return (after - before) / (last - first)
+
+    def generation(self, name: str = "loop") -> int:
+        return next(int(info.generation) for info in component_infos(self.runtime) if info.name == name)
+
+
+@pytest.fixture(params=["threads", "virtual time"])
+def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
+    del rebuilt  # searched first
+    path = tmp_path / "robot.yaml"
+    path.write_text(FILE, encoding="utf-8")
+    if request.param == "threads":
+        runtime = Runtime(lambda: load_architecture(path))
+        run = _sleep
+    else:
+        simulation = Simulation()
+        runtime = SimulatedRuntime(simulation, lambda: load_architecture(path))
+        run = _advance(simulation)
+    runtime.configure()
+    runtime.activate()
+    world = World(runtime, Control(runtime), run)
+    while world.sum()[1] == 0:
+        run(10)
+    yield world
+    runtime.deactivate()
+    runtime.cleanup()
+
+
+def _sleep(duration_ms: int) -> None:
+    time.sleep(duration_ms * 1e-3)
+
+
+def _advance(simulation: Simulation) -> Callable[[int], None]:
+    return lambda duration_ms: simulation.run_until(simulation.now_ns() + duration_ms * MS)
+
+
+def _report(outcome: Outcome, step: str) -> tuple[str, ...]:
+    """The state fields that a step has taken over."""
+    return next(report.taken for report in outcome.report if report.step.startswith(step))
+
+
+def test_rebuilt_code_is_put_in_force(world: World, rebuilt: RebuiltPackage) -> None:
+    assert world.mean_step() == 1.0
+    assert world.generation() == 1
+    before, first = world.sum()
+    rebuilt.build("STEP=2.0")
+    outcome = world.reload("reload_tests")
+    assert outcome.success, outcome.message
+    assert outcome.loaded == (str(rebuilt.library),)
+    assert "3 components run it: loop, twin, python" in outcome.message
+    assert _report(outcome, "replace_core") == ("sum", "rounds")
+    assert [report.missed_releases for report in outcome.report] == [0] * len(outcome.report)
+    assert {report.phase_nominal_ns for report in outcome.report} <= {0, NOT_MEASURED}
+    assert world.mean_step() == 2.0, "an inline variable of the new code is its own"
+    after, last = world.sum()
+    assert last - first < after - before <= 2 * (last - first), "it went on from the sum of the old core"
+    new = world.generation()
+    assert new == world.generation("twin") > 1
+    assert "no code was rebuilt" in world.reload().message
+    assert world.generation() == new
+
+
+def test_there_is_a_way_back_and_forward_again(world: World, rebuilt: RebuiltPackage) -> None:
+    assert world.reload(back=True).code is Code.INVALID
+    rebuilt.build("STEP=2.0")
+    assert world.reload().success
+    rebuilt.build("STEP=4.0", "GAIN=0.75")
+    assert world.reload("loop").success
+    assert world.mean_step() == 3.0, "a default that nobody has set is that of the new code"
+    sum_before = world.sum()[0]
+    outcome = world.reload(back=True)
+    assert outcome.success
+    assert "is in force again" in outcome.message
+    assert world.mean_step() == 2.0
+    assert world.sum()[0] > sum_before, "the sum was handed back"
+    assert world.reload(back=True).success
+    assert world.mean_step() == 1.0
+    assert world.generation() == 1
+    assert world.reload(back=True).code is Code.INVALID
+    assert world.reload().success, "what the disk has"
+    assert world.mean_step() == 3.0
+
+
+def test_a_property_that_was_set_keeps_its_value(world: World, rebuilt: RebuiltPackage) -> None:
+    assert world.ask(Step("set_property", "loop", "gain", "10.0")).success
+    rebuilt.build("GAIN=0.5")
+    assert world.reload().success
+    assert world.mean_step() == 10.0
+    assert world.part("twin").properties[0].value == 0.5
+
+
+def test_another_shell_comes_with_its_component(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("OTHER_SHELL", "STEP=2.0")
+    outcome = world.reload()
+    assert outcome.success, outcome.message
+    assert [port.name for port in world.part().ports] == ["bias", "sum"]
+    assert world.mean_step() == 2.0
+
+
+def test_state_that_does_not_fit_is_told(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("OTHER_STATE")
+    outcome = world.reload()
+    assert outcome.success
+    report = next(each for each in outcome.report if each.step == "replace_core reload_tests/Loop")
+    assert report.taken == ("sum",)
+    assert report.left == (
+        "rounds: int64 before, int32 now",
+        "history: the old core has no such field",
+    )
+
+
+REFUSED = {
+    "OTHER_LAYOUT": "type reload_tests/Number: its layout has changed: field data: float64 at byte 0 before, "
+    "float32 at byte 0 now",
+    "CRASH": "crashed (SIGABRT",
+    "MISSING": "undefined symbol",
+    "WITHOUT_CORE": "core 'reload_tests/Loop' is gone from the new code, and a component has it",
+    "WITHOUT_PORT": "the new shell lacks a port that is connected",
+    'MAUVE_RT_VERSION="9.9.9"': "built against another version of MAUVE RT; expected 0.1.0, found 9.9.9",
+}
+
+
+def test_what_does_not_fit_is_refused_before_anything_changes(world: World, rebuilt: RebuiltPackage) -> None:
+    before = world.part()
+    for macro, why in REFUSED.items():
+        rebuilt.build(macro, "STEP=2.0")
+        outcome = world.reload()
+        assert not outcome.success, macro
+        assert why in outcome.message
+        assert world.generation() == 1
+    data = rebuilt.library.read_bytes()
+    rebuilt.library.unlink()
+    rebuilt.library.write_bytes(data[: len(data) // 2])
+    assert "wait for the end of the build" in world.reload().message
+    assert world.mean_step() == 1.0
+    after = world.part()
+    assert (after.core, after.state, after.fault) == (before.core, "RUNNING", "")
+    rebuilt.build("STEP=3.0")
+    assert world.reload().success, "a refusal is in nobody's way"
+    assert world.mean_step() == 3.0
+
+
+def test_a_dry_run_changes_nothing(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("CRASH")
+    assert "crashed" in world.reload(dry_run=True).message
+    rebuilt.build("STEP=2.0")
+    outcome = world.reload(dry_run=True)
+    assert outcome.success
+    assert str(rebuilt.library) in outcome.message
+    assert (world.generation(), world.mean_step()) == (1, 1.0)
+
+
+def test_a_resource_keeps_its_code(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("STEP=2.0")
+    outcome = world.reload()
+    assert outcome.success
+    assert "resources keep the code that they were made with: box" in outcome.message
+
+
+def test_cores_of_other_libraries_have_to_be_built_with_a_changed_shell(
+    world: World, rebuilt: RebuiltPackage
+) -> None:
+    rebuilt.build("OTHER_SHELL")
+    outcome = world.reload()
+    assert outcome.success
+    assert "not usable until they are built and reloaded, too: reload_tests/Other" in outcome.message
+    refused = world.ask(Step("replace_core", "loop", "reload_tests/Other"))
+    assert not refused.success
+    assert "it was compiled for a shell that has other members by now" in refused.message
+    rebuilt.build_other("OTHER_SHELL")
+    assert world.reload().success
+    swapped = world.ask(Step("replace_core", "loop", "reload_tests/Other"))
+    assert swapped.success, swapped.message
+
+
+def test_the_state_fields_of_the_page(rebuilt: RebuiltPackage, tmp_path: Path) -> None:
+    cpp, python = (
+        next(block.text for block in blocks(PAGES["docs/howto/reload_code.md"]) if words in block.text)
+        for words in ("MAUVE_STATE", "state_fields = {")
+    )
+    source = tmp_path / "pid.cpp"
+    source.write_text(
+        '#include "mauve_rt/mauve_rt.hpp"\nstruct ControlShell : mauve::Shell {};\n'
+        + cpp.replace("...", "")
+        + "int fields() { return Pid().state_fields().size(); }\n",
+        encoding="utf-8",
+    )
+    library = tmp_path / "pid.so"
+    compile_plugin(rebuilt.headers, source, library)
+    names: dict[str, Any] = {"Core": Core}
+    exec(python, names)  # noqa: S102 - a block of the page
+    pid = names["Pid"](None)
+    pid.integral, pid.previous_error = 1.0, 2.0
+    cells = StateCells(pid)
+    assert cells.fields == [("integral", "float64", 8), ("previous_error", "float64", 8)]
+    assert cells.store() == (struct.pack("<dd", 1.0, 2.0), True)
+
+
+def test_a_module_comes_with_the_modules_that_it_uses(world: World, rebuilt: RebuiltPackage) -> None:
+    assert world.ask(Step("replace_core", "loop", "reload_tests/PyLoop")).success
+    first = world.part("python").releases
+    rebuilt.write("reload_tests_step", "STEP = 5.0\n")  # the core's own file is as it was
+    outcome = world.reload("python")
+    assert outcome.success, outcome.message
+    assert outcome.loaded == ("reload_tests_cores",)
+    assert world.generation("python") == world.generation() > 1
+    assert world.generation("twin") == 1
+    assert _report(outcome, "replace_core") == ("sum", "rounds")
+    assert world.part("python").state == "RUNNING"
+    assert world.part("python").releases > first
+    rebuilt.write("reload_tests_step", "STEP = 5.0 +\n")
+    refused = world.reload()
+    assert not refused.success
+    assert "SyntaxError" in refused.message
+    assert world.reload(back=True).success
+    assert world.generation("python") == 1
+
+
+def test_from_cpp_to_python_and_back_the_state_goes_along(world: World, rebuilt: RebuiltPackage) -> None:
+    del rebuilt
+    before = world.sum()[0]
+    there = world.ask(Step("replace_core", "loop", "reload_tests/PyLoop"))
+    assert there.success, there.message
+    assert there.report[0].taken == ("sum", "rounds")
+    assert there.report[0].left == ()
+    world.run(20)
+    back = world.ask(Step("replace_core", "loop", "reload_tests/Loop"))
+    assert back.report[0].taken == ("sum", "rounds")
+    assert world.mean_step() == 1.0
+    assert world.sum()[0] > before + 10, "the core in Python has added to it"
+
+
+def test_a_core_of_rebuilt_code_is_not_taken_without_a_reload(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("STEP=2.0")
+    refused = world.ask(Step("replace_core", "loop", "reload_tests/Loop"))
+    assert not refused.success
+    assert f"{rebuilt.library} was changed since this process loaded it" in refused.message
+    assert "mauve reload" in refused.message
+    assert world.mean_step() == 1.0
+
+
+def test_unknown_targets_and_protected_components_are_refused(world: World, rebuilt: RebuiltPackage) -> None:
+    refused = world.reload("lop")
+    assert refused.code is Code.INVALID
+    assert "'lop' is no component, and no package with code that is loaded; did you mean" in refused.message
+    rebuilt.build("STEP=2.0")
+    assert world.reload("loop", "python").success
+
+
+def test_the_file_may_be_overwritten_while_its_copy_runs(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("STEP=2.0")
+    assert world.reload().success
+    with rebuilt.library.open("r+b") as file:  # in place, as `cp` does
+        file.write(os.urandom(rebuilt.library.stat().st_size))
+    assert world.mean_step() == 2.0
+    assert not world.reload().success
