@@ -34,6 +34,7 @@ from reconfiguration import (
 from recording import recording_rows
 from recording_kept import kept_rows
 from recording_killed import kill_rows
+from reload import reload_rows
 from rows import Row, markdown, not_available
 from rules import rule_rows
 from safe_stop import safe_stop_rows
@@ -56,6 +57,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "stop": stop_rows,
     "stop-beside": stop_beside_rows,
     "swap": swap_rows,
+    "reload": reload_rows,
     "prefault": prefault_rows,
     "transaction": transaction_rows,
     "refused": refused_rows,

@@ -11,6 +11,7 @@ class Settings:
     rounds: int
     wakeup_s: float
     swaps: int
+    reloads: int
     stops: int
     busy_stops: int
     deployments: int
@@ -34,6 +35,7 @@ QUICK = Settings(
     rounds=10,
     wakeup_s=1.0,
     swaps=100,
+    reloads=10,
     stops=30,
     busy_stops=10,
     deployments=8,
@@ -54,6 +56,7 @@ FULL = Settings(
     rounds=20,
     wakeup_s=3.0,
     swaps=500,
+    reloads=50,
     stops=100,
     busy_stops=40,
     deployments=30,

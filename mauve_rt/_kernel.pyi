@@ -489,7 +489,10 @@ class Transaction:
         self, kind: str, target: str = "", name: str = "", value: PropertyValue | None = None
     ) -> Transaction:
         """A step by the name of its kind, with no object in it; the calls below are the same, typed."""
-    def replace_core(self, component: str, core: str | type[Core[Any]]) -> Transaction: ...
+    def replace_core(
+        self, component: str, core: str | type[Core[Any]], probation: ProbationOptions | None = None
+    ) -> Transaction:
+        """With `probation`, an fsm that the same transaction replaces is on probation with the core."""
     def replace_fsm(self, component: str, fsm: str | type[Fsm[Any, Any]]) -> Transaction:
         """The new one goes on in the wait of the same name, where the pending instant lies on its grid.
 
@@ -548,6 +551,48 @@ class Transaction:
         Every component goes on in its place, all its instants later by the same, less than a period. The
         report has a line for each, with its `shift_ns`.
         """
+
+@final
+class OutputLimit:
+    """What a number of an output must be; NaN breaks a bound, too. `field`: empty: each number."""
+
+    def __init__(
+        self,
+        port: str,
+        field: str = "",
+        *,
+        minimum: float | None = None,
+        maximum: float | None = None,
+        not_nan: bool = False,
+    ) -> None: ...
+
+@final
+class ProbationOptions:
+    """How long a new core is on probation, and which violations put the old core back."""
+
+    def __init__(
+        self,
+        duration_ns: int,
+        *,
+        on_fault: bool = True,
+        on_overrun: bool = False,
+        on_over_declared: bool = False,
+        outputs: list[OutputLimit] = [],
+        min_releases: int = 1,
+    ) -> None: ...
+
+@final
+class ProbationRecord:
+    """One probation; fields as mauve_msgs/msg/Probation."""
+
+    component: Final[str]
+    from_core: Final[str]
+    to_core: Final[str]
+    verdict: Final[str]  # running, passed, reverted or inconclusive
+    reason: Final[str]
+    releases: Final[int]  # of the new core
+    begin_ns: Final[int]
+    end_ns: Final[int]  # when it was decided; while it runs: when it is over
 
 @final
 class TransactionReport:
@@ -729,6 +774,15 @@ class Host:
         force: bool = False,
     ) -> Committed:
         """As commit(), but waits for no release that follows: ask what it returns."""
+    def settle_probations(self) -> None:
+        """Decides the probations whose time is over, and retires what they have put out."""
+    def probations(self) -> list[ProbationRecord]:
+        """Of each component the last verdict, then the core on probation now."""
+    def revert_probation(self, component: str, reason: str, timeout_ns: int = 1_000_000_000) -> bool:
+        """Puts the old core back; False: no core is on probation, or it was decided before.
+
+        Raises MauveError (timeout): the request stays pending.
+        """
     def replace_core(
         self,
         component: str,

@@ -240,6 +240,16 @@ void bind_host(py::module_& module) {
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
            py::arg("force") = false, py::keep_alive<0, 1>())
+      .def(
+          "settle_probations", [](PyHost& self) { self.host().settle_probations(); }, Unlocked())
+      .def(
+          "probations", [](PyHost& self) { return self.host().probations(); }, Unlocked())
+      .def(
+          "revert_probation",
+          [](PyHost& self, const std::string& component, const std::string& reason, time_ns_t timeout_ns) {
+            return self.host().revert_probation(component, reason, timeout_ns);
+          },
+          py::arg("component"), py::arg("reason"), py::arg("timeout_ns") = s_to_ns(1), Unlocked())
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
            py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
       .def(

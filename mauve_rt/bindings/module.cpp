@@ -13,6 +13,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_settings(module);
   bind_architecture(module);
   bind_value_log(module);
+  bind_probation(module);
   bind_transaction(module);
   bind_host(module);
   bind_simulation(module);

@@ -47,16 +47,21 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
   transaction
       .def(
           "replace_core",
-          [](Self self, const std::string& component, const py::object& core) -> Self {
+          [](Self self, const std::string& component, const py::object& core,
+             const std::optional<ProbationOptions>& probation) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
-              if (is_name(core)) {
+              if (is_name(core) && probation) {
+                steps.replace_core(component, core.cast<std::string>(), *probation);
+              } else if (is_name(core)) {
                 steps.replace_core(component, core.cast<std::string>());
+              } else if (probation) {
+                steps.replace_core(component, make_core(core, registry), *probation);
               } else {
                 steps.replace_core(component, make_core(core, registry));
               }
             });
           },
-          py::arg("component"), py::arg("core"))
+          py::arg("component"), py::arg("core"), py::arg("probation") = std::nullopt)
       .def(
           "replace_fsm",
           [](Self self, const std::string& component, const py::object& fsm) -> Self {

@@ -15,6 +15,7 @@ from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 
 from mauve_rt.cli.completion_cache import Cache
 from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
+from mauve_rt.cli.exchange import Exchange
 from mauve_rt.cli.transport import accounts_in_the_way, by_fast_dds, by_udp
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.discovery import limit_discovery, stays_on_this_machine
@@ -180,6 +181,10 @@ class Client:
     def poll(self, service_type: Any, service: str, *, every_s: float) -> "Poll":
         """For who asks a service again and again, and waits for no answer."""
         return Poll(self._discovery, service_type, service, every_s=every_s)
+
+    def exchange(self, service_type: Any, service: str) -> Exchange:
+        """For a caller that sends a request to a service, and does something else until the reply comes."""
+        return Exchange(self._discovery, service_type, service, resend_s=RESEND_S)
 
     def follow(self, message_type: Any, topic: str, heard: Callable[[Any], None]) -> None:
         """Call `heard` with every message, in spin()."""

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from mauve_rt.cli.views import console, duration
 from mauve_rt.control.state_age import in_words
+from mauve_rt.counts import counted
 
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
@@ -27,8 +28,7 @@ def print_components(reply: Any, out: Console | None = None) -> None:
     for name, element, author in _authors(reply):
         out.print(f"[bold]{name}[/]: {escape(element)} by {escape(author)}", soft_wrap=True)
     for component in reply.components:
-        if component.fault:
-            out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
+        _print_remarks(component, out)
     for component in reply.components:
         if component.hung or component.state_age_ns > component.period_ns > 0:
             style = "bold red" if component.hung else "yellow"
@@ -40,6 +40,13 @@ def print_components(reply: Any, out: Console | None = None) -> None:
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")
+
+
+def _print_remarks(component: Any, out: Console) -> None:
+    if component.fault:
+        out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
+    for probation in component.probations:
+        out.print(f"[bold]{component.name}[/]: {escape(probation_line(probation))}", soft_wrap=True)
 
 
 def _authors(reply: Any) -> Iterator[tuple[str, str, str]]:
@@ -80,6 +87,16 @@ def _cores(reply: Any) -> Table:
         cores = "\n".join([component.core, *(f"[dim]{core}[/]" for core in others)])
         table.add_row(component.name, cores, str(component.generation or "-"), _built(component.built_ns))
     return table
+
+
+def probation_line(probation: Any) -> str:
+    """A core on probation, or the last verdict, in words."""
+    verdict = {0: "on probation", 1: "passed its probation", 2: "reverted", 3: "probation inconclusive"}
+    text = f"{probation.to_core} {verdict.get(probation.verdict, str(probation.verdict))}"
+    text += f", {counted(probation.releases, 'release')}"
+    if probation.reason:
+        text += f": {probation.reason}"
+    return f"{text} (before: {probation.from_core})"
 
 
 def _built(built_ns: int) -> str:

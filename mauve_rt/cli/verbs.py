@@ -8,6 +8,7 @@ from typing import Any
 from mauve_rt.cli import (
     analyze_verb,
     check_verb,
+    dev_verb,
     echo_verb,
     mirror_verb,
     report_verb,
@@ -84,6 +85,40 @@ def _add_phase_timeout(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_probation(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--probation",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="put the new core on probation for S seconds: a violation puts the old core back",
+    )
+    parser.add_argument(
+        "--revert-on",
+        action="append",
+        default=[],
+        metavar="V",
+        help="violation: fault, overrun, over_declared, nan, or {output: PORT.FIELD, minimum: X, "
+        "maximum: Y}; may be repeated (default: fault and nan)",
+    )
+    parser.add_argument(
+        "--probation-releases",
+        type=int,
+        default=0,
+        metavar="N",
+        help="releases without which the verdict is inconclusive (default 1)",
+    )
+
+
+def _probation_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Fields of a request."""
+    return {
+        "probation_s": args.probation,
+        "revert_on": args.revert_on,
+        "probation_releases": max(args.probation_releases, 0),
+    }
+
+
 def _add_stop(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
@@ -93,6 +128,7 @@ def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
+    _add_probation(parser)
     completed_by(parser.add_argument("core", help="the new core, package/Class"), complete_cores)
 
 
@@ -120,6 +156,7 @@ def _add_reload(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="try and check the new code in a process of its own only"
     )
+    _add_probation(parser)
     _add_record(parser)
     _add_timeout(parser)
     _add_force(parser)
@@ -185,6 +222,7 @@ def _replace_core(args: argparse.Namespace) -> int:
         core=args.core,
         commit_timeout_s=args.timeout,
         force=args.force,
+        **_probation_of(args),
     )
 
 
@@ -227,6 +265,7 @@ def _reload(args: argparse.Namespace) -> int:
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
         force=args.force,
+        **_probation_of(args),
     )
 
 
@@ -407,6 +446,12 @@ VERBS = (
     ),
     Verb("reconfigure", "carry out a transaction: all its steps or none", _add_reconfigure, _reconfigure),
     Verb("reload", "load rebuilt code into a running executor, or go back", _add_reload, _reload),
+    Verb(
+        "dev",
+        "build, test and reload code at each save, while the executor runs",
+        dev_verb.add_arguments,
+        dev_verb.main,
+    ),
     Verb("events", "show the reconfigurations of an executor as they happen", add_executor_and_json, _events),
     Verb("nodes", "list the executors that can be reached", _add_json, _nodes),
     Verb(

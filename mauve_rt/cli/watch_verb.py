@@ -1,18 +1,14 @@
 """`mauve watch NODE...`: a live table of executors in the terminal."""
 
 import argparse
-import os
-import select
 import sys
-import termios
 import time
-import tty
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from mauve_rt.cli.arguments import absolute_name
 from mauve_rt.cli.completion import complete_executors, completed_by
+from mauve_rt.cli.keys import keys_at_once, pressed_keys
 from mauve_rt.cli.verb import BAD_USAGE, OK
 
 if TYPE_CHECKING:
@@ -23,7 +19,7 @@ _REFRESH_S = 0.25
 _FIRST_S = 5.0  # for a first answer, with --once
 _FIGURES_S = 2.5  # /diagnostics comes once a second, and a rate takes two of them
 _STEPS = {"up": -1, "k": -1, "down": 1, "j": 1}
-_ESCAPE, _BACKSPACE = "\x1b", ("\x7f", "\b")
+_BACKSPACE = ("\x7f", "\b")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,11 +90,11 @@ def _show(executors: "Sequence[WatchedExecutor]", look: Callable[[], None]) -> N
     from mauve_rt.cli.watch_view import Selection, view  # noqa: PLC0415
 
     selection = Selection()
-    with _keys_at_once(), Live(console=console(), screen=True, auto_refresh=False) as live:
+    with keys_at_once(), Live(console=console(), screen=True, auto_refresh=False) as live:
         shown_s = 0.0
         while True:
             look()
-            keys = [*_keys()]
+            keys = [*pressed_keys()]
             if any(not press(key, selection, executors) for key in keys):
                 return
             is_due = not selection.is_paused and time.monotonic() >= shown_s + _REFRESH_S
@@ -155,32 +151,3 @@ def _type(key: str, selection: "Selection") -> None:
         selection.filter = selection.filter[:-1]
     elif len(key) == 1 and key.isprintable():
         selection.filter += key
-
-
-@contextmanager
-def _keys_at_once() -> Iterator[None]:
-    """Keys arrive without Enter and are not echoed."""
-    before = termios.tcgetattr(sys.stdin)
-    try:
-        tty.setcbreak(sys.stdin)
-        yield
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
-
-
-def _keys() -> Iterator[str]:
-    """The keys pressed since the last call; "up", "down", "enter" and "escape" by these names."""
-    if not select.select([sys.stdin], [], [], 0)[0]:
-        return
-    text = os.read(sys.stdin.fileno(), 1024).decode(errors="replace")
-    if not text:
-        raise KeyboardInterrupt  # the terminal is gone
-    named = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
-    while text:
-        sequence = text[:3]
-        if sequence in named:
-            yield named[sequence]
-            text = text[3:]
-        else:
-            yield {"\r": "enter", "\n": "enter", _ESCAPE: "escape"}.get(text[0], text[0])
-            text = text[1:]

@@ -83,6 +83,11 @@ def _check_reload(order: ReloadOrder) -> None:
     if len(order.targets) > MAX_TARGETS or any(len(text) > MAX_TEXT for text in order.targets):
         text = f"expected at most {MAX_TARGETS} targets, and none longer than {MAX_TEXT} characters"
         raise RefusalError(Code.INVALID, text)
+    if len(order.probation) > MAX_VALUE:
+        raise RefusalError(Code.INVALID, f"the probation is longer than {MAX_VALUE} characters")
+    if order.back and order.probation:
+        text = "the way back needs no probation: that code ran before; leave probation_s out"
+        raise RefusalError(Code.INVALID, text)
 
 
 def _check_recording(order: RecordingOrder) -> None:

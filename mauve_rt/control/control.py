@@ -15,6 +15,7 @@ from mauve_rt._kernel import (
 )
 from mauve_rt.control.checks import check_form, check_revision, check_state, check_time
 from mauve_rt.control.limits import RequestLimits
+from mauve_rt.control.probations import Verdict
 from mauve_rt.control.reloads import Reload
 from mauve_rt.control.reports import Following, message_of, reports_of
 from mauve_rt.control.requests import (
@@ -85,6 +86,7 @@ class Control:
     | `_under_way` | every request with an id      | `_answered`; who repeats a request waits in it  |
     | `_taken`     | changes                       | `_changing`                                     |
     | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
+    | `_trials`    | reloads; the watch of verdicts | exchanged item by item                          |
     | the bag      | orders, in `_recordings`      | `_changing`                                     |
     """
 
@@ -112,6 +114,7 @@ class Control:
         self._under_way: dict[str, Request] = {}
         self._answered = threading.Condition()
         self._changing = threading.Lock()
+        self._trials: dict[str, int] = {}  # by component: the generation that is on probation there, or 0
 
     def handle(self, request: Request) -> Outcome:
         """Do what is asked, or nothing at all. Never raises: every request gets its outcome."""
@@ -141,6 +144,15 @@ class Control:
                     self._log.add(request, replace(outcome, pending=None))
                 self._under_way.pop(identity, None)
                 self._answered.notify_all()
+
+    def way_back(self, verdict: Verdict) -> Request | None:
+        """What else goes back when an old core is back: the other parts of its generation; None: nothing."""
+        record = verdict.record
+        generation = self._trials.pop(record.component, 0)
+        if not verdict.is_reverted or generation == 0:
+            return None
+        order = ReloadOrder(targets=(record.component,), back=True, generation=generation)
+        return Request(reload=order, requested_by="kernel", cause=f"probation reverted: {record.reason}")
 
     def remember(self, request: Request, outcome: Outcome) -> None:
         """Note what came of a request that somebody else carried out: who repeats it gets that."""
@@ -213,13 +225,15 @@ class Control:
         if reload.generation is None:
             prefix = "dry run: would be accepted; " if request.dry_run else ""
             return Outcome(code=Code.OK, message=prefix + found)
-        steps, transaction = reload.steps()
         try:
+            steps, transaction = reload.steps()
             committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
         except BaseException:
             reload.undo()
             raise
         reload.commit()
+        number = 0 if reload.probation is None else reload.generation.number
+        self._trials.update(dict.fromkeys((step.target for step in steps), number))
         outcome = Outcome(
             code=Code.OK, message=reload.message(steps), loaded=reload.generation.loaded, report=()
         )

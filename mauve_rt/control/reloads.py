@@ -9,10 +9,13 @@ from mauve_rt.control.requests import BY_RELOAD, Code, RefusalError, ReloadOrder
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.counts import counted
 from mauve_rt.model import PluginLoader
+from mauve_rt.model.code_layouts import shell_layout
 from mauve_rt.model.generations import Generation, Name, Source
+from mauve_rt.model.probation import Probation, read_probation
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.steps import Step
 from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.yaml.text import YamlError, read_yaml
 
 _PARTS = ("shell", "fsm", "core")
 
@@ -25,6 +28,8 @@ class Reload:
     order: ReloadOrder
     parts: Sequence[ComponentDescription]
     generation: Generation | None = None
+    probation: Probation | None = None
+    _shells: dict[str, list[object]] = field(default_factory=dict)  # layout by name, of the code of before
     _defaults: dict[str, dict[str, object]] = field(default_factory=dict)  # by shell, of the code of before
 
     def load(self, *, dry_run: bool) -> str:
@@ -34,6 +39,7 @@ class Reload:
             RefusalError: a target is unknown, or there is no way back.
             PluginError: the new code cannot be loaded. Nothing has changed then.
         """
+        self.probation = self._read_probation()
         with self.runtime.loading() as loader:
             chosen = self._chosen(loader)
             if self.order.back:
@@ -60,9 +66,15 @@ class Reload:
             used = [kind for kind in _PARTS if (kind, getattr(part, kind)) in names]
             if "shell" in used and "core" not in used and self._is_python("core", part.core):
                 used.append("core")  # it is made for one shell object
+            if self.probation is not None:
+                used = self._on_probation(part, used)
             for kind in used or ["core"]:  # of the fallback alone: it is made anew with the core
                 steps.append(Step(f"replace_{kind}", part.name, getattr(part, kind)))
-                transaction.add(steps[-1].kind, part.name, steps[-1].name)
+                if kind == "core" and self.probation is not None:
+                    ports = self.runtime.registry.describe_shell(part.shell).ports
+                    transaction.replace_core(part.name, part.core, self.probation.options(ports))
+                else:
+                    transaction.add(steps[-1].kind, part.name, steps[-1].name)
             for name, value in self._new_defaults(part).items() if "shell" in used else ():
                 steps.append(Step("set_property", part.name, name, json.dumps(value)))
                 transaction.add("set_property", part.name, name, value)
@@ -109,16 +121,37 @@ class Reload:
         ]
         late = [name for _, name in self.generation.outdated]
         waits = f"not usable until they are built and reloaded, too: {', '.join(late)}" if late else ""
+        trial = f"on probation for {self.probation.duration_s:g} s" if self.probation is not None else ""
         stays = f"resources keep the code that they were made with: {', '.join(kept)}" if kept else ""
         return "; ".join(
-            text for text in (what, runs or "no component has a part of it", stays, waits) if text
+            text for text in (what, runs or "no component has a part of it", trial, stays, waits) if text
         )
+
+    def _read_probation(self) -> Probation | None:
+        if not self.order.probation:
+            return None
+        try:
+            return read_probation(read_yaml(self.order.probation))
+        except (YamlError, ValueError) as error:
+            raise RefusalError(Code.INVALID, f"probation: {error}") from None
+
+    def _on_probation(self, part: ComponentDescription, used: list[str]) -> list[str]:
+        """The shell stays, which the old core goes back to."""
+        if "shell" in used:
+            now = self.runtime.registry.describe_shell(part.shell)
+            layout, defaults = shell_layout(now), {item.name: item.value for item in now.properties}
+            if (layout, defaults) != (self._shells[part.shell], self._defaults[part.shell]):
+                text = f"component '{part.name}': shell {part.shell} has changed"
+                remedy = "reload it without probation"
+                raise RefusalError(Code.INVALID, f"{text}, so that the old core could not go back; {remedy}")
+        return [kind for kind in ("fsm", "core") if kind in used or kind == "core"]
 
     def _note_defaults(self, loader: PluginLoader, names: Collection[Name]) -> None:
         for kind, name in names:
             if kind == "shell" and name in loader.registry.names("shell"):
                 shell = loader.registry.describe_shell(name)
                 self._defaults[name] = {item.name: item.value for item in shell.properties}
+                self._shells[name] = shell_layout(shell)
 
     def _new_defaults(self, part: ComponentDescription) -> dict[str, PropertyValue]:
         """Properties that nobody has set, and that have another default in the new shell."""
@@ -142,7 +175,7 @@ class Reload:
 
     def _go_back(self, loader: PluginLoader, chosen: Sequence[Source], *, dry_run: bool) -> str:
         generation = loader.generations.last({source.target for source in chosen})
-        if generation is None:
+        if generation is None or self.order.generation not in (0, generation.number):
             raise RefusalError(Code.INVALID, "there is no generation to go back from; nothing was reloaded")
         self._check_protected(generation.names)
         self._note_defaults(loader, generation.names)

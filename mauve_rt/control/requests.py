@@ -89,9 +89,12 @@ class ReloadOrder:
 
     targets: tuple[str, ...] = ()  # packages and components; none: all that was rebuilt
     back: bool = False
+    probation: str = ""  # YAML text, as the value of a step replace_core; empty: none
+    generation: int = 0  # to go back from; 0: the last one
 
     def __str__(self) -> str:
-        return cut(" ".join(("reload", *self.targets)) + " back" * self.back, _LONGEST_WORDS)
+        words = " ".join(("reload", *self.targets)) + " back" * self.back
+        return cut(f"{words} {self.probation}" if self.probation else words, _LONGEST_WORDS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +145,7 @@ class Request:
         if self.recording is not None:
             yield from (self.recording.bag, *self.recording.topics, *self.recording.values)
         if self.reload is not None:
-            yield from self.reload.targets
+            yield from (*self.reload.targets, self.reload.probation)
 
     def digest(self) -> bytes:
         """Of its contents: equal where two requests are, for all that anybody will ever see."""

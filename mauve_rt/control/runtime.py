@@ -13,6 +13,7 @@ from mauve_rt._kernel import (
     Deployer,
     Host,
     PluginRegistry,
+    ProbationRecord,
     RealtimeStatus,
     RecentMaxima,
     ResourceDescription,
@@ -239,6 +240,11 @@ class Runtime:
         named = (("shell", part.shell), ("core", part.core), ("fsm", part.fsm))
         plugins = [self.index.find(kind, name) for kind, name in named]
         return any(plugin is not None and plugin.is_python for plugin in plugins)
+
+    def probations(self) -> list[ProbationRecord]:
+        """Of each component the last verdict, then the core on probation now; none while unconfigured."""
+        host = self._host
+        return host.probations() if host is not None else []
 
     def threads_left_behind(self) -> int:
         """Threads of removed components that still run a timed-out execution."""

@@ -35,6 +35,7 @@ from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
+from mauve_rt.model.probation import read_probation
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
@@ -163,11 +164,30 @@ class Plan:
             if step.name not in allowed:
                 raise _undeclared(step, kind, allowed, loader)
             loader.require(kind, step.name)
-        self.transaction.add(step.kind, step.target, step.name)
+        if step.value and kind == "core":
+            self._replace_on_probation(step, sketch)
+        else:
+            self.transaction.add(step.kind, step.target, step.name)
         if kind == "shell":
             shell = self._runtime.registry.describe_shell(step.name)
             _check_structs(shell)
             sketch.properties = {item.name: item for item in shell.properties}
+
+    def _replace_on_probation(self, step: Step, sketch: _Sketch) -> None:
+        subject = f"step {step.kind} of '{step.target}'"
+        try:
+            probation = read_probation(_yaml(step, subject))
+        except ValueError as error:
+            raise RefusalError(Code.INVALID, f"{subject}: {error}") from None
+        if not isinstance(self.transaction, Transaction):
+            text = f"{subject}: a rule of the executor cannot put a core on probation"
+            raise RefusalError(Code.UNSUPPORTED, f"{text}; give the rule `in: supervisor`")
+        shell = next(
+            (part.shell for part in self._runtime.components() if part.name == step.target),
+            sketch.model.shell,
+        )
+        ports = self._runtime.registry.describe_shell(shell).ports
+        self.transaction.replace_core(step.target, step.name, probation.options(ports))
 
     def _add_component(self, step: Step) -> None:
         name = step.target

@@ -8,6 +8,7 @@ from mauve_msgs.msg import (
     ComponentInfo,
     ComponentStatus,
     PortInfo,
+    Probation,
     RealtimeStatus,
     ReconfigurationEvent,
     ResourceInfo,
@@ -15,7 +16,7 @@ from mauve_msgs.msg import (
     StepReport,
     TraceArchitecture,
 )
-from mauve_rt._kernel import ComponentDescription, DescribedState, PortDescription
+from mauve_rt._kernel import ComponentDescription, DescribedState, PortDescription, ProbationRecord
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
@@ -32,6 +33,7 @@ def component_info(
     alternatives: list[str],
     authors: Mapping[str, str],
     code: tuple[int, int] = (0, 0),
+    probations: Iterable[ProbationRecord] = (),
 ) -> Any:
     """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element.
 
@@ -62,6 +64,7 @@ def component_info(
         deadline_ns=component.deadline_ns,
         generation=code[0],
         built_ns=code[1],
+        probations=[_probation(record) for record in probations],
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
@@ -95,12 +98,16 @@ def component_infos(runtime: Runtime) -> list[Any]:
 
 def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription]) -> list[Any]:
     authors = runtime.authors()
+    probations: dict[str, list[ProbationRecord]] = {}
+    for record in runtime.probations():
+        probations.setdefault(record.component, []).append(record)
     return [
         component_info(
             part,
             alternatives=runtime.cores_of(part),
             authors=authors.get(part.name, {}),
             code=runtime.code_of(part.core),
+            probations=probations.get(part.name, ()),
         )
         for part in components
     ]
@@ -164,6 +171,19 @@ def architecture_state(
         realtime=realtime_status(runtime),
         error=error,
         rules=list(rules),
+    )
+
+
+def _probation(record: ProbationRecord) -> Any:
+    return Probation(
+        component=record.component,
+        from_core=record.from_core,
+        to_core=record.to_core,
+        verdict=getattr(Probation, record.verdict.upper()),
+        reason=record.reason,
+        releases=record.releases,
+        begin_ns=record.begin_ns,
+        end_ns=record.end_ns,
     )
 
 

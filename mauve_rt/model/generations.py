@@ -6,7 +6,7 @@ loaded. Its parts are in force for the registry: whatever is made from then on i
 
 import itertools
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +17,7 @@ from mauve_rt.errors import PluginError
 from mauve_rt.model.code_layouts import check_types, is_same_shell
 from mauve_rt.model.loaded_code import LoadedCode, Stamps
 
+MARK = "@"  # in the names of copies and modules of a generation
 PART_KINDS = ("shell", "core", "fsm", "resource")
 _FIRST = 1
 _NUMBERS = itertools.count(
@@ -54,6 +55,7 @@ class _Candidate:
     number: int
     sources: tuple[Source, ...]
     libraries: tuple[Path, ...]  # copies and what they need, in the order to open
+    copied: frozenset[Path]  # the libraries themselves
     plugins: frozenset[str]  # file names of the copies that register plug-ins
     modules: Mapping[str, tuple[str, ...]]  # module: packages of the generation
     stamps: Stamps
@@ -71,15 +73,17 @@ class CodeGenerations:
         self._packages: dict[str, tuple[int, tuple[str, ...]]] = {}  # by top-level package
         self.outdated: dict[Name, str] = {}
 
-    def rebuilt(self, sources: Iterable[Source]) -> dict[str, list[Path]]:
+    def rebuilt(self, sources: Collection[Source]) -> dict[str, list[Path]]:
         """The files that were changed since they were loaded, by source; none of a source that was not.
 
         Raises:
             PluginError: a file is no complete library.
         """
+        needed = self._needed_libraries(sources)
         found = {}
         for source in sources:
-            files = self._loaded.changed_files(source.target, self._needed(source))
+            others = self.module_files(source.target) if source.is_python else needed.get(source.target, ())
+            files = self._loaded.changed_files(source.target, others)
             if files or source.target in self._gone_back:
                 found[source.target] = files
         return found
@@ -165,13 +169,24 @@ class CodeGenerations:
         """The files of a loaded module, of its package, and of the other packages that it uses."""
         return [file for files in self._dependencies(module).values() for file in files]
 
-    def _needed(self, source: Source) -> list[Path]:
-        """Libraries or files of other packages that it was loaded with."""
-        if source.is_python:
-            return self.module_files(source.target)
-        from mauve_rt.model.library_copies import loaded_dependencies  # noqa: PLC0415
+    def _needed_libraries(self, sources: Collection[Source]) -> dict[str, list[Path]]:
+        """What the libraries were loaded with, where some of that has changed; else nothing is looked up."""
+        own = {Path(source.target) for source in sources}
+        if not {*self._changed_libraries()} - own:
+            return {}
+        from mauve_rt.model.plugin_trial import needed_libraries  # noqa: PLC0415
 
-        return loaded_dependencies(Path(source.target)) if Path(source.target).is_file() else []
+        libraries = [Path(source.target) for source in sources if not source.is_python]
+        answer = needed_libraries([library for library in libraries if library.is_file()])
+        return {target: [Path(file) for file in files] for target, files in answer.items()}
+
+    def _changed_libraries(self) -> list[Path]:
+        """Libraries that the loader opened for others, and that are others by now."""
+        from mauve_rt.model.opened_libraries import opened_libraries  # noqa: PLC0415
+        from mauve_rt.model.workspace_files import may_be_rebuilt  # noqa: PLC0415
+
+        opened = (Path(path) for name, path in opened_libraries().items() if MARK not in name)
+        return [path for path in opened if may_be_rebuilt(path) and self._loaded.is_changed(path)]
 
     def _dependencies(self, module: str) -> dict[str, list[Path]]:
         from mauve_rt.model.module_dependencies import module_dependencies  # noqa: PLC0415
@@ -192,14 +207,21 @@ class CodeGenerations:
         in_python: Collection[Name],
         folder: Path,
     ) -> _Candidate:
-        from mauve_rt.model.plugin_trial import try_plugins  # noqa: PLC0415
+        from mauve_rt.model.plugin_trial import Copies, try_plugins  # noqa: PLC0415
 
         number = next(_NUMBERS)
         libraries = [source for source in sources if not source.is_python]
-        stamps = Stamps([file for source in sources for file in {*self._own(source), *self._needed(source)}])
-        copies = self._copies(libraries, folder=folder, number=number)
+        changed = {*self._changed_libraries(), *self._copied} if libraries else set()
+        files = [file for source in sources if source.is_python for file in self.module_files(source.target)]
+        stamps = Stamps([*files, *changed, *(Path(source.target) for source in libraries)])
         modules = {source.target: self._to_load(source) for source in sources if source.is_python}
-        answer = try_plugins(copies, list(modules.items()), generation=number)
+        answer = try_plugins(
+            [Path(source.target) for source in libraries],
+            list(modules.items()),
+            generation=number,
+            copies=Copies(folder, changed),
+        )
+        opened = tuple(Path(library) for library in answer["opened"])
         stale = [file for file, was in stamps.files.items() if Stamps([file]).files[file] != was]
         if stale:
             remedy = "wait for the end of the build, then reload again"
@@ -212,27 +234,13 @@ class CodeGenerations:
         return _Candidate(
             number=number,
             sources=tuple(sources),
-            libraries=tuple(copies),
+            libraries=opened,
+            copied=frozenset(Path(library) for library in answer["copied"]),
             plugins=frozenset(_copied_name(Path(source.target), number) for source in libraries),
             modules=modules,
             stamps=stamps,
             outdated=tuple(outdated),
         )
-
-    def _own(self, source: Source) -> list[Path]:
-        return [] if source.is_python else [Path(source.target)]
-
-    def _copies(self, libraries: Sequence[Source], *, folder: Path, number: int) -> list[Path]:
-        if not libraries:
-            return []
-        from mauve_rt.model.library_copies import copy_libraries, loaded_dependencies  # noqa: PLC0415
-
-        wanted = {Path(source.target) for source in libraries}
-        for source in libraries:
-            needed = loaded_dependencies(Path(source.target))
-            changed = {*self._loaded.changed_files(source.target, needed), *self._copied} & {*needed}
-            wanted |= {file for file in needed if file in changed or changed & {*loaded_dependencies(file)}}
-        return copy_libraries(sorted(wanted), folder=folder, generation=number)
 
     def _to_load(self, source: Source) -> tuple[str, ...]:
         """The packages that are loaded anew for a module: its own, and those on the way to a changed file."""
@@ -271,14 +279,12 @@ class CodeGenerations:
             if source.is_python:
                 for file, stamp in Stamps(self.module_files(source.target)).files.items():
                     candidate.stamps.files.setdefault(file, stamp)
-        copied = {library.name for library in candidate.libraries}
-        files = {file for file in candidate.stamps.files if _copied_name(file, candidate.number) in copied}
-        self._copied |= files
+        self._copied |= candidate.copied
         generation = Generation(
             number=candidate.number,
             sources=tuple(source.target for source in candidate.sources),
             names=frozenset().union(*(source.names for source in candidate.sources)),
-            loaded=(*map(str, sorted(files)), *candidate.modules),
+            loaded=(*map(str, sorted(candidate.copied)), *candidate.modules),
             outdated=candidate.outdated,
             kept=kept,
             stamps=candidate.stamps,

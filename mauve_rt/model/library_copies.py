@@ -17,7 +17,7 @@ it: one that is not copied is the first one.
 import ctypes
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from mauve_rt.errors import PluginError
@@ -28,59 +28,54 @@ from mauve_rt.model.workspace_files import may_be_rebuilt
 _OWN_MODULES = ("mauve_rt._kernel", "mauve_rt._bridge")
 _RTLD_DI_LINKMAP = 2
 
-
-def mapped_libraries() -> list[Path]:
-    """The libraries in this process that a user may rebuild; needs no pyelftools.
-
-    A library that was replaced on the disk has the path that it was loaded from.
-    """
-    paths = set()
-    for line in Path("/proc/self/maps").read_text(errors="surrogateescape").splitlines():
-        path = line.partition("/")[2].removesuffix(" (deleted)")
-        if path.endswith(".so") or ".so." in path.rpartition("/")[2]:
-            paths.add(Path("/", path))
-    return sorted(path for path in paths if may_be_rebuilt(path))
+_Find = Callable[[bytes], Path | None]
+"""The file of an open library, by the name that others need it by."""
 
 
-def loaded_dependencies(library: Path) -> list[Path]:
+def loaded_dependencies(library: Path, *, opened: Mapping[str, str] | None = None) -> list[Path]:
     """The loaded libraries that this one needs, directly or not, and that a user may rebuild.
 
     They have the paths that the loader opened. Libraries of the system and of this Python, and those that
-    MAUVE RT's own modules need, are not among them.
+    MAUVE RT's own modules need, are not among them. `opened`: the libraries of the process in question, by
+    name; None: this process.
 
     Raises:
         PluginError: the file is no complete library, or pyelftools is missing.
     """
     modules = [getattr(sys.modules.get(name), "__file__", None) for name in _OWN_MODULES]
-    own = {file.resolve() for module in modules if module for file in _loaded_below(Path(module))}
-    return [file for file in _loaded_below(library) if file.resolve() not in own]
+    find = _finder(opened)
+    own = {file.resolve() for module in modules if module for file in _loaded_below(Path(module), find)}
+    return [file for file in _loaded_below(library, find) if file.resolve() not in own]
 
 
-def copy_libraries(libraries: Sequence[Path], *, folder: Path, generation: int) -> list[Path]:
+def copy_libraries(
+    libraries: Sequence[Path], *, folder: Path, generation: int, opened: Mapping[str, str] | None = None
+) -> list[Path]:
     """Copy libraries for one generation; what to open, by full path, in this order.
 
     Give every changed library, and every library between a changed one and a plug-in. The answer begins with
     libraries that the copies need and that are no copies: the copies' RUNPATH no longer finds those.
+    `opened`: as of loaded_dependencies().
 
     Raises:
         PluginError: a library cannot be copied. Nothing is left in the folder then.
     """
-    opened = _in_order([ElfLibrary(path) for path in dict.fromkeys(libraries)])
-    names = _library_names(opened, generation)
-    outside = _outside(opened)
-    symbols = _symbol_names(opened, outside, generation)
-    for library in opened:
+    copied = _in_order([ElfLibrary(path) for path in dict.fromkeys(libraries)])
+    names = _library_names(copied, generation)
+    outside = _outside(copied, _finder(opened))
+    symbols = _symbol_names(copied, outside, generation)
+    for library in copied:
         library.rename(libraries=names, symbols=symbols)
     needed = [library.path for library in outside if may_be_rebuilt(library.path)]
-    return [*needed, *_write(opened, folder, generation)]
+    return [*needed, *_write(copied, folder, generation)]
 
 
-def _loaded_below(library: Path) -> list[Path]:
+def _loaded_below(library: Path, find: _Find) -> list[Path]:
     found: dict[Path, None] = {}
     waiting = [library]
     while waiting:
         for name in ElfLibrary(waiting.pop()).needed:
-            file = _loaded_file(name)
+            file = find(name)
             if file is not None and file not in found and may_be_rebuilt(file):
                 found[file] = None
                 waiting.append(file)
@@ -130,7 +125,7 @@ def _in_order(libraries: Sequence[ElfLibrary]) -> list[ElfLibrary]:
     return list(order.values())
 
 
-def _outside(copied: Sequence[ElfLibrary]) -> list[ElfLibrary]:
+def _outside(copied: Sequence[ElfLibrary], find: _Find) -> list[ElfLibrary]:
     """All that the copied libraries need and that is not copied; dependencies first."""
     inside = {library.soname for library in copied}
     seen: set[bytes] = set()
@@ -141,7 +136,7 @@ def _outside(copied: Sequence[ElfLibrary]) -> list[ElfLibrary]:
             if name in inside or name in seen:
                 continue
             seen.add(name)
-            file = _loaded_file(name) or _file_to_load(name, library)
+            file = find(name) or _file_to_load(name, library)
             if file is not None:
                 dependency = ElfLibrary(file)
                 visit(dependency)
@@ -193,6 +188,12 @@ def _file_to_load(name: bytes, needed_by: ElfLibrary) -> Path | None:
         folders = [Path()]
     files = (folder / os.fsdecode(name) for folder in folders)
     return next((file for file in files if file.is_file()), None)
+
+
+def _finder(opened: Mapping[str, str] | None) -> _Find:
+    if opened is None:
+        return _loaded_file
+    return lambda name: Path(opened[key]) if (key := os.path.basename(os.fsdecode(name))) in opened else None  # noqa: PTH119
 
 
 class _LinkMap(ctypes.Structure):

@@ -74,6 +74,10 @@ class LoadedCode:
         files = dict.fromkeys((*self._sources.get(target, ()), *others))
         return [file for file in files if self._is_changed(file, self._noted_ns.get(target, 0))]
 
+    def is_changed(self, file: Path) -> bool:
+        """Whether a library that the loader opened for another one is another file by now."""
+        return self._is_changed(file, min(self._noted_ns.values(), default=0))
+
     def built_ns(self, target: str) -> int:
         """When the newest file that was loaded for a target was written; ns since 1970, 0: not known."""
         stamps = (self._files[file].stamp for file in self._sources.get(target, ()))

@@ -20,6 +20,7 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from mauve_rt.errors import PluginError, one_line
+from mauve_rt.model.opened_libraries import opened_libraries
 
 _PROGRAM = "mauve_rt.model.plugin_trial_process"
 _READ_BYTES = 65536
@@ -41,15 +42,20 @@ def try_plugins(
     modules: Sequence[tuple[str, Collection[str]]],
     *,
     generation: int,
+    copies: "Copies | None" = None,
     timeout_s: float = 10.0,
 ) -> dict[str, Any]:
     """Open the libraries and import the modules, in this order, in a process of its own.
+
+    With `copies` that process makes private copies of the libraries first, and of others that go with them;
+    it opens these, and the answer has them.
 
     `modules`: each with its packages, as for load_module(). The answer:
 
         {"names": {kind: [name, ...]},
          "shells": {name: its shell_layout()},
-         "types": {name: its layout_of()}}
+         "types": {name: its layout_of()},
+         "copied": [library, ...], "opened": [copy, or a library that it needs, ...]}
 
     Raises:
         PluginError: the code does not load, crashes, ends the process, does not end, or raises.
@@ -60,11 +66,47 @@ def try_plugins(
         "libraries": [str(library) for library in libraries],
         "modules": [[module, sorted(packages)] for module, packages in modules],
         "generation": generation,
+        "copies": None if copies is None else copies.request(),
     }
+    return _answer(request, f"trial of generation {generation}", timeout_s)
+
+
+def needed_libraries(libraries: Sequence[Path], *, timeout_s: float = 10.0) -> dict[str, list[str]]:
+    """What loaded_dependencies() finds for each library, for this process.
+
+    Raises:
+        PluginError: a file is no complete library, or pyelftools is missing.
+    """
+    request = {
+        "parent": os.getpid(),
+        "path": [entry for entry in sys.path if isinstance(entry, str)],
+        "needed": [str(library) for library in libraries],
+        "of": opened_libraries(),
+    }
+    return _answer(request, "dependencies of libraries", timeout_s)
+
+
+@dataclass(frozen=True)
+class Copies:
+    """What is copied for a generation: the libraries of the trial, and those of `changed` that they need."""
+
+    folder: Path
+    changed: Collection[Path]
+
+    def request(self) -> dict[str, Any]:
+        """As the other process takes it. Libraries are read there: what that takes of memory goes with it."""
+        return {
+            "folder": str(self.folder),
+            "changed": [str(file) for file in self.changed],
+            "of": opened_libraries(),
+        }
+
+
+def _answer(request: dict[str, Any], what: str, timeout_s: float) -> dict[str, Any]:
     try:
         outcome = _run(request, timeout_s)
     except OSError as error:
-        text = f"trial of generation {generation}: cannot start a process: {error.strerror}"
+        text = f"{what}: cannot start a process: {error.strerror}"
         raise PluginError(text, remedy="free memory, processes or file descriptors") from None
     step = ""
     for line in _messages(outcome.answer):
@@ -73,9 +115,9 @@ def try_plugins(
             return answer
         if "error" in line:
             said, remedy = line["error"]  # the text has the remedy, if there is one
-            raise PluginError(f"trial of generation {generation}: {said}", remedy="" if remedy else _CORRECT)
+            raise PluginError(f"{what}: {said}", remedy="" if remedy else _CORRECT)
         step = f"{line['step']}: "
-    text = f"trial of generation {generation}: {step}{_how_it_ended(outcome, timeout_s)}"
+    text = f"{what}: {step}{_how_it_ended(outcome, timeout_s)}"
     raise PluginError(f"{text}{_last_output(outcome.output)}", remedy=_CORRECT)
 
 

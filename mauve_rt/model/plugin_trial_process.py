@@ -19,6 +19,7 @@ from typing import Any
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
 from mauve_rt.model.code_layouts import registered_layouts, shell_layout
+from mauve_rt.model.library_copies import copy_libraries, loaded_dependencies
 from mauve_rt.model.module_generations import load_module
 from mauve_rt.model.plugins import KINDS
 
@@ -42,7 +43,7 @@ def main() -> None:
             data = data[os.write(pipe, data) :]
 
     try:
-        report("answer", _try(request, report))
+        report("answer", _needed(request) if "needed" in request else _try(request, report))
     except MauveError as error:
         report("error", [one_line(str(error)), getattr(error, "remedy", "")])
     except BaseException as error:  # noqa: BLE001 - whatever the code of somebody else raises
@@ -65,9 +66,39 @@ def _settle(parent: int) -> None:
     os.close(null)
 
 
+def _needed(request: dict[str, Any]) -> dict[str, Any]:
+    return {
+        library: [str(file) for file in loaded_dependencies(Path(library), opened=request["of"])]
+        for library in request["needed"]
+    }
+
+
+def _copied(request: dict[str, Any], copies: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """The libraries, changed ones that they need, and those in between; and the copies to open."""
+    changed = {Path(file) for file in copies["changed"]}
+    of = copies["of"]
+    wanted = {Path(library) for library in request["libraries"]}
+    for library in list(wanted):
+        needed = loaded_dependencies(library, opened=of)
+        wanted |= {
+            file
+            for file in needed
+            if file in changed or changed & {*loaded_dependencies(file, opened=of)} & {*needed}
+        }
+    made = copy_libraries(
+        sorted(wanted), folder=Path(copies["folder"]), generation=request["generation"], opened=of
+    )
+    return [str(file) for file in sorted(wanted)], [str(file) for file in made]
+
+
 def _try(request: dict[str, Any], report: Report) -> dict[str, Any]:
     registry = PluginRegistry()
-    for library in request["libraries"]:
+    libraries: list[str] = request["libraries"]
+    copied: list[str] = []
+    if libraries and request["copies"] is not None:
+        report("step", "copying the libraries")
+        copied, libraries = _copied(request, request["copies"])
+    for library in libraries:
         report("step", f"opening library {library}")
         _open(registry, library)
     for module, packages in request["modules"]:
@@ -80,6 +111,8 @@ def _try(request: dict[str, Any], report: Report) -> dict[str, Any]:
     return {
         "names": {kind: registry.names(kind) for kind in KINDS},
         "shells": shells,
+        "copied": copied,
+        "opened": libraries,
         "types": registered_layouts(registry, list(shells)),
     }
 

@@ -10,7 +10,7 @@ from typing import Literal
 
 Target = Literal["component", "new component", "resource", "new resource", "all"]
 Name = Literal["", "core", "fsm", "shell", "property", "port"]
-Value = Literal["", "scalar", "resource.service", "section"]
+Value = Literal["", "scalar", "resource.service", "section", "probation"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,14 @@ class StepKind:
 
 STEP_KINDS: Mapping[str, StepKind] = {
     "replace_core": StepKind(
-        what="replace the core; the component keeps its pending instant", name="core", needs_running=True
+        what="replace the core; the component keeps its pending instant. With a value (probation_s, "
+        "revert_on, releases) the core is on probation: a violation puts the old core back",
+        name="core",
+        value="probation",
+        needs_running=True,
+    ),
+    "revert_core": StepKind(
+        what="put the old core of a core on probation back; without a probation nothing happens"
     ),
     "replace_fsm": StepKind(what="replace the fsm", name="fsm", needs_running=True),
     "replace_shell": StepKind(

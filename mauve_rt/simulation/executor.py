@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.control.control import Control
 from mauve_rt.control.faults import FaultWatch
+from mauve_rt.control.probations import ProbationWatch
 from mauve_rt.control.recorded_values import RecordedValues, choose
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
@@ -79,6 +80,7 @@ class SimulatedExecutor:
                 self._bind(resource, described, described.topic)
         self._published_revision = -1
         self._faults = FaultWatch()
+        self._probations = ProbationWatch()
         self._waiting: list[SentMessage] = []
         self._received: Counter[str] = Counter()  # by topic
         self._refused: Counter[str] = Counter()
@@ -170,6 +172,11 @@ class SimulatedExecutor:
         for fault in self._faults.look(observed.components):
             if fault.part.fell_back:
                 self._event(*fault.event(observed.revision))
+        self._runtime.host.settle_probations()
+        for verdict in self._probations.look(self._runtime.probations()):
+            self._event(*verdict.event(self._runtime.observe().revision))
+            if (request := self._control.way_back(verdict)) is not None:
+                self.handle(request)
 
     def carry(self) -> None:
         """Publish what was written to bound resources; rules see what befell components."""

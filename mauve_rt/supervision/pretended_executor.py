@@ -73,7 +73,7 @@ def _after(component: ListedComponent, step: Step) -> ListedComponent:
     kind = STEP_KINDS[step.kind]
     match kind.name:
         case "":
-            return replace(component, state=kind.leaves[0])
+            return replace(component, state=kind.leaves[0]) if kind.leaves else component
         case "property":
             return replace(component, properties={**component.properties, step.name: step.value})
         case "port":

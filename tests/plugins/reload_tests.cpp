@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A package of plug-ins that the tests of reloads build in several variants, each by macros of its own.
 #include <cstdlib>
+#include <limits>
 #include <stdexcept>
 
 #include "mauve_rt/mauve_rt.hpp"
@@ -79,11 +80,11 @@ class Loop : public mauve::Core<LoopShell> {
   double sum_{0.0};
 
  public:
-  void act() {
+  virtual void act() {
     sum_ += step * shell().gain.value();
     ++rounds_;
 #ifdef THROWS
-    throw std::runtime_error("the new code is broken");
+    if (rounds_ > 20) throw std::runtime_error("the new code is broken");
 #endif
 #ifndef WITHOUT_PORT
     shell().sum.write({sum_});
@@ -93,6 +94,41 @@ class Loop : public mauve::Core<LoopShell> {
 
 /// Of a library of its own, which is not built again.
 class Other : public Loop {};
+
+// Each does one thing wrong, at its third release.
+
+class Misbehaving : public Loop {
+ protected:
+  bool is_time() { return ++releases_ == 3; }
+
+ private:
+  int releases_{0};
+};
+class Throws : public Misbehaving {
+ public:
+  void act() override {
+    if (is_time()) throw std::runtime_error("the new code is broken");
+    Loop::act();
+  }
+};
+class Nan : public Misbehaving {
+ public:
+  void act() override {
+    Loop::act();
+#ifndef WITHOUT_PORT
+    if (is_time()) shell().sum.write({std::numeric_limits<double>::quiet_NaN()});
+#endif
+  }
+};
+class Loud : public Misbehaving {
+ public:
+  void act() override {
+    Loop::act();
+#ifndef WITHOUT_PORT
+    if (is_time()) shell().sum.write({1e9});
+#endif
+  }
+};
 
 /// Without values.
 struct Box : mauve::Resource {
@@ -127,6 +163,9 @@ MAUVE_PLUGINS(registry) {
   registry.resource<reload_tests::Box>("reload_tests/Box");
 #ifdef NEW_CORE
   registry.core<reload_tests::Other>("reload_tests/New", "reload_tests/LoopShell");
+  registry.core<reload_tests::Throws>("reload_tests/Throws", "reload_tests/LoopShell");
+  registry.core<reload_tests::Nan>("reload_tests/Nan", "reload_tests/LoopShell");
+  registry.core<reload_tests::Loud>("reload_tests/Loud", "reload_tests/LoopShell");
 #endif
 }
 #endif

@@ -26,7 +26,15 @@ PAGES_OF_CLAIMS = (
     ),
     *(
         f"docs/howto/{name}.md"
-        for name in ("install", "operate", "record_and_report", "reload_code", "see_values", "write_a_core")
+        for name in (
+            "install",
+            "operate",
+            "record_and_report",
+            "reload_code",
+            "see_values",
+            "try_on_probation",
+            "write_a_core",
+        )
     ),
 )
 """Each sentence of these is in the table. Of other pages only what is quoted."""
@@ -37,6 +45,8 @@ _PEERS = "python/simulation/test_failures_of_peers.py::test_"
 _PEERS_FAULTS = "python/simulation/test_faults_of_peers.py::test_"
 _KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
 
+_PROBATION = "python/control/test_probation.py::test"
+_PAGE_OF_PROBATION = "ros/executor/test_reload.py::test_the_commands_of_the_probation_page"
 _RELOAD = "python/control/test_reload.py::test"
 
 CLAIMS: dict[str, tuple[str, ...]] = {
@@ -406,7 +416,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ): ("ros/cli/test_ros2_command.py::test_ros2_run_starts_an_executor",),
     (
         "Its interface is in `mauve_msgs` (`~/list_components`, `~/stop`, `~/start`, "
-        "`~/replace_core`, `~/reconfigure`, `~/list_rules`, `~/load_rules`, "
+        "`~/replace_core`, `~/reconfigure`, `~/reload`, `~/list_rules`, `~/load_rules`, "
         "`~/read_values`, `~/mirror`, `~/start_recording`, "
         "`~/stop_recording`, `~/state`, `~/events`, `~/decisions`, `/diagnostics`)."
     ): ("ros/cli/test_list.py::test_the_interface_is_the_one_that_readme_lists",),
@@ -590,6 +600,99 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "Rebuilt code is [loaded by `mauve reload`](reload_code.md).": (
         "ros/executor/test_reload.py::test_the_commands_of_the_page",
     ),
+    # ---- probation
+    "mauve replace-core /robot_1/executor control my_robot/Pid2 --probation 5": (_PAGE_OF_PROBATION,),
+    (
+        "mauve replace-core /robot_1/executor control my_robot/Pid2 --probation 5 --revert-on "
+        "fault --revert-on overrun \\"
+    ): (_PAGE_OF_PROBATION,),
+    "--revert-on '{output: command.linear.x, minimum: -1, maximum: 1}'": (_PAGE_OF_PROBATION,),
+    "mauve reload /robot_1/executor my_robot --probation 5 --probation-releases 100": (_PAGE_OF_PROBATION,),
+    "mauve list /robot_1/executor # who is on probation, and the last verdicts": (_PAGE_OF_PROBATION,),
+    (
+        "While a core is on probation, the old core stays configured, with the state that it had "
+        "when it was replaced."
+    ): (
+        f"{_PROBATION}_a_violation_puts_the_old_core_back",
+        "Probations.AFaultPutsTheOldCoreBack",
+    ),
+    "A violation puts the old core back.": (f"{_PROBATION}_a_violation_puts_the_old_core_back",),
+    ("The component's own thread finds the violation and puts the core back: no other thread takes part."): (
+        "Probations.EachRandomlyBadCoreIsRevertedByTheNextRelease",
+        "ProbationThreads.TheWayBackAllocatesNothing",
+    ),
+    (
+        "| `fault` | an exception, or a state that lasts longer than declared | at once; the "
+        "component goes on in the initial state at its next instant |"
+    ): ("Probations.AFaultPutsTheOldCoreBack",),
+    "| `overrun` | the component enters a wait after its end | in that wait |": (
+        "Probations.AnOverrunPutsTheOldCoreBackWithinTheWait",
+    ),
+    "| `over_declared` | a state lasts longer than its `max_execution` | as after a fault |": (
+        "Probations.AnExecutionOverItsBoundPutsTheOldCoreBack",
+    ),
+    "| `nan` | a number of any output is NaN | in the wait that follows |": (
+        f"{_PROBATION}_a_violation_puts_the_old_core_back",
+    ),
+    (
+        "| `{output: PORT.FIELD, minimum: X, maximum: Y}` | the number is beyond its limits, or "
+        "NaN | in the wait that follows |"
+    ): (
+        f"{_PROBATION}_a_violation_puts_the_old_core_back",
+        "Probations.AValueThatBreaksALimitIsNotWritten",
+    ),
+    "The default is `fault` and `nan`.": (f"{_PROBATION}_a_violation_puts_the_old_core_back",),
+    "A value that breaks a limit is not written: consumers keep the value before it.": (
+        "Probations.AValueThatBreaksALimitIsNotWritten",
+    ),
+    "The next release runs the old core.": ("Probations.EachRandomlyBadCoreIsRevertedByTheNextRelease",),
+    "The verdict comes on `~/events`, in the log and in `mauve list`, with the reason:": (
+        _PAGE_OF_PROBATION,
+    ),
+    "| passed | the time is over without a violation; the old core is retired |": (
+        f"{_PROBATION}_a_core_that_does_nothing_wrong_passes",
+        "Probations.ACoreWithoutViolationPasses",
+    ),
+    "| reverted | the old core is back |": (f"{_PROBATION}_a_violation_puts_the_old_core_back",),
+    (
+        "| inconclusive | the new core stays, but nothing is known: there were too few releases, "
+        "or something else ended the probation |"
+    ): (
+        f"{_PROBATION}_too_few_releases_are_inconclusive",
+        "Probations.AnotherCoreEndsItInconclusive",
+    ),
+    "A second change of the component's core, fsm or shell ends a probation as inconclusive.": (
+        "Probations.AnotherCoreEndsItInconclusive",
+        "Probations.AnotherFsmEndsItInconclusive",
+    ),
+    "A stop does not end it: the time goes on.": ("Probations.AStoppedComponentsProbationEndsByTheClock",),
+    "A shutdown of the executor ends it as inconclusive.": ("Probations.AShutdownEndsItInconclusive",),
+    "Properties and connections may change: they stay as they are when the old core goes back.": (
+        "Probations.PropertiesAndConnectionsDoNotEndIt",
+    ),
+    "A reload on probation keeps the shell, which must not have changed.": (
+        f"{_PROBATION}_a_changed_shell_cannot_be_on_probation",
+    ),
+    "Where one component goes back, the whole reload goes back.": (
+        f"{_PROBATION}_a_reload_on_probation_goes_back_as_a_whole",
+    ),
+    (
+        "For any other condition, write a [rule](../rules.md) with the step `revert_core`, or "
+        "send that step by `mauve reconfigure`."
+    ): (
+        f"{_PROBATION}_a_step_puts_the_old_core_back",
+        "ros/executor/test_reload.py::test_a_rule_puts_the_old_core_back",
+    ),
+    "Without a probation the step does nothing.": (f"{_PROBATION}_a_step_puts_the_old_core_back",),
+    "A step of kind `replace_core` takes a probation as its value:": (
+        f"{_PROBATION}_a_violation_puts_the_old_core_back",
+    ),
+    "State fields ([MAUVE_STATE](reload_code.md)) are copied, so the old core keeps its own.": (
+        f"{_PROBATION}_a_violation_puts_the_old_core_back",
+    ),
+    "[On probation](try_on_probation.md), rebuilt code goes back by itself after a fault.": (
+        f"{_PROBATION}_a_reload_on_probation_goes_back_as_a_whole",
+    ),
     # ---- rebuilt code
     "mauve reload /robot_1/executor # all code that was rebuilt since it was loaded": (
         "ros/executor/test_reload.py::test_the_commands_of_the_page",
@@ -625,6 +728,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`adopt` and `take` are called as in any replacement, and no release is missed.": (
         f"{_RELOAD}_rebuilt_code_is_put_in_force",
         "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
+    ),
+    "[`mauve dev`](develop_live.md) builds, tests and reloads at each save.": (
+        "ros/cli/test_dev.py::test_a_save_leads_to_new_code",
     ),
     "Each reload makes a **generation**.": (f"{_RELOAD}_there_is_a_way_back_and_forward_again",),
     "Nothing that was loaded is ever closed, so `--back` needs no build.": (
@@ -1918,6 +2024,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
 
 # Sentences that say what something is called, where it stands or what to type next, and promise nothing more.
 PROMISE_NOTHING = (
+    "| `--revert-on` | violation | the old core goes in |",
+    "| verdict | meaning |",
+    "A core that moves its state out in its own `take` cannot give it back.",
     "| new code | message |",
     "The other direction needs two transactions.",
     "The first one starts the component that writes the reference.",

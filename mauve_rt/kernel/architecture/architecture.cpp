@@ -107,6 +107,34 @@ void Architecture::settle_changes() noexcept {
   has_open_.store(!open_.empty(), std::memory_order_relaxed);  // relaxed: a hint
 }
 
+void Architecture::settle_probations() noexcept {
+  for (const auto& component : components()) {
+    if (!component->is_probation_over()) continue;
+    ChangeMark& mark = component->change_mark();
+    const bool is_reverted = component->is_probation_reverted();
+    {
+      const std::lock_guard gate(commit_gate_.mutex);
+      if (mark.is_claimed() || mark.is_unsettled()) continue;
+      mark.claim();
+      if (is_reverted) mark.set_changed();
+    }
+    drop_stale_prepared();  // they refer to the core that goes now
+    component->settle_probation();
+    if (is_reverted) note_author(component->name(), "core", "probation");
+    const std::lock_guard gate(commit_gate_.mutex);
+    mark.release();
+  }
+}
+
+void Architecture::settle_probations_if_idle() noexcept {
+  if (!change_lock_.try_lock()) return;
+  const std::lock_guard change(change_lock_, std::adopt_lock);
+  std::shared_lock<std::shared_mutex> use;
+  use_host(use);
+  settle_changes();
+  settle_probations();
+}
+
 void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
   open_.push_back(std::move(change));
   has_open_.store(true, std::memory_order_relaxed);  // relaxed: a hint

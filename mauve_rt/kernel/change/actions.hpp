@@ -2,11 +2,13 @@
 // What a transaction does in its commit beside putting in parts and property values.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
+#include "mauve_rt/run/probation.hpp"
 
 namespace mauve {
 
@@ -49,6 +51,23 @@ class FloorChange final : public CommitAction {
 
  private:
   ServiceBase& service_;
+};
+
+/// Puts the old core of a probation back: of a running component in its next step, within the same wait.
+class RevertRequest final : public CommitAction {
+ public:
+  RevertRequest(Task& its_task, std::shared_ptr<Probation> probation)
+      : task_(its_task), probation_(std::move(probation)), trace_id_(TraceNames::intern("revert_core")) {
+    task = &its_task;
+    probation_->name_request("a step revert_core");
+  }
+  void take() noexcept override { task_.revert_here(*probation_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  Task& task_;
+  std::shared_ptr<Probation> probation_;
+  std::uint32_t trace_id_;
 };
 
 /// Exchanges a port's connection for one made ready.

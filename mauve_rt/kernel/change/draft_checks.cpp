@@ -19,6 +19,7 @@ void Draft::finish() const {
     check_repaired(component);
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
+    if (component.probation) check_probation(component);
     if (architecture_.is_configured()) check_required_ports(component);
     if (component.core_unready && component.runs) {
       throw Error(ErrorCode::not_configured, "the core is not configured",
@@ -66,6 +67,42 @@ void Draft::check_structural(const DraftComponent& component) {
     } catch (const Error& failure) {
       rethrow_as_of(failure, component.name(), property.step);
     }
+  }
+}
+
+/// The old core is to go back in as it is, with an old fsm, into the parts that they were configured with.
+void Draft::check_probation(const DraftComponent& component) const {
+  const auto refuse = [&](ErrorCode code, const char* what, const char* expected, const char* remedy) {
+    throw Error(code, what,
+                {.component = component.name(),
+                 .element = "probation",
+                 .expected = expected,
+                 .remedy = remedy,
+                 .step = component.core_step});
+  };
+  if (!deployed_ || component.is_added) {
+    refuse(ErrorCode::not_configured, "a core is on probation only in a deployed component",
+           "a component of a deployed architecture",
+           "deploy it first, or replace the core without probation");
+  }
+  if (component.state == ComponentState::faulted) {
+    refuse(ErrorCode::faulted, "the core of a FAULTED component is not replaced on probation",
+           "a component that is RUNNING or STOPPED",
+           "repair it first, or replace the core without probation");
+  }
+  if (component.shell_step != 0 || component.configure_step != 0) {
+    refuse(ErrorCode::invalid_argument, "only a core, or an fsm and a core, can be on probation",
+           "no new shell and no configure step of the component in the same transaction",
+           "make these changes in a transaction of their own");
+  }
+  const ReadBy replaced = component.fsm_step != 0 ? ReadBy::core | ReadBy::fsm : ReadBy::core;
+  for (const auto& [name, property] : component.properties) {
+    const ReadBy read_by = component.component->require_property(name).options().structural;
+    if (without(read_by, replaced) == read_by) continue;
+    refuse(ErrorCode::structural_property,
+           "the old part was configured with another value of a structural property",
+           "no structural property that a part on probation reads",
+           "set it in a transaction without probation");
   }
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Changes to a component: new parts, and property values.
-#include <map>
 #include <string>
 #include <string_view>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/component.hpp"
+
+#include "change/kept_waits.hpp"
 
 namespace mauve {
 
@@ -44,37 +45,37 @@ ErrorDetail preparation_detail(const Error& failure, const std::string& componen
 
 }  // namespace
 
-PartsChange::PartsChange(Component& component, Parts fresh,
-                         std::function<std::unique_ptr<FsmBase>()> make_fsm)
+PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory make_fsm)
     : component_(component),
       parts_(std::move(fresh)),
-      make_fsm_(std::move(make_fsm)),
+      fsm_before_(&component.fsm()),
       restarts_(parts_.shell != nullptr || parts_.fsm != nullptr),
       trace_id_(TraceNames::intern(change_name(parts_))) {
   task = &component.task();
   if (parts_.core != nullptr) core_name_ = TraceNames::intern(parts_.core->implementation());
+  if (parts_.fsm != nullptr) parts_.fsm->set_factory(std::move(make_fsm));
   if (parts_.shell == nullptr) return;
   parts_.shell->set_context(&component_.task().context());
   copy_properties(component_.shell(), *parts_.shell);
   if (parts_.fsm != nullptr) return;
-  if (!component_.make_fsm_) {
+  if (!fsm_before_->factory()) {
     throw Error(ErrorCode::prepare_failed,
                 "a new shell needs a new instance of the fsm, and none can be made",
                 {.component = component_.name(),
-                 .element = component_.fsm().description(),
+                 .element = fsm_before_->description(),
                  .remedy = "replace the fsm in the same transaction"});
   }
-  make_fsm_ = component_.make_fsm_;
-  parts_.fsm = make_fsm_();
+  parts_.fsm = fsm_before_->factory()();
   if (parts_.fsm == nullptr) {
     throw Error(ErrorCode::prepare_failed, "the fsm's factory returned no object",
                 {.component = component_.name(),
-                 .element = component_.fsm().description(),
+                 .element = fsm_before_->description(),
                  .expected = "another instance of the fsm",
                  .found = "nullptr",
                  .remedy = "correct the factory that was given with the fsm"});
   }
-  parts_.fsm->set_implementation(component_.fsm().implementation());
+  parts_.fsm->set_implementation(fsm_before_->implementation());
+  parts_.fsm->set_factory(fsm_before_->factory());
 }
 
 PartsChange::~PartsChange() { retire(); }
@@ -82,7 +83,7 @@ PartsChange::~PartsChange() { retire(); }
 Shell& PartsChange::shell() noexcept { return parts_.shell != nullptr ? *parts_.shell : component_.shell(); }
 
 const FsmBase& PartsChange::fsm() const noexcept {
-  return parts_.fsm != nullptr ? *parts_.fsm : *component_.parts_.fsm;
+  return parts_.fsm != nullptr ? *parts_.fsm : *fsm_before_;
 }
 
 void PartsChange::prepare() {
@@ -118,6 +119,7 @@ void PartsChange::prepare_parts() {
   const FsmBase& fsm = this->fsm();
   if (restarts_) component_.check_fallback(shell, fsm);
   period_ns_ = component_.settled_period_ns(fsm);  // not the task's: a fallback is prepared before it has one
+  if (has_probation() && replaces_fsm()) prepare_way_back();
   if (parts_.core != nullptr) {
     what_ = parts_.core->description();
     component_.bind_and_configure(*parts_.core, shell, fsm, binding_);
@@ -140,45 +142,65 @@ void PartsChange::prepare_parts() {
     if (state->event != nullptr) state->event->mute();  // until the commit
   }
   component_.update_listening(*parts_.fsm);
-  find_kept_waits();
+  kept_waits_ = kept_waits(*fsm_before_, *parts_.fsm, period_ns_);
 }
 
-/// By name, of the fsm that goes out: a time wait for a time wait, an event wait for an event wait.
-void PartsChange::find_kept_waits() {
-  kept_waits_.clear();
-  const std::map<const State*, time_ns_t> ends_ns = wait_ends_ns(parts_.fsm->initial());
-  for (const auto& before : component_.parts_.fsm->states()) {
-    if (!before->is_wait) continue;
-    for (const auto& [now, end_ns] : ends_ns) {
-      if (now->name != before->name || (now->event == nullptr) != (before->event == nullptr)) continue;
-      kept_waits_.push_back({before.get(), now, period_ns_ != 0 ? end_ns % period_ns_ : 0});
-    }
-  }
+void PartsChange::prepare_way_back() {
+  const time_ns_t period_before_ns = component_.settled_period_ns(*fsm_before_);
+  require_places_kept(*fsm_before_, period_before_ns, *parts_.fsm, period_ns_);
+  waits_back_ = kept_waits(*parts_.fsm, *fsm_before_, period_before_ns);
 }
 
 bool PartsChange::adopt() {
+  if (component_.parts_.fsm.get() != fsm_before_)
+    return false;  // that of one on probation, which has gone out
   if (afresh_ || unready_) return true;
   // Else a fallback took the place of the core meanwhile.
   if (parts_.core != nullptr) return handover_->is_from(*component_.parts_.core) && handover_->adopt();
   return kept_core_ == component_.parts_.core.get();
 }
 
+void PartsChange::exchange_core() noexcept {
+  std::swap(parts_.core, component_.parts_.core);
+  component_.present_core_.store(component_.parts_.core.get(), std::memory_order_release);
+  const bool had_fallen_back = component_.task_.has_fallen_back();
+  component_.task_.set_fallen_back(fallen_back_);
+  fallen_back_ = had_fallen_back;
+  // relaxed: a lone fact
+  core_name_ = component_.core_name_.exchange(core_name_, std::memory_order_relaxed);
+}
+
+void PartsChange::exchange_fsm() noexcept {
+  std::swap(parts_.fsm, component_.parts_.fsm);
+  component_.present_fsm_.store(component_.parts_.fsm.get(), std::memory_order_release);
+}
+
+void PartsChange::put_back() noexcept {
+  exchange_core();
+  if (replaces_fsm()) {
+    component_.task_.set_fallback(nullptr);  // made ready for the fsm that goes out; who settles renews it
+    exchange_fsm();
+    // Who settles may retire the other fsm as soon as the probation has ended: no state of it is referred to any more.
+    if (!component_.task_.keep_place(waits_back_, period_ns_))
+      component_.task_.give_up_place_for(component_.parts_.fsm->initial());
+  }
+  MAUVE_RT_TRUSTED(std::swap(binding_, component_.binding_));  // moves: nothing is allocated, nothing freed
+  component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
+                               period_ns_);
+}
+
 void PartsChange::take() noexcept {
+  component_.task_.end_probation(is_fallback_);
   if (parts_.core != nullptr) {
     if (!afresh_ && !unready_) handover_->take();
-    std::swap(parts_.core, component_.parts_.core);
-    component_.task_.set_fallen_back(is_fallback_);
-    component_.core_name_.store(core_name_, std::memory_order_relaxed);
+    exchange_core();
   } else if (parts_.shell != nullptr) {
     component_.parts_.core->bind_shell(*parts_.shell);
   }
   // Made ready for parts that go out this moment; renew_fallback() arms it anew.
   if (restarts_) component_.task_.set_fallback(nullptr);
   if (parts_.shell != nullptr) std::swap(parts_.shell, component_.parts_.shell);
-  if (parts_.fsm != nullptr) {
-    std::swap(parts_.fsm, component_.parts_.fsm);
-    std::swap(make_fsm_, component_.make_fsm_);
-  }
+  if (replaces_fsm()) exchange_fsm();
   std::swap(binding_, component_.binding_);
   taken_ = true;
   if (unready_) return;
@@ -186,6 +208,7 @@ void PartsChange::take() noexcept {
     take_over_events(*parts_.fsm, component_.task_.keep_place(kept_waits_, period_ns_));
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
+  if (probation_ != nullptr) probation_->begin(*this);
 }
 
 /// By the fsm that was just put in; `before` has gone out.

@@ -180,6 +180,10 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     }
   }
   if (draft.is_repaired()) change.parts->start_afresh();
+  if (draft.probation) {
+    change.parts->set_probation(std::make_shared<Probation>(component, change.parts->core()->implementation(),
+                                                            std::move(*draft.probation)));
+  }
   Preview preview;
   preview.begin(change.parts->shell(), draft);
   change.parts->prepare();

@@ -12,6 +12,15 @@ Transaction& Transaction::replace_core(const std::string& component, const std::
 Transaction& Transaction::replace_core(const std::string& component, std::unique_ptr<CoreBase> core) {
   return add(steps::replace_core, component, {}, std::move(core));
 }
+Transaction& Transaction::replace_core(const std::string& component, const std::string& implementation,
+                                       ProbationOptions options) {
+  return add(steps::replace_core, component, implementation, CoreOnProbation{.options = std::move(options)});
+}
+Transaction& Transaction::replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
+                                       ProbationOptions options) {
+  return add(steps::replace_core, component, {},
+             CoreOnProbation{.core = std::move(core), .options = std::move(options)});
+}
 Transaction& Transaction::place_core(const std::string& component, std::unique_ptr<CoreBase> core) {
   return add(steps::place_core, component, {}, std::move(core));
 }

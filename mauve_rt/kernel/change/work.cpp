@@ -52,6 +52,7 @@ void TransactionCommit::Work::begin_alone() {
     structure_ = architecture_.commit_gate().structure();
   }
   architecture_.reap();
+  architecture_.settle_probations();
   numbers_before_ = architecture_.numbers();
 }
 
@@ -383,26 +384,28 @@ void TransactionCommit::Work::publish() {
 /// or a structural property was set that it may have read, or its code was loaded anew.
 void TransactionCommit::Work::renew_fallback(Change& change) {
   Component& component = *change.draft->component;
-  const bool is_outdated =
-      change.parts->restarts() || change.draft->sets_structural() || component.has_outdated_fallback();
-  std::unique_ptr<CoreBase> out = change.parts->give_back_core();
-  const std::string& fallback = component.fallback_implementation();
-  if (!component.is_configured()) return;
-  if (fallback.empty() || !(is_outdated || (out != nullptr && out->implementation() == fallback))) return;
-  try {
-    component.renew_fallback(std::move(out));
-  } catch (const Error&) {  // it cannot be configured anew; the change itself is in
-  }
+  const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
+  // A core that is on probation may need the old one yet.
+  std::unique_ptr<CoreBase> out = change.parts->has_probation() ? nullptr : change.parts->give_back_core();
+  component.renew_fallback_if_needed(std::move(out), is_outdated);
 }
 
 void TransactionCommit::Work::retire() {
+  for (const Change& change : changes_) {
+    const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
+    if (handover == nullptr || handover->is_whole()) continue;
+    reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
+        "a field of the old core could not be read at the change: its value is that of the preparation");
+  }
   for (ListenerChange* change : listener_changes_) change->hand_over();
   for (Change& change : changes_) {
     Component& component = *change.draft->component;
     if (change.retreat == nullptr && component.is_configured()) component.update_listening();
     if (change.parts == nullptr) continue;
-    change.parts->retire();
+    component.settle_probation();  // the take has ended it
+    if (!change.parts->has_probation()) change.parts->retire();
     renew_fallback(change);
+    if (change.parts->has_probation()) component.keep_probation(std::move(change.parts));
     change.parts.reset();
   }
   for (const DraftComponent& removed : draft_->removed_components()) {
@@ -420,12 +423,6 @@ void TransactionCommit::Work::retire() {
 
 /// Whoever waits for the report keeps nothing that others may take away meanwhile.
 void TransactionCommit::Work::keep_for_report() {
-  for (const Change& change : changes_) {
-    const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
-    if (handover == nullptr || handover->is_whole()) continue;
-    reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
-        "a field of the old core could not be read at the change: its value is that of the preparation");
-  }
   changes_.clear();
   listener_changes_.clear();
   actions_.clear();

@@ -84,6 +84,20 @@ StepReport Host::set_property(const std::string& component, const std::string& n
   return architecture_.commit_one(std::move(Transaction().set_property(component, name, value)), timeouts);
 }
 
+void Host::settle_probations() noexcept { architecture_.settle_probations_if_idle(); }
+
+std::vector<ProbationRecord> Host::probations() const {
+  std::vector<ProbationRecord> all;
+  for (const auto& component : architecture_.components()) {
+    for (ProbationRecord& record : component->probations()) all.push_back(std::move(record));
+  }
+  return all;
+}
+
+bool Host::revert_probation(const std::string& component, const std::string& reason, time_ns_t timeout_ns) {
+  return architecture_.hold_component(component)->revert_probation(reason, timeout_ns);
+}
+
 ArchitectureDescription Host::describe() const {
   architecture_.settle_if_idle();
   return architecture_.describe();
@@ -127,6 +141,7 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
   }
   for (const auto& component : components) {
     if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);
+    component->conclude_probation();
   }
 }
 

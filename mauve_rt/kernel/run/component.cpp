@@ -75,6 +75,11 @@ Architecture& Component::require_listed() const {
   throw Error(ErrorCode::unknown_component, "the component was removed", {.component = name_});
 }
 
+void Component::put_back_parked(Probation& probation) {
+  const auto change = join_change();
+  task_.put_back_parked(probation);
+}
+
 void Component::configure() {
   const auto change = join_change();
   Configurable::configure();
@@ -87,8 +92,10 @@ void Component::cleanup() {
 
 void Component::set_parts(Parts parts, FsmFactory make_fsm) {
   parts_ = std::move(parts);
-  make_fsm_ = std::move(make_fsm);
+  parts_.fsm->set_factory(std::move(make_fsm));
   parts_.shell->set_context(&task_.context());
+  present_core_.store(parts_.core.get(), std::memory_order_release);
+  present_fsm_.store(parts_.fsm.get(), std::memory_order_release);
   declared_core_ = parts_.core->implementation();
   core_name_.store(TraceNames::intern(declared_core_), std::memory_order_relaxed);
   show();
@@ -117,8 +124,8 @@ std::vector<DescribedState> Component::described_states() const {
 }
 
 std::vector<DescribedState> Component::previewed_states() const {
-  if (!make_fsm_) return described_states();
-  const std::unique_ptr<FsmBase> fsm = make_fsm_();
+  if (!fsm_factory()) return described_states();
+  const std::unique_ptr<FsmBase> fsm = fsm_factory()();
   bind_fsm(*fsm, *parts_.shell);
   fsm->configure();
   std::vector<DescribedState> states = fsm->describe_states();
@@ -133,9 +140,10 @@ std::vector<DescribedState> Component::previewed_states() const {
 }
 
 void Component::show() {
+  const FsmBase& fsm = this->fsm();  // once: the old fsm of one on probation may take its place
   ShownParts now{.shell = parts_.shell->implementation(),
                  .core = {},  // by name only: a fallback may take its place at any moment
-                 .fsm = parts_.fsm->implementation(),
+                 .fsm = fsm.implementation(),
                  .ports = {},
                  .properties = {}};
   for (const auto& port : parts_.shell->ports()) {
@@ -146,11 +154,11 @@ void Component::show() {
   }
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});
-  std::vector<DescribedState> states = parts_.fsm->describe_states();
+  std::vector<DescribedState> states = fsm.describe_states();
   const std::lock_guard lock(shown_mutex_);
   shown_ = std::move(now);
   shown_states_ = std::move(states);
-  shown_times_ = parts_.fsm->times();
+  shown_times_ = fsm.times();
 }
 
 void Component::set_settings(const TaskSettings& settings) {
@@ -437,7 +445,7 @@ bool Component::configure_hook() {
   for (const auto& port : parts_.shell->ports()) port->reopen();
   task_.clear_fault();
   task_.set_machine(*parts_.shell, *parts_.fsm, &binding_, period_ns);
-  update_listening(*parts_.fsm);
+  update_listening();
   show();
   if (task_.has_thread()) prefault_allocated();
   task_.set_state(ComponentState::stopped);
@@ -502,7 +510,7 @@ void Component::update_listening(const FsmBase& fsm) {
 }
 
 void Component::stop_listening() noexcept {
-  for (const auto& state : parts_.fsm->states()) {
+  for (const auto& state : fsm().states()) {
     if (state->event != nullptr) state->event->stop_listening();
   }
 }
@@ -523,12 +531,15 @@ void Component::configure_anew() {
 void Component::check_cleanup() const { require_parked("cleanup"); }
 
 void Component::cleanup_hook() {
+  conclude_probation();
+  settle_probation();
   task_.set_fallback(nullptr);
   spare_ = nullptr;
   if (fallback_ != nullptr) {
     // After a fault the declared core is the one that is out: it gets another chance.
     fallback_core_ = fallback_->give_back_core();
     if (fallback_->was_taken()) std::swap(fallback_core_, parts_.core);
+    present_core_.store(parts_.core.get(), std::memory_order_release);
     core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
     fallback_.reset();
     fallback_core_->cleanup();

@@ -44,6 +44,7 @@ void Task::step() {
   if (!machine_.is_started()) return take_up_start();
   const std::uint32_t control = control_.load(std::memory_order_acquire);
   if ((control & kStop) != 0) return park_stopped();
+  if ((control & kRevert) != 0) take_up_revert();
   if ((control & kCommit) != 0 && !visit_posted()) return;
   if ((control & kEvent) != 0) settle_event();
   const time_ns_t now = clock().now_ns();
@@ -102,6 +103,8 @@ void Task::run_to_next_wait() {
         // relaxed: who posts this moment sets the bit itself
         if (slot_.load(std::memory_order_relaxed) != kEmpty)
           control_.fetch_or(kCommit, std::memory_order_acq_rel);
+        if (probation_.is_set()) [[unlikely]]
+          watch_probation();
         return;
       case Machine::Entered::timed_out:
         return park_timed_out();
@@ -170,13 +173,16 @@ void Task::tell_over_declared() noexcept {
 }
 
 void Task::end_in_fault() noexcept {
+  const bool is_violation = note_fault_on_probation();
   const bool has_new_parts = settle_slot();
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
+  if (is_violation && put_back_after_fault(has_new_parts)) return;
   write_outputs(false);
   const bool stays = has_new_parts || !machine_.is_started() ||
                      (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
   CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
-  if (fallback == nullptr) return park(ComponentState::faulted);
+  // One that was renewed while an fsm on probation went out was made ready for that fsm.
+  if (fallback == nullptr || !fallback->adopt()) return park(ComponentState::faulted);
   // Not parked in between: nobody may take parts away that are put in this moment.
   publish_state(ComponentState::faulted);
   settle_slot();
@@ -195,7 +201,7 @@ void Task::fall_back(CommitAction& fallback) noexcept {
 void Task::park(ComponentState state) noexcept {
   machine_.park();
   overlong_ns_ = 0;
-  control_.fetch_and(~(kStop | kEvent), std::memory_order_acq_rel);
+  control_.fetch_and(~(kStop | kEvent | kRevert), std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
   settle_slot();  // last: who is refused finds the state that tells why

@@ -116,7 +116,7 @@ bool Task::must_act(std::uint32_t control) noexcept {
   if (!machine_.is_started()) return (control & (kStart | kCommit)) != 0;
   if ((control & kStop) != 0) return true;
   if ((control & kEvent) != 0 && !machine_.is_settled()) return true;
-  return (control & kCommit) != 0;
+  return (control & (kCommit | kRevert)) != 0;
 }
 
 }  // namespace mauve

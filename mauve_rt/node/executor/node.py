@@ -1,5 +1,6 @@
 """The executor as a managed ROS 2 node: configure builds, activate deploys, deactivate stops."""
 
+import functools
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -33,6 +34,9 @@ from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
+    from mauve_rt.control.control import Control
+    from mauve_rt.control.probations import Verdict
+    from mauve_rt.node.executor.services import Services
     from mauve_rt.node.executor.stop_guard import StopGuard
 
 NODE_NAME = "executor"
@@ -134,6 +138,7 @@ class ExecutorNode(LifecycleNode):
             control_group=self.control_group,
             query_group=query_group,
         )
+        self._state.decided = functools.partial(_go_back, control, services)
         self._guard = services.guard = StopGuard(
             self,
             self._runtime,
@@ -379,6 +384,12 @@ class ExecutorNode(LifecycleNode):
     def _refusal(self, parameter: str) -> str:
         setting = PARAMETERS.get(parameter) or OF_RCLPY.get(parameter)
         return "" if setting is None else refusal(parameter, setting, configured=self._runtime.configured)
+
+
+def _go_back(control: "Control", services: "Services", verdict: "Verdict") -> None:
+    """A reload was put on probation, and a core of it has gone back: so does the rest of it."""
+    if (request := control.way_back(verdict)) is not None:
+        services.handle(request)
 
 
 def _limits(settings: Mapping[str, Any]) -> RequestLimits:

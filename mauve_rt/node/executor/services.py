@@ -266,7 +266,7 @@ def _start(ros: Any) -> Request:
 
 
 def _replace_core(ros: Any) -> Request:
-    step = Step("replace_core", ros.component, ros.core)
+    step = Step("replace_core", ros.component, ros.core, _probation_value(ros))
     return Request(steps=(step,), **_commit(ros), **_common(ros))
 
 
@@ -276,7 +276,7 @@ def _reconfigure(ros: Any) -> Request:
 
 
 def _reload(ros: Any) -> Request:
-    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back)
+    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back, probation=_probation_value(ros))
     return Request(reload=order, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
 
 
@@ -294,6 +294,14 @@ def _start_recording(ros: Any) -> Request:
 
 def _stop_recording(ros: Any) -> Request:
     return Request(recording=RecordingOrder(start=False), **_common(ros))
+
+
+def _probation_value(ros: Any) -> str:
+    """The value of a step that puts a core on probation; empty: none was asked for."""
+    if ros.probation_s == 0.0 and not ros.revert_on:
+        return ""
+    listed = ", ".join(ros.revert_on)
+    return f"{{probation_s: {ros.probation_s!r}, revert_on: [{listed}], releases: {ros.probation_releases}}}"
 
 
 def _commit(ros: Any) -> dict[str, Any]:

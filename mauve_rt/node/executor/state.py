@@ -12,6 +12,7 @@ from rclpy.serialization import serialize_message
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent
 from mauve_rt._kernel import Host
 from mauve_rt.control.faults import FaultWatch
+from mauve_rt.control.probations import ProbationWatch, Verdict
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.control.state_age import HangWatch
@@ -38,6 +39,7 @@ class StatePublisher:
         self._states = node.create_publisher(ArchitectureState, "~/state", self._state_qos)
         self._events = node.create_publisher(ReconfigurationEvent, "~/events", self._event_qos)
         self.rules: Callable[[], list[str]] = list  # names of those at work
+        self.decided: Callable[[Verdict], None] = lambda _verdict: None  # about a core on probation
         self.completed: Callable[[Request, Outcome], None] = lambda _request, _outcome: None
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
@@ -93,7 +95,7 @@ class StatePublisher:
     def start(self, host: Host) -> None:
         """Watch the components, so that changes nobody asked for, such as faults, are published at once."""
         self._ending.clear()
-        look = functools.partial(self._look, host, FaultWatch())
+        look = functools.partial(self._look, host, FaultWatch(), ProbationWatch())
         self._thread = self._watch.thread("state", look, ending=self._ending)
         self._thread.start()
 
@@ -110,9 +112,11 @@ class StatePublisher:
         self.stop()
         self._queue.close()
 
-    def _look(self, host: Host, faults: FaultWatch) -> None:
+    def _look(self, host: Host, faults: FaultWatch, probations: ProbationWatch) -> None:
         """Wait for a change, and tell of it; one that could not be told is told with the next look."""
-        if not host.wait_change(_WAIT_NS) and not self._behind:
+        is_changed = host.wait_change(_WAIT_NS)
+        self._look_at_probations(host, probations)
+        if not is_changed and not self._behind:
             return
         self._ending.wait(_SETTLED_S)
         self._behind = True
@@ -122,6 +126,15 @@ class StatePublisher:
             if fault.part.fell_back:
                 self.event(*fault.event(observed.revision))
         self._behind = False
+
+    def _look_at_probations(self, host: Host, watch: ProbationWatch) -> None:
+        """Decide those whose time is over, and tell of the verdicts."""
+        host.settle_probations()
+        for verdict in watch.look(host.probations()):
+            console = self._node.get_logger()
+            (console.error if verdict.is_reverted else console.info)(verdict.message)
+            self.event(*verdict.event(self.refresh().revision))
+            self.decided(verdict)
 
     def _publish_event(self, event: Event) -> None:
         self.completed(event.request, event.outcome)

@@ -5,9 +5,7 @@ On threads and in virtual time.
 
 import os
 import struct
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,106 +13,17 @@ import pytest
 from page_blocks import blocks
 from pages import PAGES
 from rebuilt_package import RebuiltPackage, compile_plugin
+from reload_world import World, make_world
 
-from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.api import Core
-from mauve_rt.control.control import Control
-from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, ReloadOrder, Request, Step
-from mauve_rt.control.runtime import Runtime
-from mauve_rt.control.simulated_runtime import SimulatedRuntime
-from mauve_rt.interfaces.descriptions import component_infos
-from mauve_rt.model import load_architecture
+from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Step
 from mauve_rt.parts.state_fields import StateCells
-
-MS = 1_000_000
-FILE = """\
-mauve: 1
-components:
-  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
-         alternatives: [reload_tests/PyLoop, reload_tests/Other]}
-  twin: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm}
-  python: {shell: reload_tests/LoopShell, core: reload_tests/PyLoop, fsm: reload_tests/LoopFsm}
-resources:
-  sum: {kind: shared_data, type: std_msgs/msg/Float64}
-  box: {kind: reload_tests/Box}
-  others: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 2}
-connections:
-  - [loop.sum, sum.write]
-  - [twin.sum, others.write]
-  - [python.sum, others.write]
-"""
-
-
-@dataclass
-class World:
-    """An architecture at work, with a clock that the test lets run."""
-
-    runtime: Runtime
-    control: Control
-    run: Callable[[int], None]  # so many milliseconds
-
-    def reload(self, *targets: str, back: bool = False, dry_run: bool = False) -> Outcome:
-        return self._handle(Request(reload=ReloadOrder(targets=targets, back=back), dry_run=dry_run))
-
-    def ask(self, *steps: Step) -> Outcome:
-        return self._handle(Request(steps=steps))
-
-    def _handle(self, request: Request) -> Outcome:
-        outcome = self.control.handle(request)
-        self.run(5)
-        while outcome.pending is not None:
-            outcome = outcome.pending.look(outcome, wait_ns=100 * MS)
-        return outcome
-
-    def part(self, name: str = "loop") -> ComponentDescription:
-        return next(part for part in self.runtime.components() if part.name == name)
-
-    def sum(self) -> tuple[float, int]:
-        """What the loop wrote last, and how many times it wrote."""
-        data, number, _ = self.runtime.host.read_resource("sum")
-        return struct.unpack_from("<d", data, 4)[0], number
-
-    def mean_step(self) -> float:
-        """By how much the loop adds at each release."""
-        self.run(3)  # a change that was decided is taken
-        before, first = self.sum()
-        while self.sum()[1] < first + 10:
-            self.run(10)
-        after, last = self.sum()
-        return (after - before) / (last - first)
-
-    def generation(self, name: str = "loop") -> int:
-        return next(int(info.generation) for info in component_infos(self.runtime) if info.name == name)
 
 
 @pytest.fixture(params=["threads", "virtual time"])
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     del rebuilt  # searched first
-    path = tmp_path / "robot.yaml"
-    path.write_text(FILE, encoding="utf-8")
-    if request.param == "threads":
-        runtime = Runtime(lambda: load_architecture(path))
-        run = _sleep
-    else:
-        simulation = Simulation()
-        runtime = SimulatedRuntime(simulation, lambda: load_architecture(path))
-        run = _advance(simulation)
-    runtime.configure()
-    runtime.activate()
-    world = World(runtime, Control(runtime), run)
-    while world.sum()[1] == 0:
-        run(10)
-    yield world
-    runtime.deactivate()
-    runtime.cleanup()
-
-
-def _sleep(duration_ms: int) -> None:
-    time.sleep(duration_ms * 1e-3)
-
-
-def _advance(simulation: Simulation) -> Callable[[int], None]:
-    return lambda duration_ms: simulation.run_until(simulation.now_ns() + duration_ms * MS)
+    yield from make_world(request.param, tmp_path, "[reload_tests/PyLoop, reload_tests/Other]")
 
 
 def _report(outcome: Outcome, step: str) -> tuple[str, ...]:

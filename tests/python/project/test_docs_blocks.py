@@ -57,6 +57,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "core; my_robot/Doubler;": (PEERS,),
         "doubler: {shell: mauve_rt/Float64FilterShell": (PEERS,),
     },
+    "docs/howto/develop_live.md": {
+        "--watch src/my_robot": ("ros/cli/test_dev.py::test_the_commands_of_the_page",),
+        "--once": ("ros/cli/test_dev.py::test_the_commands_of_the_page",),
+    },
     "docs/howto/find_an_overrun.md": {
         "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),
         "--suppose mapping.Integrate=120ms --witness too_long": (OVERRUN,),
@@ -189,6 +193,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         ),
         "MAUVE_STATE(integral_": ("python/control/test_reload.py::test_the_state_fields_of_the_page",),
         "state_fields = {": ("python/control/test_reload.py::test_the_state_fields_of_the_page",),
+    },
+    "docs/howto/try_on_probation.md": {
+        "--probation-releases 100": ("ros/executor/test_reload.py::test_the_commands_of_the_probation_page",),
+        "- kind: replace_core": ("ros/executor/test_reload.py::test_the_commands_of_the_probation_page",),
     },
     "docs/howto/uninstall.md": {
         "rm -rf .venv build install": (f"{HOWTO}uninstalling_leaves_nothing_but_the_sources",),

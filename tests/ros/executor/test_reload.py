@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +14,8 @@ from pages import PAGES
 from rebuilt_package import RebuiltPackage
 from ros_processes import PATIENCE_S
 
-from mauve_msgs.msg import ReconfigurationEvent
-from mauve_msgs.srv import ListComponents, Reload
+from mauve_msgs.msg import Probation, ReconfigurationEvent
+from mauve_msgs.srv import ListComponents, LoadRules, Reload
 from mauve_rt.cli.main import main
 
 NODE = "/robot_1/executor"
@@ -112,3 +113,70 @@ def test_a_core_that_is_new_in_the_package(
     mauve("replace-core", NODE, "loop", "reload_tests/New")
     listed = json.loads(mauve("list", NODE, "--json"))
     assert listed["components"][0]["core"] == "reload_tests/New"
+
+
+def _words(page: str, begin: str) -> list[list[str]]:
+    """The commands of a page's block, with the names of the package."""
+    text = next(block.text for block in blocks(PAGES[page]) if block.text.startswith(begin))
+    text = text.replace("\\\n", " ").replace("my_robot/Pid2", "reload_tests/Other")
+    text = text.replace("my_robot", "reload_tests").replace("command.linear.x", "sum.data")
+    text = text.replace("control", "loop").replace("minimum: -1, maximum: 1}", "minimum: -1, maximum: 1e9}")
+    return [shlex.split(line, comments=True)[1:] for line in text.splitlines() if line.strip()]
+
+
+def _until_verdict(graph: Any, verdict: int) -> Any:
+    def decided() -> bool:
+        return any(each.verdict == verdict for each in _loop(graph).probations)
+
+    graph.spin_until(decided, f"verdict {verdict}")
+    return next(each for each in _loop(graph).probations if each.verdict == verdict)
+
+
+def test_the_commands_of_the_probation_page(
+    running: RebuiltPackage, graph: Any, mauve: Callable[..., str], tmp_path: Path
+) -> None:
+    events = graph.hear(ReconfigurationEvent, f"{NODE}/events")
+    page = "docs/howto/try_on_probation.md"
+    plain, watched, reload, listed = _words(page, "mauve replace-core")
+    plain[-1] = "0.1"
+    mauve(*plain)
+    assert _until_verdict(graph, Probation.PASSED).to_core == "reload_tests/Other"
+    said = mauve(*listed)
+    assert "reload_tests/Other passed its probation" in said
+    graph.spin_until(lambda: any("passed after" in event.message for event in events), "the event")
+    mauve("replace-core", NODE, "loop", "reload_tests/Loop")
+    mauve(*watched)
+    assert _until_verdict(graph, Probation.RUNNING).from_core == "reload_tests/Loop"
+    mauve("replace-core", NODE, "loop", "reload_tests/Loop")
+    assert _until_verdict(graph, Probation.INCONCLUSIVE).to_core == "reload_tests/Other"
+    running.build("THROWS", "STEP=2.0")
+    mauve(*reload)
+    reverted = _until_verdict(graph, Probation.REVERTED)
+    assert "the new code is broken" in reverted.reason
+    graph.spin_until(lambda: _loop(graph).generation == 1, "the way back")
+    graph.spin_until(lambda: any(event.request.endswith("back") for event in events), "its event")
+    (steps,) = (block.text for block in blocks(PAGES[page]) if block.text.startswith("- kind"))
+    path = tmp_path / "steps.yaml"
+    text = steps.replace("my_robot/Pid2", "reload_tests/Other").replace("control", "loop")
+    path.write_text(text.replace("command.linear.x, maximum: 1}", "sum.data, maximum: 1}"), encoding="utf-8")
+    mauve("reconfigure", NODE, str(path))
+    assert "above 1" in _until_verdict(graph, Probation.REVERTED).reason
+
+
+def test_a_rule_puts_the_old_core_back(
+    running: RebuiltPackage, graph: Any, mauve: Callable[..., str], tmp_path: Path
+) -> None:
+    del running
+    mauve("replace-core", NODE, "loop", "reload_tests/Other", "--probation", "60")
+    rules = tmp_path / "rules.yaml"
+    rules.write_text(
+        "mauve: 1\nrules:\n"
+        "  - name: too_large\n"
+        "    when: {value: {resource: sum, field: data, above: 100.0}}\n"
+        "    do: [{kind: revert_core, target: loop}]\n",
+        encoding="utf-8",
+    )
+    reply = graph.ask(LoadRules, f"{NODE}/load_rules", path=str(rules))
+    assert reply.success, reply.message
+    assert _until_verdict(graph, Probation.REVERTED).reason == "a step revert_core"
+    assert _loop(graph).core == "reload_tests/Loop"

@@ -15,6 +15,7 @@ constexpr StepKind steps::place_core{
       changed.component->require_parked("replace_core");
       changed.fresh.core = std::move(core);
       changed.core_step = draft.step();
+      changed.probation.reset();
       changed.core_unready = !changed.is_added;  // an added one is configured as a whole
     }};
 

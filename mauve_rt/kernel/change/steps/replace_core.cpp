@@ -17,23 +17,39 @@ void allow_first_core(DraftComponent& added, const CoreBase& core) {
   added.component->allow(std::move(alternatives), added.component->is_reconfigurable());
 }
 
+std::string core_words(const TransactionStep& step) {
+  const auto* trial = std::get_if<CoreOnProbation>(&step.value);
+  if (trial == nullptr) return part_words<CoreBase>(step);
+  return step.target + " " + (trial->core != nullptr ? shown({}, trial->core) : step.name) + " on probation";
+}
+
+/// The core that the step brings; nullptr: it names one.
+std::unique_ptr<CoreBase>* find_object(TransactionStep& step) {
+  if (auto* trial = std::get_if<CoreOnProbation>(&step.value))
+    return step.name.empty() ? &trial->core : nullptr;
+  return brings<CoreBase>(step) ? &value_of<std::unique_ptr<CoreBase>>(step) : nullptr;
+}
+
 }  // namespace
 
 constexpr StepKind steps::replace_core{.name = "replace_core",
                                        .element = "core",
-                                       .words = part_words<CoreBase>,
+                                       .words = core_words,
                                        .draft = [](Draft& draft, TransactionStep& step) {
-                                         const bool by_name = !brings<CoreBase>(step);
+                                         std::unique_ptr<CoreBase>* const object = find_object(step);
                                          std::unique_ptr<CoreBase> core =
-                                             by_name ? draft.registry().make_core(step.name)
-                                                     : take(value_of<std::unique_ptr<CoreBase>>(step));
+                                             object == nullptr ? draft.registry().make_core(step.name)
+                                                               : take(*object);
                                          DraftComponent& changed = replacing(draft, step.target);
-                                         if (by_name && !changed.is_added)
+                                         if (object == nullptr && !changed.is_added)
                                            changed.component->check_allowed(core->implementation());
                                          if (changed.is_added) allow_first_core(changed, *core);
                                          changed.fresh.core = std::move(core);
                                          changed.core_step = draft.step();
                                          changed.core_unready = false;
+                                         changed.probation.reset();
+                                         if (const auto* trial = std::get_if<CoreOnProbation>(&step.value))
+                                           changed.probation = trial->options;
                                        }};
 
 }  // namespace mauve

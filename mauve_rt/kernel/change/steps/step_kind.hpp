@@ -36,6 +36,7 @@ struct StepKind {
 #define MAUVE_STEP_KINDS(kind) \
   kind(replace_core) \
   kind(place_core) \
+  kind(revert_core) \
   kind(replace_fsm) \
   kind(replace_shell) \
   kind(set_property) \

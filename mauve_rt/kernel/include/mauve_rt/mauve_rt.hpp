@@ -35,4 +35,5 @@
 #include "mauve_rt/parts/shell.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/component.hpp"
+#include "mauve_rt/run/probation.hpp"
 #include "mauve_rt/run/watchdog.hpp"

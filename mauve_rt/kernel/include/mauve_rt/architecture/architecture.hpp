@@ -167,7 +167,8 @@ class Architecture final : public Configurable {
   std::size_t threads_left_behind() const;
 
   ChangeSignal& changes() noexcept { return changes_; }
-  /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback". [non-rt]
+  /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback",
+  /// one that a probation has put back "probation". [non-rt]
   std::vector<Authored> authors() const;
   /// Notes the author of a change that was made without a transaction. [non-rt]
   void note_author(const std::string& target, const std::string& element, const std::string& author);
@@ -225,6 +226,11 @@ class Architecture final : public Configurable {
   void settle_changes() noexcept;
   /// The same where no change is being made. [non-rt]
   void settle_if_idle() noexcept;
+  /// Ends the probations whose time is over, and retires the parts that those which have ended have put out; a component that a
+  /// change has claimed is left to the next call. [non-rt], the change lock held; as settle_changes().
+  void settle_probations() noexcept;
+  /// The same where no change is being made. [non-rt]
+  void settle_probations_if_idle() noexcept;
   /// Keeps a change that a late component has not taken yet. [non-rt], the change lock held.
   void keep_open(std::shared_ptr<OpenChange> change);
   /// Completes what can be completed and lets other threads have the change lock until the look finds nothing to wait for. A

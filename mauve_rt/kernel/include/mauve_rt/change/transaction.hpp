@@ -50,9 +50,16 @@ struct NewResource {
   time_ns_t longest_hold_ns{0};
 };
 
+/// A core to be put in on probation: by the step's name, or as an object.
+struct CoreOnProbation {
+  std::unique_ptr<CoreBase> core{};
+  ProbationOptions options{};
+};
+
 /// What a step puts in, as its kind takes it.
-using StepValue = std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>,
-                               std::unique_ptr<FsmBase>, std::unique_ptr<Shell>, NewComponent, NewResource>;
+using StepValue =
+    std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>, std::unique_ptr<FsmBase>,
+                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreOnProbation>;
 
 struct StepKind;
 
@@ -99,6 +106,12 @@ class Transaction {
   /// By name: one of the component's declared alternatives, or the core it was declared with.
   Transaction& replace_core(const std::string& component, const std::string& implementation);
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core);
+  /// The same on probation (probation.hpp): the old core stays ready, and a violation puts it back. Of a deployed component that
+  /// runs or is STOPPED; not together with a new shell or fsm, a configure step, or a structural property that its core reads.
+  Transaction& replace_core(const std::string& component, const std::string& implementation,
+                            ProbationOptions options);
+  Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
+                            ProbationOptions options);
   /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
   Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
   /// The new fsm goes on in the wait of the same name, where it has one in a cycle with its initial state and the pending

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/message_shape.hpp"
@@ -97,7 +98,32 @@ struct FindNumber<T> {
   }
 };
 
+inline void add_number_paths(const std::vector<FieldShape>& fields, const std::string& before,
+                             std::size_t most, std::vector<std::string>& paths) {
+  for (const FieldShape& field : fields) {
+    const bool is_text = field.type == "string" && field.fields.empty();
+    if (is_text || field.arity == FieldArity::bounded) continue;  // at no fixed place
+    const bool is_array = field.arity == FieldArity::fixed;
+    for (std::size_t index = 0; index < (is_array ? field.size : 1); ++index) {
+      if (paths.size() > most) return;
+      const std::string path = before + field.name + (is_array ? "[" + std::to_string(index) + "]" : "");
+      if (field.fields.empty()) {
+        paths.push_back(path);
+      } else {
+        add_number_paths(field.fields, path + ".", most, paths);
+      }
+    }
+  }
+}
+
 }  // namespace detail
+
+/// The paths of the numbers of a message that lie at a fixed place; of too many, one more than `most`. [non-rt]
+inline std::vector<std::string> number_paths(const MessageShape& message, std::size_t most) {
+  std::vector<std::string> paths;
+  detail::add_number_paths(message.fields, "", most, paths);
+  return paths;
+}
 
 /// The number at a path such as twist.linear.x or ranges[3]; nothing: there is none at a fixed place. [non-rt]
 template <Described T>

@@ -135,9 +135,10 @@ class WritePort final : public PortBase {
     return *this;
   }
 
-  /// False when the resource had no room. [rt]
+  /// False when the resource had no room. A value that an OutputWatch refuses is dropped. [rt]
   bool write(const T& value) MAUVE_RT {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
+    if (!admits(&value)) return true;
     const bool taken = service_->write(value, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
     if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
@@ -151,6 +152,9 @@ class WritePort final : public PortBase {
     return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
   }
   OutputOptions output() const noexcept override { return output_; }
+  std::optional<NumberPlace> find_number(std::string_view path) const override {
+    return mauve::find_number<T>(path);
+  }
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
 
   bool write_serialized(std::span<const std::byte> message) override {

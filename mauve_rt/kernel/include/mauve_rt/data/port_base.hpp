@@ -12,8 +12,11 @@
 
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/this_thread.hpp"
+#include "mauve_rt/data/number_place.hpp"
+#include "mauve_rt/data/output_watch.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -55,6 +58,7 @@ struct ConnectedTo {
 /// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
 /// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
+/// | watch_      | the component's thread; who ends the watch | component            | its own: revocable_reference.hpp     |
 /// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
 class PortBase {
  public:
@@ -126,6 +130,13 @@ class PortBase {
   /// writes for good. The connection stays until disconnect(). [rt]
   void leave_behind() MAUVE_RT;
 
+  /// Asks the watch before each write, until unwatch(). [rt], on the component's thread, or parked.
+  void watch(OutputWatch& watch) MAUVE_RT { watch_.set(watch); }
+  /// No thread asks the watch any more afterwards. [rt]
+  void unwatch() MAUVE_RT { watch_.revoke(kForever); }
+  /// Where the number at a path lies in a value that it writes; nothing: there is none at a fixed place. [non-rt]
+  virtual std::optional<NumberPlace> find_number(std::string_view /*path*/) const { return {}; }
+
   /// A read as serialized message (for cores that are not C++); false when this is no read port. [non-rt]
   virtual bool read_serialized(std::vector<std::byte>& /*message*/, DataStatus& /*status*/,
                                time_ns_t& /*time*/) {
@@ -156,6 +167,14 @@ class PortBase {
   time_ns_t stamp_ns() const MAUVE_RT {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();
   }
+  /// Whether the watch lets this value be written. [rt]
+  bool admits(const void* value) MAUVE_RT {
+    if (!watch_.is_set()) [[likely]]
+      return true;
+    bool is_admitted = true;
+    watch_.use([&](OutputWatch& watch) MAUVE_RT { is_admitted = watch.admits(value); });
+    return is_admitted;
+  }
   bool is_closed() const MAUVE_RT { return closed_.load(std::memory_order_acquire) != kOpen; }
   /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
   bool keeps_zero() const MAUVE_RT { return closed_.load(std::memory_order_acquire) == kClosed; }
@@ -178,6 +197,7 @@ class PortBase {
   std::atomic<std::uint8_t> closed_{kOpen};
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service
+  RevocableReference<OutputWatch> watch_;
   std::unique_ptr<PortBase> stand_in_;
   std::atomic<pthread_t> previewer_{kNobody};
 };

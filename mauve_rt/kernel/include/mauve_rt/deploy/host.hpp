@@ -59,6 +59,15 @@ class Host : public Runner {
   StepReport set_property(const std::string& component, const std::string& name, const PropertyValue& value,
                           const CommitTimeouts& timeouts = {});
 
+  /// Decides the probations whose time is over, and retires what they and the reverted ones have put out (probation.hpp). To be
+  /// called now and then; does nothing while a change is being made, which does the same as it begins. [non-rt]
+  void settle_probations() noexcept;
+  /// Of each component the last verdict, then the core on probation now. [non-rt]
+  std::vector<ProbationRecord> probations() const;
+  /// As Component::revert_probation().
+  bool revert_probation(const std::string& component, const std::string& reason,
+                        time_ns_t timeout_ns = s_to_ns(1));
+
   /// The instant that all grids are counted from; 0 before deployment.
   time_ns_t epoch_ns() const noexcept { return architecture_.deployment_epoch_ns(); }
   /// Now, as the components see it.

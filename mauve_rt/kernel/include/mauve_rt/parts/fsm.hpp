@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -170,6 +171,12 @@ class FsmBase : public ConfigurablePart {
   const std::string& implementation() const MAUVE_RT { return implementation_; }
   std::string description() const override { return "fsm " + implementation_; }
 
+  using Factory = std::function<std::unique_ptr<FsmBase>()>;
+  /// Makes another instance of the same fsm. It is part of the fsm, so that both are exchanged as one. [setup]
+  void set_factory(Factory make) { make_ = std::move(make); }
+  /// Empty: no other instance can be made. [non-rt]
+  const Factory& factory() const noexcept { return make_; }
+
  protected:
   /// Throws Error (type_mismatch): fsm and core are of two builds. [non-rt]
   void require_same_generation(const CoreBase& core) const;
@@ -211,6 +218,7 @@ class FsmBase : public ConfigurablePart {
   time_ns_t divisor_ns_{0};  // 0: none
   std::vector<DeclaredState> declared_states_;
   std::string implementation_;
+  Factory make_{};
 };
 
 /// Derive from this with the shell and core types, and declare the machine in define().

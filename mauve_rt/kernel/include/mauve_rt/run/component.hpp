@@ -13,6 +13,7 @@
 #include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
+#include "mauve_rt/run/probation.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -61,7 +62,7 @@ class PartsChange final : public CommitAction {
   /// A new shell takes the property values of the old one where name, type and range fit. With a new shell and no new
   /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
   /// `make_fsm` makes another instance of a new fsm.
-  PartsChange(Component& component, Parts fresh, std::function<std::unique_ptr<FsmBase>()> make_fsm = {});
+  PartsChange(Component& component, Parts fresh, FsmBase::Factory make_fsm = {});
   ~PartsChange() override;
 
   /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]
@@ -81,8 +82,19 @@ class PartsChange final : public CommitAction {
   void leave_unready() noexcept { unready_ = true; }
   /// The component starts anew in the initial state, whatever the wait that it is in. [setup]
   void give_up_place() noexcept { kept_waits_.clear(); }
+  /// The new core is on probation once it was taken, from which put_back() puts the old one back. [setup]
+  void set_probation(std::shared_ptr<Probation> probation) noexcept { probation_ = std::move(probation); }
+  /// Gives the probation away; nullptr: there is none. [non-rt]
+  std::shared_ptr<Probation> release_probation() noexcept { return std::move(probation_); }
+  bool has_probation() const noexcept { return probation_ != nullptr; }
+  /// After take, of a core, or of an fsm and a core: exchanges the parts once more. No code of theirs runs. A running component
+  /// goes on in the wait of the same name; before its first release, and after a fault, the caller starts it anew
+  /// (Task::keep_place()). [rt]
+  void put_back() MAUVE_RT;
+  /// Whether an fsm is replaced. [rt]
+  bool replaces_fsm() const MAUVE_RT { return parts_.fsm != nullptr; }
   /// And it is the fallback. [setup]
-  void be_fallback() noexcept { afresh_ = is_fallback_ = true; }
+  void be_fallback() noexcept { afresh_ = is_fallback_ = fallen_back_ = true; }
 
   /// What the new core takes over; nullptr: none, or it takes nothing. [non-rt]
   const Handover* handover() const noexcept { return handover_.get(); }
@@ -99,19 +111,24 @@ class PartsChange final : public CommitAction {
 
  private:
   void prepare_parts();
-  void find_kept_waits();
+  void prepare_way_back();
+  void exchange_core() MAUVE_RT;
+  void exchange_fsm() MAUVE_RT;
   void take_over_events(const FsmBase& before, bool keeps_place) MAUVE_RT;
 
   Component& component_;
-  Parts parts_;  // the new ones; after take the old ones
-  std::function<std::unique_ptr<FsmBase>()> make_fsm_;
+  Parts parts_;                // the new ones; after take the old ones
+  const FsmBase* fsm_before_;  // in force when the change was begun: for which the new parts are made
   CoreBinding binding_;
   time_ns_t period_ns_{0};
   std::vector<KeptWait> kept_waits_{};
+  std::vector<KeptWait> waits_back_{};  // of the new fsm on probation, to the old one
   bool restarts_;
   std::unique_ptr<Handover> handover_{};  // from the core that ran when it was prepared
   const CoreBase* kept_core_{nullptr};    // the one that the binding was made for, when it stays
-  std::uint32_t core_name_{0};
+  std::uint32_t core_name_{0};            // of the core that is not in force
+  bool fallen_back_{false};               // whether the component runs its fallback core, with that core
+  std::shared_ptr<Probation> probation_{};
   bool afresh_{false};
   bool unready_{false};
   bool is_fallback_{false};
@@ -165,13 +182,16 @@ struct ShownParts {
 /// | member           | written by                                | read by             | under            |
 /// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
 /// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
+/// | present_core_    | with parts_.core                          | anyone              | release/acquire: the core's contents |
+/// | present_fsm_     | with parts_.fsm                           | anyone              | release/acquire: the fsm's contents |
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
+/// | probation_ ...   | changes, who settles; the component claimed | any ordinary thread | shown_mutex_   |
 /// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
  public:
-  using FsmFactory = std::function<std::unique_ptr<FsmBase>()>;
+  using FsmFactory = FsmBase::Factory;
 
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Component() override;
@@ -191,8 +211,11 @@ class Component final : public Configurable {
 
   const std::string& name() const noexcept { return name_; }
   Shell& shell() noexcept { return *parts_.shell; }
-  CoreBase& core() noexcept { return *parts_.core; }
-  const FsmBase& fsm() const noexcept { return *parts_.fsm; }
+  /// The fsm in force; the old fsm of one on probation may take its place at any moment. An fsm that is out stays as it is
+  /// until a change, or who settles, has claimed the component. [rt]
+  const FsmBase& fsm() const MAUVE_RT { return *present_fsm_.load(std::memory_order_acquire); }
+  /// The core in force; a fallback, or the old core of one on probation, may take its place at any moment. [rt]
+  CoreBase& core() MAUVE_RT { return *present_core_.load(std::memory_order_acquire); }
   /// What changes it has been through. [rt]
   ChangeMark& change_mark() MAUVE_RT { return change_mark_; }
   /// [rt]
@@ -205,7 +228,7 @@ class Component final : public Configurable {
   }
   template <typename CoreType>
   CoreType& core_as() {
-    return dynamic_cast<CoreType&>(*parts_.core);
+    return dynamic_cast<CoreType&>(core());
   }
   std::string description() const override { return "component " + name_; }
 
@@ -245,7 +268,7 @@ class Component final : public Configurable {
   /// Throws Error: unknown_port.
   PortBase& require_port(const std::string& name) const;
   /// Whether an fsm of the present kind can be made once more. [non-rt]
-  const FsmFactory& fsm_factory() const noexcept { return make_fsm_; }
+  const FsmFactory& fsm_factory() const noexcept { return fsm().factory(); }
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
   /// Throws Error: unknown_property, type_mismatch, out_of_range; once configured structural_property,
@@ -279,14 +302,39 @@ class Component final : public Configurable {
   StepReport swap_core(std::unique_ptr<CoreBase> core, const CommitTimeouts& timeouts = {},
                        const std::function<void()>& committed = {});
 
+  // ---- a core on probation (probation.hpp)
+
+  /// Puts back the old core of a core on probation, whatever the component does; waits for its state to end, as long as told;
+  /// of a parked component it is a change, and waits for another one under way.
+  /// False when none is on probation, or it ends without that. From one of the component's own states it is pending by the
+  /// return. [non-rt] Throws Error (timeout) naming the state still running; the request stays pending then.
+  bool revert_probation(const std::string& reason, time_ns_t timeout_ns = s_to_ns(1));
+  /// The last probation that was settled, then the present one, as far as there are. A new core is there once its change is
+  /// completed. [non-rt]
+  std::vector<ProbationRecord> probations() const;
+  /// The one that has not been settled; nullptr: none. [non-rt]
+  std::shared_ptr<Probation> present_probation() const;
+  /// Has the parts that a change has put out, from which the new core may be reverted. [non-rt], by the change.
+  void keep_probation(std::unique_ptr<PartsChange> parts);
+  /// Ends the present probation if its time is over. Whether there is one that has ended. [non-rt]
+  bool is_probation_over() const noexcept;
+  /// Whether that has put the old core back. [non-rt]
+  bool is_probation_reverted() const noexcept;
+  /// Retires the parts that a probation which has ended has put out. [non-rt], the component claimed.
+  void settle_probation() noexcept;
+  /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
+  void conclude_probation() noexcept;
+
   /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
   /// `out`: the core that was replaced, which may be the fallback itself.
   void renew_fallback(std::unique_ptr<CoreBase> out);
+  /// The same where it is of no use any more as it is, or `out` is one of its kind. [non-rt]
+  void renew_fallback_if_needed(std::unique_ptr<CoreBase> out, bool is_outdated) noexcept;
   /// Whether the code of the fallback was loaded anew since it was made. [non-rt]
   bool has_outdated_fallback() const;
 
   /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
-  void update_listening() { update_listening(*parts_.fsm); }
+  void update_listening() { update_listening(fsm()); }
   /// Its event waits hear of nothing any more, for a component that is removed while a state of it hangs. [non-rt]
   void stop_listening() noexcept;
   /// Whether one of its ports leads to the resource. [non-rt]
@@ -315,6 +363,8 @@ class Component final : public Configurable {
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();
+  /// As a change: another one may look at the core that is in.
+  void put_back_parked(Probation& probation);
   /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.
   std::unique_ptr<CoreBase> rebuilt_core(const CoreBase& core) const;
   void check_fallback(const Shell& shell, const FsmBase& fsm) const;
@@ -324,7 +374,8 @@ class Component final : public Configurable {
   Task task_;
   ChangeMark change_mark_;
   Parts parts_;
-  FsmFactory make_fsm_;
+  std::atomic<CoreBase*> present_core_{nullptr};
+  std::atomic<const FsmBase*> present_fsm_{nullptr};
   CoreBinding binding_;
   std::string declared_core_;
   std::vector<std::string> alternatives_;
@@ -339,6 +390,8 @@ class Component final : public Configurable {
   std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
   std::shared_ptr<const StateTimes> shown_times_;
   std::vector<DescribedState> shown_states_;
+  std::shared_ptr<Probation> probation_;
+  std::optional<ProbationRecord> last_probation_;
 };
 
 /// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]

@@ -129,6 +129,11 @@ class Machine {
   /// Before another fsm with this period is put in: goes on in its wait of the same name, where it has one and the pending
   /// instant lies on its grid; else false, and nothing is changed. [rt]
   bool keep_place(std::span<const KeptWait> waits, time_ns_t period_ns) MAUVE_RT;
+  /// Before another fsm without event waits is put in, whose place is not kept: waits for its initial state, and refers to no
+  /// state of the fsm before. The caller starts or parks it next. [rt]
+  void give_up_place_for(const State& initial) MAUVE_RT {
+    if (is_started()) waiting_ = next_ = &initial;
+  }
   /// Whether the wait's end is fixed: it is for no event, or one has come. [rt]
   bool is_settled() const MAUVE_RT { return event_settled_; }
   /// Started, and not woken ahead of its first release yet. [rt]

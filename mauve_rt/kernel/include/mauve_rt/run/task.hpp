@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
 #include "mauve_rt/base/threads.hpp"
@@ -20,11 +21,12 @@
 #include "mauve_rt/run/commit.hpp"
 #include "mauve_rt/run/machine.hpp"
 #include "mauve_rt/run/queue_place.hpp"
-#include "mauve_rt/run/revocable_reference.hpp"
 #include "mauve_rt/run/task_settings.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
 namespace mauve {
+
+class Probation;
 
 /// Numbered as mauve_msgs/msg/ComponentInfo, whose 3 is no longer used.
 enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, stopping = 4, faulted };
@@ -85,6 +87,7 @@ struct ChangeSignal {
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | times out    |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
+/// | probation_             | machine, in a take; who settles it    | machine alone| its own: base/revocable_reference.hpp |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
 /// | machine_               | machine                               | machine      | its own: machine.hpp               |
@@ -108,6 +111,8 @@ class Task final : public Waiter {
   bool keep_place(std::span<const KeptWait> waits, time_ns_t period_ns) MAUVE_RT {
     return place_kept_ = machine_.keep_place(waits, period_ns);
   }
+  /// Machine::give_up_place_for(), when the place is not kept. [rt]
+  void give_up_place_for(const State& initial) MAUVE_RT { machine_.give_up_place_for(initial); }
   /// [setup]
   void set_settings(const TaskSettings& settings) { settings_ = settings; }
   /// [rt]
@@ -120,6 +125,27 @@ class Task final : public Waiter {
   }
   /// Whether the core that runs is the fallback. [rt]
   bool has_fallen_back() const MAUVE_RT { return fallen_back_.load(std::memory_order_acquire); }
+
+  // ---- a core on probation (probation.hpp)
+
+  /// Its core is on probation from now on. [rt], in a take.
+  void set_probation(Probation& probation) MAUVE_RT { probation_.set(probation); }
+  /// The core is replaced by another one: it is on probation no more. [rt], in a take.
+  void end_probation(bool falls_back) MAUVE_RT;
+  /// The machine does not refer to the probation any more, which has ended; it may have another by now. [non-rt], the
+  /// component claimed.
+  void forget_probation(const Probation& probation) noexcept {
+    if (probation_.is(probation)) probation_.revoke(kForever);
+  }
+  /// Lets the machine look whether the old core was asked for; in virtual time it has looked by the return. [non-rt]
+  void notify_revert() noexcept;
+  /// Puts the old core back in the next step, or at once; the caller is the machine's thread in a wait, or acts for a parked
+  /// component. [rt]
+  void revert_here(Probation& probation) MAUVE_RT;
+  /// Puts the old core back, as was asked for, if the component is parked and no command of it lasts. [non-rt], it is claimed.
+  void put_back_parked(Probation& probation) noexcept;
+  /// Whether the calling thread runs one of its own states. [non-rt]
+  bool is_called_from_own_state() const noexcept;
 
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
@@ -298,8 +324,8 @@ class Task final : public Waiter {
   std::uint16_t number() const noexcept { return number_; }
 
  private:
-  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16,
-                                 kAwaited = 32;                        // of control_
+  static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16, kAwaited = 32,
+                                 kRevert = 64;                         // of control_
   enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
 
   // commands
@@ -310,7 +336,6 @@ class Task final : public Waiter {
   time_ns_t restart_instant(const Participant& participant) noexcept;
   bool withdraw_start() noexcept;
   void require_startable() const;
-  bool is_called_from_own_state() const noexcept;
   void begin_trace(bool trace);
 
   // the thread
@@ -360,6 +385,12 @@ class Task final : public Waiter {
   void take_back_outputs() noexcept;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
+  void watch_probation() noexcept;
+  void take_up_revert() noexcept;
+  void put_back_in_wait(Probation& probation) noexcept;
+  bool leaves_core_to_change() noexcept;
+  bool note_fault_on_probation() noexcept;
+  bool put_back_after_fault(bool has_taken_change) noexcept;
   void publish_state(ComponentState state) MAUVE_RT;
   void tell_over_declared() MAUVE_RT;
 
@@ -406,6 +437,7 @@ class Task final : public Waiter {
   std::atomic<Participant*> awaiting_release_{nullptr};
   std::atomic<CommitAction*> fallback_{nullptr};
   std::atomic<bool> fallen_back_{false};
+  RevocableReference<Probation> probation_;
 
   // the machine's own
   QueuePlace queue_place_{};         // of a simulated one

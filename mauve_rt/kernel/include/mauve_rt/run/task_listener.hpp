@@ -5,9 +5,9 @@
 #include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
-#include "mauve_rt/run/revocable_reference.hpp"
 
 namespace mauve {
 

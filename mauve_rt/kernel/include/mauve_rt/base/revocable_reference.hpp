@@ -22,6 +22,7 @@ class RevocableReference {
  public:
   /// [rt]
   void set(T& object) MAUVE_RT { object_.store(&object, std::memory_order_seq_cst); }
+  bool is(const T& object) const MAUVE_RT { return object_.load(std::memory_order_seq_cst) == &object; }
   bool is_set() const MAUVE_RT { return object_.load(std::memory_order_seq_cst) != nullptr; }
 
   /// Calls the function with the object, if there is one; any number of threads. [rt] as far as that is.

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What ordinary threads do with a component's core on probation (probation.hpp).
+#include <algorithm>
+
+#include "mauve_rt/run/component.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// How often a requester looks whether the component has parked: no thread tells it.
+constexpr time_ns_t kParkedLook = ms_to_ns(20);
+
+}  // namespace
+
+std::shared_ptr<Probation> Component::present_probation() const {
+  const std::lock_guard lock(shown_mutex_);
+  return probation_;
+}
+
+std::vector<ProbationRecord> Component::probations() const {
+  const std::lock_guard lock(shown_mutex_);
+  std::vector<ProbationRecord> records;
+  if (last_probation_) records.push_back(*last_probation_);
+  if (probation_ != nullptr) records.push_back(probation_->record());
+  return records;
+}
+
+void Component::keep_probation(std::unique_ptr<PartsChange> parts) {
+  auto probation = parts->release_probation();
+  probation->keep(std::move(parts));
+  const std::lock_guard lock(shown_mutex_);
+  probation_ = std::move(probation);
+}
+
+bool Component::is_probation_over() const noexcept {
+  const auto probation = present_probation();
+  return probation != nullptr && probation->conclude_if_over();
+}
+
+bool Component::is_probation_reverted() const noexcept {
+  const auto probation = present_probation();
+  return probation != nullptr && probation->is_reverted();
+}
+
+void Component::conclude_probation() noexcept {
+  if (const auto probation = present_probation()) probation->conclude(ProbationCause::ended);
+}
+
+void Component::settle_probation() noexcept {
+  const auto probation = present_probation();
+  if (probation == nullptr || !probation->has_ended()) return;
+  task_.forget_probation(*probation);
+  if (const std::unique_ptr<PartsChange> parts = probation->release_parts()) {
+    const bool is_fsm_back = probation->is_reverted() && parts->replaces_fsm();
+    parts->retire();
+    if (is_fsm_back) show();  // other states, and other times
+    renew_fallback_if_needed(parts->give_back_core(), is_fsm_back);
+  }
+  ProbationRecord record = probation->record();
+  const std::lock_guard lock(shown_mutex_);
+  last_probation_ = std::move(record);
+  probation_.reset();
+}
+
+bool Component::revert_probation(const std::string& reason, time_ns_t timeout_ns) {
+  const auto probation = present_probation();
+  if (probation == nullptr) return false;
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  probation->request(reason);
+  for (;;) {
+    task_.notify_revert();
+    if (!probation->has_ended() && task_.is_parked()) put_back_parked(*probation);
+    if (probation->has_ended()) return probation->is_reverted();
+    if (task_.is_called_from_own_state()) return true;
+    const time_ns_t now = monotonic_now_ns();
+    if (now >= until || task_.is_simulated()) break;
+    if (probation->wait_ended(std::min(until, now + kParkedLook))) return probation->is_reverted();
+  }
+  task_.throw_state_running("the old core is not back yet; the request stays pending", timeout_ns,
+                            "the old core goes in when the state ends");
+}
+
+void Component::renew_fallback_if_needed(std::unique_ptr<CoreBase> out, bool is_outdated) noexcept {
+  if (!is_configured() || fallback_name_.empty()) return;
+  try {
+    if (!is_outdated && !has_outdated_fallback() &&
+        (out == nullptr || out->implementation() != fallback_name_))
+      return;
+    renew_fallback(std::move(out));
+  } catch (...) {  // it cannot be configured anew; the change itself is in
+  }
+}
+
+}  // namespace mauve

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/run/probation.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/run/component.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// Of a value without a named field; each of its numbers is looked at in each write.
+constexpr std::size_t kMostLimits = 1'000;
+
+std::string number_text(double number) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%g", number);
+  return text.data();
+}
+
+}  // namespace
+
+class Probation::PortLimits final : public OutputWatch {
+ public:
+  PortLimits(Probation& probation, PortBase& its_port) : port(its_port), probation_(probation) {}
+  bool admits(const void* value) noexcept override {
+    if (!probation_.is_watched()) return true;
+    for (const Limit& limit : limits) {
+      const double number = limit.place.of(value);
+      const bool is_within = number >= limit.minimum && number <= limit.maximum;  // false for NaN
+      const bool is_free = !limit.is_bounded && !std::isnan(number);
+      if (is_within || is_free) continue;
+      probation_.find({.cause = ProbationCause::output,
+                       .instant_ns = probation_.component_.task().entered_ns(),
+                       .port = this,
+                       .limit = &limit,
+                       .number = number});
+      return false;
+    }
+    return true;
+  }
+
+  PortBase& port;
+  std::vector<Limit> limits;
+
+ private:
+  Probation& probation_;
+};
+
+const char* to_string(ProbationVerdict verdict) noexcept {
+  switch (verdict) {
+    case ProbationVerdict::running:
+      return "running";
+    case ProbationVerdict::passed:
+      return "passed";
+    case ProbationVerdict::reverted:
+      return "reverted";
+    case ProbationVerdict::inconclusive:
+      return "inconclusive";
+  }
+  return "inconclusive";
+}
+
+Probation::Probation(Component& component, const std::string& to_core, ProbationOptions options)
+    : component_(component),
+      from_core_(component.core_implementation()),
+      to_core_(to_core),
+      options_(std::move(options)),
+      trace_id_(TraceNames::intern("revert_core " + from_core_)) {
+  if (options_.duration_ns <= 0) {
+    throw Error(ErrorCode::invalid_argument, "a probation needs a duration",
+                {.component = component.name(),
+                 .element = "duration_ns",
+                 .expected = "more than 0 ns",
+                 .found = std::to_string(options_.duration_ns)});
+  }
+  for (const OutputLimit& limit : options_.outputs) add(limit);
+}
+
+Probation::~Probation() = default;
+
+void Probation::add(const OutputLimit& limit) {
+  PortBase& port = component_.require_port(limit.port);
+  const auto refuse = [&](const char* what, const std::string& expected, const std::string& found,
+                          const char* remedy) {
+    throw Error(ErrorCode::invalid_argument, what,
+                {.component = component_.name(),
+                 .element = "output " + limit.port,
+                 .expected = expected,
+                 .found = found,
+                 .remedy = remedy});
+  };
+  if (port.kind() != PortKind::write)
+    refuse("a limit is set to an output", "a write port", std::string(to_string(port.kind())),
+           "name one of the component's write ports");
+  if (!limit.minimum && !limit.maximum && !limit.not_nan)
+    refuse("the limit sets no bound", "minimum, maximum or not_nan", "none", "give one of them");
+  std::vector<std::string> paths{limit.field};
+  if (limit.field.empty()) {
+    paths.clear();
+    for (const MessageShape& message : port.messages()) paths = number_paths(message, kMostLimits);
+  }
+  if (paths.size() > kMostLimits)
+    refuse("the value has too many numbers", "at most " + std::to_string(kMostLimits) + " numbers", "more",
+           "name the field of one number");
+  PortLimits& own = limits_of(port);
+  for (const std::string& path : paths) {
+    const std::optional<NumberPlace> place = port.find_number(path);
+    if (!place.has_value()) {
+      refuse("the output has no number there that can be read in real time",
+             "a field of " + port.type() + " that is a number, not in a text or a list whose length changes",
+             path, "name the field of a number");
+    }
+    constexpr double kInfinite = std::numeric_limits<double>::infinity();
+    own.limits.push_back({.path = path,
+                          .place = place.value_or(NumberPlace{}),
+                          .minimum = limit.minimum.value_or(-kInfinite),
+                          .maximum = limit.maximum.value_or(kInfinite),
+                          .is_bounded = limit.minimum || limit.maximum});
+  }
+  if (paths.empty())
+    refuse("the output has no number that can be read in real time",
+           "a C++ struct with numbers at fixed places", port.type(),
+           "leave the limit out, or watch the output by a rule");
+}
+
+/// A port has one watch.
+Probation::PortLimits& Probation::limits_of(PortBase& port) {
+  for (const auto& limits : limits_) {
+    if (&limits->port == &port) return *limits;
+  }
+  return *limits_.emplace_back(std::make_unique<PortLimits>(*this, port));
+}
+
+// ---- the component's thread, or who acts for a parked one
+
+void Probation::begin(PartsChange& parts) noexcept {
+  const Task& task = component_.task();
+  parts_ = &parts;
+  overruns_ = task.statistics().overruns.load(std::memory_order_relaxed);  // relaxed: this thread counts them
+  begin_ns_ = task.clock().now_ns();
+  end_ns_ = later_by(begin_ns_, options_.duration_ns);
+  phase_.store(kRunning, std::memory_order_release);  // release: whoever finds it running finds all this
+  for (const auto& limits : limits_) limits->port.watch(*limits);
+  component_.task().set_probation(*this);
+}
+
+bool Probation::is_watched() const noexcept {
+  return phase() == kRunning && component_.task().entered_ns() < end_ns_;
+}
+
+void Probation::find(const Found& found) noexcept {
+  if (found_.cause == ProbationCause::none) found_ = found;
+}
+
+bool Probation::end_release() noexcept {
+  if (phase() != kRunning) return false;
+  const Task& task = component_.task();
+  const std::uint64_t overruns = task.statistics().overruns.load(std::memory_order_relaxed);  // as in begin()
+  const bool has_overrun = std::exchange(overruns_, overruns) != overruns;
+  if (is_watched()) {
+    releases_.store(releases_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    if (options_.on_overrun && has_overrun)
+      find({.cause = ProbationCause::overrun, .instant_ns = task.entered_ns()});
+  }
+  note_request();
+  return found_.cause != ProbationCause::none;
+}
+
+bool Probation::note_fault(const FaultNote& fault) noexcept {
+  if (!is_watched()) return false;
+  const Task& task = component_.task();
+  const bool has_overrun = task.statistics().overruns.load(std::memory_order_relaxed) != overruns_;
+  const bool is_over_declared = fault.bound_ns != 0;
+  ProbationCause cause = ProbationCause::none;
+  if (is_over_declared && (options_.on_fault || options_.on_over_declared)) {
+    cause = ProbationCause::over_declared;
+  } else if (options_.on_fault) {
+    cause = ProbationCause::fault;
+  } else if (options_.on_overrun && has_overrun) {
+    cause = ProbationCause::overrun;  // whose policy is fault
+  }
+  if (cause != ProbationCause::none && found_.cause == ProbationCause::none) {
+    MAUVE_RT_TRUSTED(fault_ = fault.what);  // empty before, so nothing is freed
+    fault_bound_ns_ = fault.bound_ns;
+    fault_where_ = fault.where;
+    find({.cause = cause, .instant_ns = task.entered_ns()});
+  }
+  note_request();
+  return found_.cause != ProbationCause::none;
+}
+
+bool Probation::note_request() noexcept {
+  if (phase() != kRunning) return false;
+  if (is_requested_.load(std::memory_order_acquire))
+    find({.cause = ProbationCause::request, .instant_ns = component_.task().entered_ns()});
+  return found_.cause != ProbationCause::none;
+}
+
+bool Probation::begin_end() noexcept {
+  std::uint32_t running = kRunning;
+  if (!phase_.compare_exchange_strong(running, kEnding, std::memory_order_acq_rel)) return false;
+  for (const auto& limits : limits_) limits->port.unwatch();
+  return true;
+}
+
+void Probation::end(Phase phase, ProbationCause why) noexcept {
+  cause_ = why;
+  ended_ns_ = component_.task().clock().now_ns();
+  phase_.store(phase, std::memory_order_release);  // release: the cause, and parts that were put back
+  futex_wake_all(phase_);
+}
+
+bool Probation::put_back() noexcept {
+  if (found_.cause == ProbationCause::none || !begin_end()) return false;
+  parts_->put_back();
+  end(kReverted, found_.cause);
+  return true;
+}
+
+void Probation::conclude(ProbationCause why) noexcept {
+  if (begin_end()) end(kConcluded, why);
+}
+
+// ---- ordinary threads
+
+void Probation::name_request(const std::string& reason) {
+  const std::lock_guard lock(request_mutex_);
+  if (request_.empty()) request_ = reason;
+}
+
+void Probation::request(const std::string& reason) {
+  const std::lock_guard lock(request_mutex_);
+  if (is_requested_.load(std::memory_order_relaxed))
+    return;  // relaxed: under the mutex; the first one counts
+  request_ = reason;
+  is_requested_.store(true, std::memory_order_release);
+}
+
+bool Probation::wait_ended(time_ns_t until_ns) const noexcept {
+  for (auto seen = phase_.load(std::memory_order_acquire); seen < kConcluded;
+       seen = phase_.load(std::memory_order_acquire)) {
+    if (!futex_wait_until(phase_, seen, until_ns)) return has_ended();
+  }
+  return true;
+}
+
+bool Probation::conclude_if_over() noexcept {
+  if (phase() == kRunning && component_.task().clock().now_ns() >= end_ns_) {
+    const bool is_enough = releases_.load(std::memory_order_relaxed) >= options_.min_releases;
+    conclude(is_enough ? ProbationCause::none : ProbationCause::too_few);
+  }
+  return has_ended();
+}
+
+void Probation::keep(std::unique_ptr<PartsChange> parts) noexcept { kept_ = std::move(parts); }
+
+std::unique_ptr<PartsChange> Probation::release_parts() noexcept { return std::move(kept_); }
+
+ProbationRecord Probation::record() const {
+  const Phase now = phase();
+  ProbationRecord record{.component = component_.name(),
+                         .from_core = from_core_,
+                         .to_core = to_core_,
+                         .releases = releases_.load(std::memory_order_relaxed),
+                         .begin_ns = begin_ns_,
+                         .end_ns = end_ns_};
+  if (now < kConcluded) return record;
+  record.cause = cause_;
+  record.end_ns = ended_ns_;
+  record.reason = reason();
+  record.verdict = now == kReverted                 ? ProbationVerdict::reverted
+                   : cause_ == ProbationCause::none ? ProbationVerdict::passed
+                                                    : ProbationVerdict::inconclusive;
+  return record;
+}
+
+std::string Probation::reason() const {
+  const std::string at = " at instant " + std::to_string(found_.instant_ns) + " ns";
+  switch (cause_) {
+    case ProbationCause::none:
+      return {};
+    case ProbationCause::fault:
+      return "fault: " + (fault_ != nullptr ? *fault_ : std::string("an execution over its bound")) +
+             " in state " + TraceNames::word(fault_where_);
+    case ProbationCause::over_declared:
+      return "execution over declared: state " + TraceNames::word(fault_where_) + " ran longer than its " +
+             std::to_string(fault_bound_ns_ / us_to_ns(1)) + " us" + at;
+    case ProbationCause::overrun:
+      return "overrun" + at;
+    case ProbationCause::output: {
+      std::string text = "output " + found_.port->port.name() + ": " + found_.limit->path + " is " +
+                         number_text(found_.number);
+      if (found_.number < found_.limit->minimum) text += ", below " + number_text(found_.limit->minimum);
+      if (found_.number > found_.limit->maximum) text += ", above " + number_text(found_.limit->maximum);
+      return text;
+    }
+    case ProbationCause::request: {
+      const std::lock_guard lock(request_mutex_);
+      return request_;
+    }
+    case ProbationCause::too_few:
+      return std::to_string(releases_.load(std::memory_order_relaxed)) + " releases, expected at least " +
+             std::to_string(options_.min_releases);
+    case ProbationCause::replaced:
+      return "another change replaced parts of the component";
+    case ProbationCause::fell_back:
+      return "the core faulted, which on_fault did not watch, and the fallback core took over";
+    case ProbationCause::ended:
+      return "the component was cleaned up or removed, or its host was shut down";
+  }
+  return {};
+}
+
+}  // namespace mauve

@@ -1,0 +1,685 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A core on probation: each violation puts the old core back, whatever else ends a probation, on both kinds of hosts.
+#include <cmath>
+#include <random>
+
+#include "probation_fixtures.hpp"
+
+namespace mauve::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+TYPED_TEST_SUITE(Probations, EveryHost, HostNames);
+
+TYPED_TEST(Probations, ACoreWithoutViolationPasses) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->wait_seen(*this->old_seen, 2);
+  const auto seen = this->put_in([](TrialCore&, int) {}, {.duration_ns = ms_to_ns(20), .min_releases = 3});
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+  EXPECT_EQ("t/Old", this->record().from_core);
+  EXPECT_EQ("t/New", this->record().to_core);
+  EXPECT_FALSE(this->old_seen->is_cleaned) << "it stays configured";
+  this->wait_seen(*seen, 4);
+  this->settle();
+  const auto end_ns = this->record().begin_ns + ms_to_ns(20);
+  this->host.until([&] { return this->host.now_ns() >= end_ns; }, "the end");
+  this->settle();
+  const ProbationRecord record = this->record();
+  EXPECT_EQ(Verdict::passed, record.verdict);
+  EXPECT_EQ("", record.reason);
+  EXPECT_GE(record.releases, 3);
+  EXPECT_GE(record.end_ns, end_ns);
+  EXPECT_TRUE(this->old_seen->is_cleaned);
+  EXPECT_EQ("t/New", component.core_implementation());
+  this->wait_seen(*seen, seen->runs + 3);
+  EXPECT_EQ(1U, (*this->host).probations().size());
+}
+
+TYPED_TEST(Probations, WithTooFewReleasesNothingIsKnown) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->put_in([](TrialCore&, int) {}, {.duration_ns = ms_to_ns(5), .min_releases = 1'000'000});
+  this->host.until(
+      [&] {
+        this->settle();
+        return this->record().verdict != Verdict::running;
+      },
+      "the end");
+  EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
+  EXPECT_EQ(Cause::too_few, this->record().cause);
+  EXPECT_THAT(this->record().reason, HasSubstr("expected at least 1000000"));
+  EXPECT_EQ("t/New", component.core_implementation());
+}
+
+TYPED_TEST(Probations, AFaultPutsTheOldCoreBack) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->wait_seen(*this->old_seen, 2);
+  const int runs_before = this->old->runs;
+  const auto seen = this->put_in([](TrialCore& core, int run) {
+    core.exposed_shell().output.write({2.0});
+    if (run == 3) throw std::runtime_error("division by zero");
+  });
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  EXPECT_EQ(3, seen->runs);
+  EXPECT_GT(this->old->runs, runs_before) << "it has its state of before";
+  EXPECT_EQ(Cause::fault, this->record().cause);
+  EXPECT_EQ("fault: division by zero in state Run", this->record().reason);
+  EXPECT_EQ(2, this->record().releases);
+  EXPECT_EQ("division by zero", component.task().fault().what);
+  EXPECT_FALSE(seen->is_cleaned) << "not by the component's own thread";
+  this->settle();
+  EXPECT_TRUE(seen->is_cleaned);
+  EXPECT_EQ(Verdict::reverted, this->record().verdict);
+}
+
+TYPED_TEST(Probations, OutputsAreHeldOverAFaultAsOverAChange) {
+  if constexpr (TestFixture::is_virtual) {
+    this->add_trial();
+    this->deploy();
+    this->wait_seen(*this->old_seen, 2);
+    const auto seen = this->put_in([](TrialCore& core, int) {
+      core.exposed_shell().output.write({2.0});
+      throw std::runtime_error("at once");
+    });
+    this->wait_seen(*seen, 1);
+    EXPECT_EQ(Verdict::reverted, this->record().verdict);
+    EXPECT_EQ(2.0, this->newest()) << "no zero in between";
+  }
+}
+
+TYPED_TEST(Probations, AnOverrunPutsTheOldCoreBackWithinTheWait) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->wait_seen(*this->old_seen, 2);
+  const auto seen = this->put_in(
+      [&](TrialCore&, int run) {
+        if (run == 3) this->overrun(component);
+      },
+      {.on_fault = false, .on_overrun = true});
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  EXPECT_LE(seen->runs, 3) << "a slow machine may overrun sooner";
+  EXPECT_EQ(Cause::overrun, this->record().cause);
+  EXPECT_THAT(this->record().reason, HasSubstr("overrun at instant"));
+}
+
+TYPED_TEST(Probations, AnExecutionOverItsBoundPutsTheOldCoreBack) {
+  constexpr time_ns_t kBound = ms_to_ns(200);
+  Component& component = this->add_trial("c", {.states = {{.name = "Run", .max_execution_ns = kBound}}});
+  this->deploy();
+  const auto seen = this->put_in(
+      [&](TrialCore&, int run) {
+        if (run == 2) this->overrun(component, 2 * kBound);
+      },
+      {.on_fault = false, .on_over_declared = true});
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  EXPECT_EQ(2, seen->runs);
+  EXPECT_EQ(Cause::over_declared, this->record().cause);
+  EXPECT_THAT(this->record().reason, HasSubstr("state Run ran longer than its 200000 us"));
+  this->host.until([&] { return this->newest() == 1.0; }, "its outputs to be open again");
+}
+
+TYPED_TEST(Probations, AValueThatBreaksALimitIsNotWritten) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->wait_seen(*this->old_seen, 2);
+  std::atomic<double> bad{kNan};
+  const auto seen = this->put_in(
+      [&](TrialCore& core, int run) { core.exposed_shell().output.write({run < 3 ? 5.0 : bad.load()}); },
+      {.outputs = {{.port = "output", .not_nan = true}}});
+  this->wait_verdict(Verdict::reverted);
+  EXPECT_FALSE(std::isnan(this->newest()));
+  EXPECT_EQ(3, seen->runs);
+  EXPECT_EQ("output output: value is nan", this->record().reason);
+  this->expect_old_core_runs_on(component);
+  bad = 11.0;
+  const auto second = this->put_in(
+      [&](TrialCore& core, int run) { core.exposed_shell().output.write({run < 3 ? 5.0 : bad.load()}); },
+      {.outputs = {{.port = "output", .field = "value", .minimum = -1.0, .maximum = 10.0}}});
+  this->wait_verdict(Verdict::reverted);
+  EXPECT_NE(11.0, this->newest());
+  EXPECT_EQ(3, second->runs);
+  EXPECT_EQ("output output: value is 11, above 10", this->record().reason);
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, NothingIsWatchedThatWasNotAskedFor) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in(
+      [&](TrialCore& core, int run) {
+        core.exposed_shell().output.write({kNan});
+        if (run == 2) this->overrun(component);
+      },
+      {.outputs = {}});
+  this->wait_seen(*seen, 6);
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+  EXPECT_TRUE(std::isnan(this->newest()));
+}
+
+TYPED_TEST(Probations, AFaultThatIsNotWatchedIsFinal) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->put_in([](TrialCore&, int) { throw std::runtime_error("unwatched"); }, {.on_fault = false});
+  this->wait_state(component, ComponentState::faulted);
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+  EXPECT_EQ("t/New", component.core_implementation());
+}
+
+TYPED_TEST(Probations, ARequestPutsTheOldCoreBack) {
+  Component& component = this->add_trial();
+  this->deploy();
+  EXPECT_FALSE((*this->host).revert_probation("c", "there is none"));
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  this->wait_seen(*seen, 2);
+  EXPECT_TRUE((*this->host).revert_probation("c", "rule too_warm", s_to_ns(30)));
+  const int runs = seen->runs;
+  EXPECT_EQ(Verdict::reverted, this->record().verdict);
+  EXPECT_EQ("rule too_warm", this->record().reason);
+  this->expect_old_core_runs_on(component);
+  EXPECT_EQ(runs, seen->runs);
+}
+
+TYPED_TEST(Probations, ARequestPutsTheOldCoreBackIntoAStoppedComponent) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  this->wait_seen(*seen, 2);
+  this->host.stop("c");
+  EXPECT_EQ(Verdict::running, this->record().verdict) << "a stop does not end it";
+  EXPECT_TRUE((*this->host).revert_probation("c", "while it is stopped"));
+  EXPECT_EQ("t/Old", component.core_implementation());
+  EXPECT_EQ(ComponentState::stopped, component.task().state());
+  this->host.start("c");
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, ARequestFromTheComponentsOwnStateIsCarriedOutInItsWait) {
+  Component& component = this->add_trial();
+  this->deploy();
+  std::atomic<bool> answered{false};
+  const auto seen = this->put_in([&](TrialCore&, int run) {
+    if (run == 3) answered = component.revert_probation("by itself");
+  });
+  this->wait_verdict(Verdict::reverted);
+  EXPECT_TRUE(answered);
+  EXPECT_EQ(3, seen->runs);
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, AStoppedComponentsProbationEndsByTheClock) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {}, {.duration_ns = ms_to_ns(30), .min_releases = 1});
+  this->wait_seen(*seen, 2);
+  this->host.stop("c");
+  this->host.until(
+      [&] {
+        this->settle();
+        return this->record().verdict != Verdict::running;
+      },
+      "the end");
+  EXPECT_EQ(Verdict::passed, this->record().verdict);
+  this->host.start("c");
+  this->wait_seen(*seen, seen->runs + 2);
+  EXPECT_EQ("t/New", component.core_implementation());
+}
+
+TYPED_TEST(Probations, AnotherCoreEndsItInconclusive) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto first = this->put_in([](TrialCore&, int) {});
+  this->wait_seen(*first, 2);
+  const auto second = this->put_in([](TrialCore&, int) {});
+  const auto all = (*this->host).probations();
+  ASSERT_EQ(2U, all.size());
+  EXPECT_EQ(Verdict::inconclusive, all[0].verdict);
+  EXPECT_EQ(Cause::replaced, all[0].cause);
+  EXPECT_EQ(Verdict::running, all[1].verdict);
+  EXPECT_TRUE(this->old_seen->is_cleaned) << "the one before it is retired";
+  EXPECT_FALSE(first->is_cleaned) << "it is the old core now";
+  EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
+  this->wait_seen(*first, first->runs + 2);
+  EXPECT_EQ("t/New", component.core_implementation());
+  this->settle();
+  EXPECT_TRUE(second->is_cleaned);
+}
+
+TYPED_TEST(Probations, AnotherFsmEndsItInconclusive) {
+  this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  Transaction change;
+  change.replace_fsm("c", std::make_unique<TestFsm>());
+  this->host.commit(std::move(change), 0);
+  EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
+  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_seen(*seen, seen->runs + 3);
+}
+
+TYPED_TEST(Probations, ARefusedChangeDoesNotEndIt) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  Transaction change;
+  change.replace_core("c", std::make_unique<RefusingCore>());
+  EXPECT_EQ(ErrorCode::adopt_refused, this->code_of([&] { this->host.commit(std::move(change)); }));
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+  EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, PropertiesAndConnectionsDoNotEndIt) {
+  Component& component = this->add_trial();
+  auto& other = this->architecture.template add_resource<SharedData<Number>>("other");
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  component.set_property("gain", 5.0, {.commit_ns = s_to_ns(30), .phase_ns = 0});
+  Transaction change;
+  change.disconnect("c", "output").connect("c", "output", "other", "write");
+  this->host.commit(std::move(change), 0);
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+  EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
+  this->expect_old_core_runs_on(component);
+  EXPECT_EQ(PropertyValue(5.0), component.shown().properties[0].value) << "it stays";
+  this->out = &other;
+  EXPECT_EQ(1.0, this->newest()) << "the old core writes to the new connection";
+}
+
+TYPED_TEST(Probations, AShutdownEndsItInconclusive) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  this->host.shutdown();
+  EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
+  EXPECT_EQ(Cause::ended, this->record().cause);
+  this->architecture.cleanup();
+  EXPECT_TRUE(this->old_seen->is_cleaned);
+  EXPECT_TRUE(seen->is_cleaned);
+  EXPECT_EQ(Verdict::inconclusive, component.probations().back().verdict);
+}
+
+TYPED_TEST(Probations, ToConfigureAnewEndsItInconclusive) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  this->host.stop("c");
+  component.configure_anew();
+  EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
+  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->host.start("c");
+  this->wait_seen(*seen, seen->runs + 2);
+}
+
+TYPED_TEST(Probations, ARemovedComponentsCoresAreBothRetired) {
+  this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  Transaction change;
+  change.remove_component("c");
+  this->host.commit(std::move(change), 0);
+  EXPECT_TRUE((*this->host).probations().empty());
+  EXPECT_TRUE(this->old_seen->is_cleaned);
+  EXPECT_TRUE(seen->is_cleaned);
+}
+
+TYPED_TEST(Probations, AStopThatIsPendingAtAFaultIsCarriedOut) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->put_in([&](TrialCore&, int run) {
+    if (run != 2) return;
+    component.task().stop();  // from its own state: pending
+    throw std::runtime_error("while it stops");
+  });
+  this->wait_verdict(Verdict::reverted);
+  this->wait_state(component, ComponentState::stopped);
+  this->host.start("c");
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, APreparedChangeIsStaleAfterARevert) {
+  Component& component = this->add_trial();
+  this->deploy();
+  const auto seen = this->put_in([](TrialCore&, int) {});
+  Transaction steps;
+  steps.set_property("c", "gain", 3.0);
+  const auto prepared = (*this->host).prepare(std::move(steps));
+  Transaction core_steps;
+  core_steps.replace_core("c", std::make_unique<TrialCore>());
+  const auto other = (*this->host).prepare(std::move(core_steps));
+  EXPECT_TRUE(prepared->is_current());
+  EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
+  EXPECT_EQ(PreparedOutcome::refused, other->commit(s_to_ns(30))) << "made for the core that is out";
+  this->settle();
+  EXPECT_FALSE(prepared->is_current());
+  EXPECT_EQ(PreparedOutcome::stale, prepared->commit(s_to_ns(30)));
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, APreparedOneIsWatchedFromItsCommitOn) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->wait_seen(*this->old_seen, 2);
+  auto core = std::make_unique<TrialCore>();
+  core->work = [&own = *core] {
+    if (own.runs == 2) throw std::runtime_error("bad");
+  };
+  const auto seen = core->seen;
+  Transaction steps;
+  steps.replace_core("c", std::move(core), ProbationOptions{.duration_ns = kLong});
+  const auto prepared = (*this->host).prepare(std::move(steps));
+  EXPECT_EQ(PreparedOutcome::committed, prepared->commit(s_to_ns(30)));
+  this->host.until([&] { return seen->runs == 2 && component.core_implementation() == "t/Old"; },
+                   "the way back");
+  EXPECT_TRUE((*this->host).probations().empty()) << "not completed yet";
+  prepared->complete();
+  EXPECT_EQ(Verdict::reverted, this->record().verdict);
+  this->settle();
+  EXPECT_TRUE(seen->is_cleaned);
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, AFallbackStaysReadyForLater) {
+  Component& component = this->add_trial();
+  auto spare = std::make_unique<TrialCore>();
+  spare->set_implementation("t/Fallback");
+  const auto spare_seen = spare->seen;
+  component.set_fallback(std::move(spare));
+  std::atomic<bool> is_broken{false};
+  this->old->work = [&] {
+    if (is_broken) throw std::runtime_error("the old one, too");
+  };
+  this->deploy();
+  this->put_in([](TrialCore&, int) { throw std::runtime_error("the new one"); });
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  EXPECT_FALSE(component.task().has_fallen_back());
+  EXPECT_EQ(0, spare_seen->runs);
+  this->settle();
+  is_broken = true;
+  this->wait_seen(*spare_seen, 2);
+  EXPECT_TRUE(component.task().has_fallen_back());
+  // The fallback is the old core of the next one.
+  const auto seen = this->put_in([](TrialCore&, int run) {
+    if (run == 2) throw std::runtime_error("and again");
+  });
+  EXPECT_FALSE(component.task().has_fallen_back());
+  this->wait_verdict(Verdict::reverted);
+  this->wait_seen(*spare_seen, spare_seen->runs + 2);
+  EXPECT_TRUE(component.task().has_fallen_back());
+  EXPECT_EQ("t/Fallback", component.core_implementation());
+}
+
+TYPED_TEST(Probations, AFallbackThatTakesOverEndsIt) {
+  Component& component = this->add_trial();
+  auto spare = std::make_unique<TrialCore>();
+  spare->set_implementation("t/Fallback");
+  component.set_fallback(std::move(spare));
+  this->deploy();
+  this->put_in([](TrialCore&, int) { throw std::runtime_error("unwatched"); }, {.on_fault = false});
+  this->wait_verdict(Verdict::inconclusive);
+  EXPECT_EQ(Cause::fell_back, this->record().cause);
+  EXPECT_EQ("t/Fallback", component.core_implementation());
+}
+
+TYPED_TEST(Probations, WhatCannotBeOnProbationIsRefused) {
+  Component& component = this->add_trial();
+  const auto code = [&](ProbationOptions options, std::string* text = nullptr) {
+    return this->code_of([&] { this->put_in([](TrialCore&, int) {}, std::move(options)); }, text);
+  };
+  this->architecture.configure();
+  if constexpr (!TestFixture::is_virtual) {
+    EXPECT_EQ(ErrorCode::not_configured, code({})) << "nothing is deployed";
+  }
+  this->deploy();
+  std::string text;
+  EXPECT_EQ(ErrorCode::invalid_argument, code({.duration_ns = -1}));
+  EXPECT_EQ(ErrorCode::unknown_port, code({.outputs = {{.port = "cmd", .not_nan = true}}}));
+  EXPECT_EQ(ErrorCode::invalid_argument, code({.outputs = {{.port = "input", .not_nan = true}}}, &text));
+  EXPECT_THAT(text, HasSubstr("write port"));
+  EXPECT_EQ(ErrorCode::invalid_argument,
+            code({.outputs = {{.port = "output", .field = "x", .not_nan = true}}}));
+  EXPECT_EQ(ErrorCode::invalid_argument, code({.outputs = {{.port = "output"}}}, &text));
+  EXPECT_THAT(text, HasSubstr("sets no bound"));
+  Transaction both;
+  both.replace_core("c", std::make_unique<TrialCore>(), ProbationOptions{.duration_ns = kLong})
+      .replace_shell("c", std::make_unique<TestShell>());
+  EXPECT_EQ(ErrorCode::invalid_argument, this->code_of([&] { this->host.commit(std::move(both)); }));
+  EXPECT_TRUE((*this->host).probations().empty());
+  this->expect_old_core_runs_on(component);
+}
+
+TYPED_TEST(Probations, TheTraceShowsTheWayBack) {
+  Component& component = this->add_trial();
+  this->deploy();
+  this->put_in([](TrialCore& core, int run) { core.exposed_shell().output.write({run < 3 ? 1.0 : kNan}); },
+               {.outputs = {{.port = "output", .not_nan = true}}});
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  const TraceDrain drain = this->architecture.drain_trace();
+  int ways_back = 0;
+  for (const TraceRecord& record : records_of(drain, TraceKind::reconfiguration, component.task().number())) {
+    if (TraceNames::word(record.name) == "revert_core t/Old") ++ways_back;
+  }
+  EXPECT_EQ(1, ways_back);
+}
+
+/// Writes at each event.
+struct EventFsm : Fsm<TestShell, TestCore> {
+  void define() override {
+    State& run = execution("Run", "act", &TestCore::act);
+    State& pause = wait_event("Pause", shell().input, s_to_ns(1'000), us_to_ns(100));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+TYPED_TEST(Probations, AComponentThatWaitsForEventsIsReverted) {
+  auto& events = this->architecture.template add_resource<SharedData<Number>>("events");
+  Component& component = this->architecture.template add_component<TestShell, TrialCore, EventFsm>("c");
+  auto& first = component.template core_as<TrialCore>();
+  first.set_implementation("t/Old");
+  const auto old_seen = first.seen;
+  this->architecture.connect("c", "input", "events", "read");
+  this->deploy();
+  const auto raise = [&](Seen& seen, int runs) {
+    this->host.until(
+        [&] {
+          if (seen.runs >= runs) return true;
+          events.write.write({1.0}, this->host.now_ns());
+          return false;
+        },
+        "the event's release");
+  };
+  raise(*old_seen, 2);
+  const auto faulty = this->put_in([](TrialCore&, int run) {
+    if (run == 2) throw std::runtime_error("bad");
+  });
+  raise(*faulty, 2);
+  this->wait_verdict(Verdict::reverted);
+  raise(*old_seen, old_seen->runs + 2);
+  EXPECT_EQ(2, faulty->runs);
+  const auto second = this->put_in([](TrialCore&, int) {});
+  EXPECT_TRUE((*this->host).revert_probation("c", "within the long wait", s_to_ns(30)));
+  raise(*old_seen, old_seen->runs + 2);
+  EXPECT_EQ(0, second->runs);
+}
+
+/// Each round's core is bad in a random way at a random release, and does not run once more; its neighbours do not notice.
+TYPED_TEST(Probations, EachRandomlyBadCoreIsRevertedByTheNextRelease) {
+  constexpr int kRounds = TestFixture::is_virtual ? 1'000 : 50;
+  Component& component = this->add_trial();
+  Component& neighbour = this->add("neighbour", 1, {.offset_ns = kPeriod / 2});
+  this->core(neighbour).instants.reserve(200'000);
+  this->deploy();
+  std::mt19937 random(20261126);
+  const auto below = [&random](int limit) {
+    return static_cast<int>(random() % static_cast<unsigned>(limit));
+  };
+  int reverted = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const int kind = below(5);
+    const int bad_run = 1 + below(5);
+    const auto seen = this->put_in(
+        [&, kind, bad_run](TrialCore& core, int run) {
+          if (run != bad_run) return;
+          if (kind == 0) throw std::runtime_error("bad");
+          if (kind == 1) throw 7;  // NOLINT: no std::exception
+          if (kind == 2) this->overrun(component);
+          if (kind == 3) core.exposed_shell().output.write({kNan});
+          if (kind == 4) core.exposed_shell().output.write({1e9});
+        },
+        {.on_overrun = TestFixture::is_virtual || kind == 2,  // a busy machine overruns by itself
+         .outputs = {{.port = "output", .minimum = -10.0, .maximum = 10.0}}});
+    const int old_runs = this->old_seen->runs;
+    this->wait_verdict(Verdict::reverted);
+    this->wait_seen(*this->old_seen, old_runs + 2);
+    const time_ns_t bad_ns = seen->last_ns;
+    const auto& instants = this->old->instants;
+    if constexpr (TestFixture::is_virtual) {
+      ASSERT_EQ(bad_run, seen->runs) << "round " << round << ", kind " << kind;
+      const time_ns_t next_ns = bad_ns + (kind == 2 ? 2 : 1) * kPeriod;
+      ASSERT_NE(instants.end(), std::find(instants.begin(), instants.end(), next_ns)) << "round " << round;
+    } else if (kind != 2) {
+      ASSERT_EQ(bad_run, seen->runs) << "round " << round << ", kind " << kind;
+    }
+    ASSERT_EQ(ComponentState::running, component.task().state());
+    ASSERT_LE(std::abs(this->newest()), 10.0);
+    ++reverted;
+    this->settle();
+    ASSERT_TRUE(seen->is_cleaned);
+  }
+  EXPECT_EQ(kRounds, reverted);
+  this->host.shutdown();
+  const auto& instants = this->core(neighbour).instants;
+  const auto skipped = static_cast<time_ns_t>(neighbour.task().statistics().skipped.load());
+  ASSERT_FALSE(instants.empty());
+  EXPECT_EQ((instants.back() - instants.front()) / kPeriod,
+            static_cast<time_ns_t>(instants.size()) - 1 + skipped);
+  if constexpr (TestFixture::is_virtual) {
+    EXPECT_EQ(0, skipped);
+  }
+}
+
+class ProbationThreads : public Probations<OnThreads> {};
+
+TEST_F(ProbationThreads, TheWayBackAllocatesNothing) {
+  Component& component = add_trial();
+  deploy();
+  wait_seen(*old_seen, 2);
+  host.stop("c");
+  const auto seen =
+      put_in([&](TrialCore& core, int run) { core.exposed_shell().output.write({run < 3 ? 1.0 : kNan}); },
+             {.outputs = {{.port = "output", .not_nan = true}}});
+  host.start("c");  // counts from here on
+  wait_verdict(Verdict::reverted);
+  wait_seen(*old_seen, old_seen->runs + 3);
+  EXPECT_EQ(3, seen->runs);
+  EXPECT_EQ(0U, component.task().counters().allocations());
+}
+
+TEST_F(ProbationThreads, ACoreThatWasStoppedByForceIsOutWhenItsStateEnds) {
+  Component& component = add_trial();
+  deploy();
+  std::atomic<bool> is_open{false};
+  const auto seen = put_in([&](TrialCore&, int) {
+    while (!is_open) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  wait_seen(*seen, 1);
+  EXPECT_TRUE((*host).stop("c", {.timeout_ns = ms_to_ns(10), .force = true}));
+  EXPECT_EQ(Verdict::running, record().verdict) << "its thread still executes the new core";
+  is_open = true;
+  wait_verdict(Verdict::reverted);
+  host.until([&] { return component.task().is_parked(); }, "the park");
+  EXPECT_EQ(ComponentState::faulted, component.task().state()) << "as the stop has reported";
+  EXPECT_THAT(record().reason, HasSubstr("stopped by force"));
+  EXPECT_EQ("t/Old", component.core_implementation());
+  component.configure_anew();
+  host.start("c");
+  wait_seen(*old_seen, old_seen->runs + 2);
+}
+
+/// Whatever is asked for at once: in the end one core is in, and each other one is cleaned up.
+TEST_F(ProbationThreads, ManyChangesAtOnceLeaveOneCore) {
+  Component& component = add_trial();
+  Component& neighbour = add("neighbour");
+  deploy();
+  std::mutex mutex;
+  std::vector<std::shared_ptr<Seen>> all{old_seen};
+  std::atomic<bool> is_over{false};
+  const auto tolerate = [](const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const Error&) {  // another one was first
+    }
+  };
+  const auto worker = [&](unsigned seed, const std::function<void(std::mt19937&)>& act) {
+    return std::thread([&, seed, act] {
+      std::mt19937 random(seed);
+      while (!is_over) {
+        tolerate([&] { act(random); });
+        std::this_thread::sleep_for(std::chrono::microseconds(200 + random() % 2'000));
+      }
+    });
+  };
+  std::vector<std::thread> threads;
+  for (unsigned seed : {1U, 2U}) {
+    threads.push_back(worker(seed, [&](std::mt19937& random) {
+      auto core = std::make_unique<TrialCore>();
+      const int kind = static_cast<int>(random() % 6);
+      const int bad_run = 1 + static_cast<int>(random() % 4);
+      core->work = [&component, &own = *core, kind, bad_run] {
+        if (own.runs != bad_run) return;
+        if (kind == 0) throw std::runtime_error("bad");
+        if (kind == 1) own.exposed_shell().output.write({kNan});
+        if (kind == 2) overrun(component);
+      };
+      {
+        const std::lock_guard lock(mutex);
+        all.push_back(core->seen);
+      }
+      auto seen = core->seen;
+      ProbationOptions options{.duration_ns = ms_to_ns(1 + static_cast<std::int64_t>(random() % 8)),
+                               .on_overrun = true,
+                               .outputs = {{.port = "output", .not_nan = true}}};
+      Transaction change;
+      change.set_property("neighbour", "gain", 2.0).replace_core("c", std::move(core), std::move(options));
+      host.commit(std::move(change), 0);
+    }));
+  }
+  threads.push_back(worker(3, [&](std::mt19937& random) {
+    if (random() % 4 == 0) host.stop("c");
+    (*host).start("c");
+  }));
+  threads.push_back(
+      worker(4, [&](std::mt19937& /*random*/) { (*host).revert_probation("c", "asked for", s_to_ns(30)); }));
+  threads.push_back(worker(5, [&](std::mt19937& random) {
+    (*host).settle_probations();
+    for (const ProbationRecord& record : (*host).probations()) EXPECT_EQ("c", record.component);
+    component.set_property("gain", static_cast<double>(random() % 10),
+                           {.commit_ns = s_to_ns(30), .phase_ns = 0});
+  }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1'500));
+  is_over = true;
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(ComponentState::running, neighbour.task().state());
+  host.shutdown();
+  settle();
+  int configured = 0;
+  for (const auto& seen : all) configured += seen->is_configured && !seen->is_cleaned ? 1 : 0;
+  EXPECT_EQ(1, configured) << "of " << all.size();
+  EXPECT_GT(all.size(), 20U);
+  (*host).deploy();
+  tolerate([&] { (*host).start("c"); });
+  const auto& last = component.core_as<TrialCore>().seen;
+  EXPECT_FALSE(last->is_cleaned);
+}
+
+}  // namespace
+}  // namespace mauve::testing
