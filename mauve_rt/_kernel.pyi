@@ -493,6 +493,8 @@ class Transaction:
         self, component: str, core: str | type[Core[Any]], probation: ProbationOptions | None = None
     ) -> Transaction:
         """With `probation`, an fsm that the same transaction replaces is on probation with the core."""
+    def shadow(self, component: str, core: str, budget_ns: int) -> Transaction:
+        """A candidate executes in parallel with the core; its budget is for one release, on average."""
     def replace_fsm(self, component: str, fsm: str | type[Fsm[Any, Any]]) -> Transaction:
         """The new one goes on in the wait of the same name, where the pending instant lies on its grid.
 
@@ -593,6 +595,47 @@ class ProbationRecord:
     releases: Final[int]  # of the new core
     begin_ns: Final[int]
     end_ns: Final[int]  # when it was decided; while it runs: when it is over
+
+@final
+class NumberDifference:
+    path: Final[str]
+    count: Final[int]
+    maximum: Final[float]
+    rms: Final[float]
+    nan: Final[int]
+    live_nan: Final[int]
+
+@final
+class OutputDifference:
+    port: Final[str]
+    type: Final[str]
+    both: Final[int]
+    live_only: Final[int]
+    shadow_only: Final[int]
+    is_truncated: Final[bool]  # the value has more numbers than are compared
+    numbers: Final[list[NumberDifference]]
+    lag: Final[int | None]  # releases by which the candidate's first number is later
+
+@final
+class ShadowRecord:
+    """One shadow; fields as mauve_msgs/msg/Shadow."""
+
+    component: Final[str]
+    core: Final[str]
+    live_core: Final[str]
+    verdict: Final[str]  # running, ended, faulted or promoted
+    reason: Final[str]
+    begin_ns: Final[int]
+    end_ns: Final[int]
+    releases: Final[int]
+    compared: Final[int]
+    skipped_late: Final[int]
+    skipped_budget: Final[int]
+    idle: Final[int]
+    over_budget: Final[int]
+    budget_ns: Final[int]
+    largest_execution_ns: Final[int]
+    outputs: Final[list[OutputDifference]]
 
 @final
 class TransactionReport:
@@ -778,6 +821,8 @@ class Host:
         """Decides the probations whose time is over, and retires what they have put out."""
     def probations(self) -> list[ProbationRecord]:
         """Of each component the last verdict, then the core on probation now."""
+    def shadows(self) -> list[ShadowRecord]:
+        """Of each component the shadow that runs, or the last one that has ended."""
     def revert_probation(self, component: str, reason: str, timeout_ns: int = 1_000_000_000) -> bool:
         """Puts the old core back; False: no core is on probation, or it was decided before.
 

@@ -17,10 +17,7 @@ class Accelerando final : public Metronome {
   }
 
   /// Takes over at the tempo it finds.
-  void take(mauve::CoreBase& old) noexcept override {
-    Metronome::take(old);
-    first_beat_ = beats();
-  }
+  void take(mauve::CoreBase& /*old*/) noexcept override { first_beat_ = beats(); }
 
  private:
   std::int64_t first_beat_{0};

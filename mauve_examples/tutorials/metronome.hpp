@@ -33,14 +33,7 @@ class Metronome : public mauve::Core<MetronomeShell> {
     shell().beat.write({.data = static_cast<double>(++beats_)});
   }
 
-  /// Replacing another metronome while it runs, this one goes on counting where that one was.
-  void take(mauve::CoreBase& old) noexcept override {
-    if (const auto* metronome = dynamic_cast<const Metronome*>(&old)) {
-      ticks_ = metronome->ticks_;
-      beats_ = metronome->beats_;
-    }
-  }
-  /// That is all there is to it: 50 us before a tick there is still time for it.
+  /// Two numbers are copied: 50 us before a tick there is still time for it.
   mauve::time_ns_t budget_ns() const noexcept override { return mauve::us_to_ns(50); }
 
  protected:
@@ -48,7 +41,8 @@ class Metronome : public mauve::Core<MetronomeShell> {
   std::int64_t beats() const noexcept { return beats_; }
 
  private:
-  std::int64_t ticks_{0};  // since the last beat
+  MAUVE_STATE(ticks_, beats_)  // a metronome that replaces this one goes on counting
+  std::int64_t ticks_{0};      // since the last beat
   std::int64_t beats_{0};
 };
 

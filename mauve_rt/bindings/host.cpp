@@ -245,6 +245,8 @@ void bind_host(py::module_& module) {
       .def(
           "probations", [](PyHost& self) { return self.host().probations(); }, Unlocked())
       .def(
+          "shadows", [](PyHost& self) { return self.host().shadows(); }, Unlocked())
+      .def(
           "revert_probation",
           [](PyHost& self, const std::string& component, const std::string& reason, time_ns_t timeout_ns) {
             return self.host().revert_probation(component, reason, timeout_ns);

@@ -14,6 +14,7 @@ PYBIND11_MODULE(_kernel, module) {
   bind_architecture(module);
   bind_value_log(module);
   bind_probation(module);
+  bind_shadow(module);
   bind_transaction(module);
   bind_host(module);
   bind_simulation(module);

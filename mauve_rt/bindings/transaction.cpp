@@ -63,6 +63,14 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
           },
           py::arg("component"), py::arg("core"), py::arg("probation") = std::nullopt)
       .def(
+          "shadow",
+          [](Self self, const std::string& component, const std::string& core, time_ns_t budget_ns) -> Self {
+            return self.add([=](Transaction& steps, const PluginRegistry&) {
+              steps.shadow(component, core, {.budget_ns = budget_ns});
+            });
+          },
+          py::arg("component"), py::arg("core"), py::arg("budget_ns"))
+      .def(
           "replace_fsm",
           [](Self self, const std::string& component, const py::object& fsm) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {

@@ -13,6 +13,7 @@ from mauve_rt.cli import (
     mirror_verb,
     report_verb,
     rules_verb,
+    shadow_verb,
     trace_verb,
     watch_verb,
 )
@@ -465,6 +466,12 @@ VERBS = (
         "prove that each component meets its deadline, or show which one does not",
         analyze_verb.add_arguments,
         analyze_verb.main,
+    ),
+    Verb(
+        "shadow",
+        "run a candidate core in parallel with the core, and show how their outputs differ",
+        shadow_verb.add_arguments,
+        shadow_verb.main,
     ),
     Verb("set", "set a property of a component", _add_set, _set),
     Verb("echo", "show the values of a resource or port", echo_verb.add_arguments, echo_verb.main),

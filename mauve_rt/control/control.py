@@ -114,7 +114,7 @@ class Control:
         self._under_way: dict[str, Request] = {}
         self._answered = threading.Condition()
         self._changing = threading.Lock()
-        self._trials: dict[str, int] = {}  # by component: the generation that is on probation there, or 0
+        self._trials: dict[str, tuple[int, int]] = {}  # by component: generation on probation, and since when
 
     def handle(self, request: Request) -> Outcome:
         """Do what is asked, or nothing at all. Never raises: every request gets its outcome."""
@@ -148,8 +148,11 @@ class Control:
     def way_back(self, verdict: Verdict) -> Request | None:
         """What else goes back when an old core is back: the other parts of its generation; None: nothing."""
         record = verdict.record
-        generation = self._trials.pop(record.component, 0)
-        if not verdict.is_reverted or generation == 0:
+        generation, since_ns = self._trials.get(record.component, (0, 0))
+        if generation == 0 or record.begin_ns < since_ns:
+            return None  # of an earlier probation, or of no reload
+        self._trials.pop(record.component, None)
+        if not verdict.is_reverted:
             return None
         order = ReloadOrder(targets=(record.component,), back=True, generation=generation)
         return Request(reload=order, requested_by="kernel", cause=f"probation reverted: {record.reason}")
@@ -225,6 +228,7 @@ class Control:
         if reload.generation is None:
             prefix = "dry run: would be accepted; " if request.dry_run else ""
             return Outcome(code=Code.OK, message=prefix + found)
+        since_ns = self._runtime.host.now_ns()
         try:
             steps, transaction = reload.steps()
             committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
@@ -233,7 +237,7 @@ class Control:
             raise
         reload.commit()
         number = 0 if reload.probation is None else reload.generation.number
-        self._trials.update(dict.fromkeys((step.target for step in steps), number))
+        self._trials.update(dict.fromkeys((step.target for step in steps), (number, since_ns)))
         outcome = Outcome(
             code=Code.OK, message=reload.message(steps), loaded=reload.generation.loaded, report=()
         )

@@ -58,6 +58,6 @@ class ProbationWatch:
     def look(self, records: Sequence[ProbationRecord]) -> Iterator[Verdict]:
         """Yield the verdicts that are new since the last look."""
         for record in records:
-            if record.verdict != "running" and self._told.get(record.component) != record.begin_ns:
+            if record.verdict != "running" and self._told.get(record.component, -1) < record.begin_ns:
                 self._told[record.component] = record.begin_ns
                 yield Verdict(record)

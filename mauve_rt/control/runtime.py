@@ -17,6 +17,7 @@ from mauve_rt._kernel import (
     RealtimeStatus,
     RecentMaxima,
     ResourceDescription,
+    ShadowRecord,
 )
 from mauve_rt.errors import MauveError
 from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed_parts, build, configure
@@ -245,6 +246,11 @@ class Runtime:
         """Of each component the last verdict, then the core on probation now; none while unconfigured."""
         host = self._host
         return host.probations() if host is not None else []
+
+    def shadows(self) -> list[ShadowRecord]:
+        """Of each component the shadow that runs, or the last one; none while unconfigured."""
+        host = self._host
+        return host.shadows() if host is not None else []
 
     def threads_left_behind(self) -> int:
         """Threads of removed components that still run a timed-out execution."""

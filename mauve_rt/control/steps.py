@@ -44,6 +44,7 @@ from mauve_rt.model.words import did_you_mean, shown, some
 from mauve_rt.yaml.text import YamlError, read_yaml
 
 _TOLD_PROBLEMS = 10
+_MAX_BUDGET_US = 1_000_000
 
 
 @dataclass
@@ -164,7 +165,9 @@ class Plan:
             if step.name not in allowed:
                 raise _undeclared(step, kind, allowed, loader)
             loader.require(kind, step.name)
-        if step.value and kind == "core":
+        if step.kind == "shadow":
+            self.transaction.shadow(step.target, step.name, _budget_ns(step))
+        elif step.value and kind == "core":
             self._replace_on_probation(step, sketch)
         else:
             self.transaction.add(step.kind, step.target, step.name)
@@ -285,6 +288,17 @@ def _yaml(step: Step, subject: str) -> object:
         return read_yaml(step.value)
     except YamlError:
         raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
+
+
+def _budget_ns(step: Step) -> int:
+    """The value of a step shadow: {budget_us: 100}."""
+    subject = f"step {step.kind} of '{step.target}'"
+    value = _yaml(step, subject)
+    budget = value.get("budget_us") if isinstance(value, dict) and set(value) == {"budget_us"} else None
+    if isinstance(budget, bool) or not isinstance(budget, int | float) or not 0 < budget <= _MAX_BUDGET_US:
+        expected = f"expected {{budget_us: N}}, more than 0 to {_MAX_BUDGET_US:,} us"
+        raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+    return round(budget * 1000)
 
 
 def _kernel_value(step: Step, kind: StepKind, component: _Sketch | None = None) -> PropertyValue | None:

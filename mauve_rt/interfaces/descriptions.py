@@ -12,11 +12,19 @@ from mauve_msgs.msg import (
     RealtimeStatus,
     ReconfigurationEvent,
     ResourceInfo,
+    Shadow,
+    ShadowOutput,
     StateInfo,
     StepReport,
     TraceArchitecture,
 )
-from mauve_rt._kernel import ComponentDescription, DescribedState, PortDescription, ProbationRecord
+from mauve_rt._kernel import (
+    ComponentDescription,
+    DescribedState,
+    PortDescription,
+    ProbationRecord,
+    ShadowRecord,
+)
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
@@ -34,6 +42,7 @@ def component_info(
     authors: Mapping[str, str],
     code: tuple[int, int] = (0, 0),
     probations: Iterable[ProbationRecord] = (),
+    shadows: Iterable[ShadowRecord] = (),
 ) -> Any:
     """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element.
 
@@ -65,6 +74,7 @@ def component_info(
         generation=code[0],
         built_ns=code[1],
         probations=[_probation(record) for record in probations],
+        shadows=[shadow_message(record) for record in shadows],
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
@@ -98,6 +108,7 @@ def component_infos(runtime: Runtime) -> list[Any]:
 
 def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription]) -> list[Any]:
     authors = runtime.authors()
+    shadows = runtime.shadows()
     probations: dict[str, list[ProbationRecord]] = {}
     for record in runtime.probations():
         probations.setdefault(record.component, []).append(record)
@@ -108,6 +119,7 @@ def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription
             authors=authors.get(part.name, {}),
             code=runtime.code_of(part.core),
             probations=probations.get(part.name, ()),
+            shadows=[record for record in shadows if record.component == part.name],
         )
         for part in components
     ]
@@ -184,6 +196,44 @@ def _probation(record: ProbationRecord) -> Any:
         releases=record.releases,
         begin_ns=record.begin_ns,
         end_ns=record.end_ns,
+    )
+
+
+def shadow_message(record: ShadowRecord) -> Any:
+    """Shadow of a record."""
+    return Shadow(
+        component=record.component,
+        core=record.core,
+        live_core=record.live_core,
+        verdict=getattr(Shadow, record.verdict.upper()),
+        reason=record.reason,
+        begin_ns=record.begin_ns,
+        end_ns=record.end_ns,
+        releases=record.releases,
+        compared=record.compared,
+        skipped_late=record.skipped_late,
+        skipped_budget=record.skipped_budget,
+        idle=record.idle,
+        over_budget=record.over_budget,
+        budget_ns=record.budget_ns,
+        largest_execution_ns=record.largest_execution_ns,
+        outputs=[
+            ShadowOutput(
+                port=output.port,
+                field=number.path,
+                compared=number.count,
+                maximum=number.maximum,
+                rms=number.rms,
+                nan=number.nan,
+                live_nan=number.live_nan,
+                live_only=output.live_only,
+                shadow_only=output.shadow_only,
+                has_lag=output.lag is not None,
+                lag=output.lag or 0,
+            )
+            for output in record.outputs
+            for number in output.numbers
+        ],
     )
 
 

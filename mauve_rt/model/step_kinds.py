@@ -10,7 +10,7 @@ from typing import Literal
 
 Target = Literal["component", "new component", "resource", "new resource", "all"]
 Name = Literal["", "core", "fsm", "shell", "property", "port"]
-Value = Literal["", "scalar", "resource.service", "section", "probation"]
+Value = Literal["", "scalar", "resource.service", "section", "probation", "shadow"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class StepKind:
     @property
     def needs_value(self) -> bool:
         """Whether there must be a value: a scalar may be an empty text."""
-        return self.value in ("resource.service", "section")
+        return self.value in ("resource.service", "section", "shadow")
 
     @property
     def is_structural(self) -> bool:
@@ -59,6 +59,16 @@ STEP_KINDS: Mapping[str, StepKind] = {
     ),
     "revert_core": StepKind(
         what="put the old core of a core on probation back; without a probation nothing happens"
+    ),
+    "shadow": StepKind(
+        what="execute a candidate core in parallel with the core, on the same inputs and without effects",
+        name="core",
+        value="shadow",
+        is_prepared=False,
+    ),
+    "end_shadow": StepKind(what="end the shadow of the component", is_prepared=False),
+    "promote": StepKind(
+        what="replace the core by the candidate of the shadow, which keeps its state", is_prepared=False
     ),
     "replace_fsm": StepKind(what="replace the fsm", name="fsm", needs_running=True),
     "replace_shell": StepKind(

@@ -80,7 +80,7 @@ def _after(component: ListedComponent, step: Step) -> ListedComponent:
             value = step.value if kind.value else ""
             return replace(component, connections={**component.connections, step.name: value})
         case "core":
-            return replace(component, core=step.name)
+            return component if step.kind == "shadow" else replace(component, core=step.name)
         case "fsm":
             return replace(component, fsm=step.name)
         case "shell":

@@ -69,6 +69,8 @@ struct LoopShell : mauve::Shell {
 };
 
 class Loop : public mauve::Core<LoopShell> {
+ protected:
+  double sum() const { return sum_; }
 #ifdef OTHER_STATE
   MAUVE_STATE(sum_, rounds_, history_)
   std::array<double, 4> history_{};
@@ -130,6 +132,17 @@ class Loud : public Misbehaving {
   }
 };
 
+/// Adds a tenth more each time.
+class Louder : public Loop {
+ public:
+  void act() override {
+    Loop::act();
+#ifndef WITHOUT_PORT
+    shell().sum.write({1.1 * sum()});
+#endif
+  }
+};
+
 /// Without values.
 struct Box : mauve::Resource {
   Box() : Resource("reload_tests/Box", "") {}
@@ -164,6 +177,7 @@ MAUVE_PLUGINS(registry) {
 #ifdef NEW_CORE
   registry.core<reload_tests::Other>("reload_tests/New", "reload_tests/LoopShell");
   registry.core<reload_tests::Throws>("reload_tests/Throws", "reload_tests/LoopShell");
+  registry.core<reload_tests::Louder>("reload_tests/Louder", "reload_tests/LoopShell");
   registry.core<reload_tests::Nan>("reload_tests/Nan", "reload_tests/LoopShell");
   registry.core<reload_tests::Loud>("reload_tests/Loud", "reload_tests/LoopShell");
 #endif

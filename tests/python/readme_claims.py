@@ -27,6 +27,7 @@ PAGES_OF_CLAIMS = (
     *(
         f"docs/howto/{name}.md"
         for name in (
+            "compare_in_shadow",
             "install",
             "operate",
             "record_and_report",
@@ -45,6 +46,8 @@ _PEERS = "python/simulation/test_failures_of_peers.py::test_"
 _PEERS_FAULTS = "python/simulation/test_faults_of_peers.py::test_"
 _KERNEL_ALONE = "python/project/test_readme_examples.py::test_the_kernel_knows_neither_ros_nor_python"
 
+_SHADOW = "python/control/test_shadow.py::test"
+_PAGE_OF_SHADOW = "ros/executor/test_reload.py::test_the_commands_of_the_shadow_page"
 _PROBATION = "python/control/test_probation.py::test"
 _PAGE_OF_PROBATION = "ros/executor/test_reload.py::test_the_commands_of_the_probation_page"
 _RELOAD = "python/control/test_reload.py::test"
@@ -692,6 +695,58 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ),
     "[On probation](try_on_probation.md), rebuilt code goes back by itself after a fault.": (
         f"{_PROBATION}_a_reload_on_probation_goes_back_as_a_whole",
+    ),
+    # ---- shadow
+    "[In its shadow](compare_in_shadow.md), new code is compared with the present code.": (_PAGE_OF_SHADOW,),
+    "mauve shadow /robot_1/executor control my_robot/Pid2 --budget-us 50": (_PAGE_OF_SHADOW,),
+    "mauve shadow /robot_1/executor # how the outputs differ": (_PAGE_OF_SHADOW,),
+    ("mauve shadow /robot_1/executor control --promote # the candidate becomes the core, with its state"): (
+        _PAGE_OF_SHADOW,
+        f"{_SHADOW}_the_warm_candidate_is_promoted",
+    ),
+    "mauve shadow /robot_1/executor control --end": (_PAGE_OF_SHADOW,),
+    ("A candidate core runs in parallel with the live core, on the same inputs of the same releases."): (
+        "Shadows.TheCandidateReadsWhatTheLiveCoreReadsAtTheSameInstants",
+    ),
+    "Its outputs reach no resource.": (f"{_SHADOW}_the_difference_of_each_output_is_told",),
+    (
+        "It runs on an ordinary thread below all components: a release for which it is late is "
+        "skipped and counted."
+    ): (
+        "Shadows.ACandidateOverItsBudgetCostsNobodyElse",
+        "ShadowThreads.AComponentIsNotKeptWaitingByACandidateThatHangs",
+    ),
+    "The budget is the execution time of the candidate for one release, on average.": (
+        "Shadows.ACandidateOverItsBudgetCostsNobodyElse",
+    ),
+    "A release that takes longer is paid for by releases that are skipped.": (
+        "Shadows.ACandidateOverItsBudgetCostsNobodyElse",
+    ),
+    (
+        "For each number of each output, `mauve shadow` and `/diagnostics` show the largest "
+        "difference, the root mean square, and how often the candidate wrote NaN."
+    ): (
+        _PAGE_OF_SHADOW,
+        f"{_SHADOW}_the_difference_of_each_output_is_told",
+    ),
+    ("For each output they show the lag: by how many releases the candidate's first number comes later."): (
+        "Shadows.ACandidateThatLagsIsFound",
+    ),
+    "A fault of the candidate ends its shadow.": (
+        f"{_SHADOW}_a_candidate_that_writes_nan_or_raises_harms_nobody",
+    ),
+    "So does a change of the component's parts or wiring.": ("Shadows.OtherChangesEndTheShadow",),
+    "The component goes on.": (f"{_SHADOW}_a_candidate_that_writes_nan_or_raises_harms_nobody",),
+    "A component has one shadow at most.": ("Shadows.WhatCannotBeShadowedIsRefused",),
+    "Components with call ports or event waits have none, because a call has effects.": (
+        "Shadows.CallPortsAreRefused",
+        "Shadows.TextsAndEventWaitsAreRefused",
+    ),
+    (
+        "By `mauve reconfigure` the steps are `shadow` (value `{budget_us: 50}`), `end_shadow` and `promote`."
+    ): (
+        f"{_SHADOW}_the_difference_of_each_output_is_told",
+        f"{_SHADOW}_the_warm_candidate_is_promoted",
     ),
     # ---- rebuilt code
     "mauve reload /robot_1/executor # all code that was rebuilt since it was loaded": (
@@ -1789,8 +1844,8 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ): ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
     (
         "| `void take(CoreBase& old) noexcept` | in the same wait, after `adopt` | move the state "
-        "of the old core over |"
-    ): ("Rule9Replace.RefusalsLeaveTheOldCoreRunning",),
+        "of the old core over; [state fields](reload_code.md) (`MAUVE_STATE`) are copied before it |"
+    ): ("Rule9Replace.RefusalsLeaveTheOldCoreRunning", "Handover.CopiesTheFieldsOfTheSameNameAndType"),
     "An exception of `adopt` carries its reason to the requester": (
         "HostConformance.ARefusalNamesItsComponentOnceAndItsReason",
     ),

@@ -109,7 +109,9 @@ void Architecture::settle_changes() noexcept {
 
 void Architecture::settle_probations() noexcept {
   for (const auto& component : components()) {
-    if (!component->is_probation_over()) continue;
+    const auto shadow = component->last_shadow();
+    const bool has_shadow_ended = shadow != nullptr && shadow->is_to_settle();
+    if (!component->is_probation_over() && !has_shadow_ended) continue;
     ChangeMark& mark = component->change_mark();
     const bool is_reverted = component->is_probation_reverted();
     {
@@ -120,6 +122,7 @@ void Architecture::settle_probations() noexcept {
     }
     drop_stale_prepared();  // they refer to the core that goes now
     component->settle_probation();
+    component->settle_shadow();
     if (is_reverted) note_author(component->name(), "core", "probation");
     const std::lock_guard gate(commit_gate_.mutex);
     mark.release();

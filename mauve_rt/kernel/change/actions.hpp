@@ -9,6 +9,7 @@
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/run/probation.hpp"
+#include "mauve_rt/run/shadow.hpp"
 
 namespace mauve {
 
@@ -67,6 +68,36 @@ class RevertRequest final : public CommitAction {
  private:
   Task& task_;
   std::shared_ptr<Probation> probation_;
+  std::uint32_t trace_id_;
+};
+
+/// Captures the component's releases for a shadow from then on.
+class ShadowBegin final : public CommitAction {
+ public:
+  ShadowBegin(Task& its_task, std::shared_ptr<Shadow> shadow)
+      : task_(its_task),
+        shadow_(std::move(shadow)),
+        trace_id_(TraceNames::intern("shadow " + shadow_->core_name())) {}
+  void take() noexcept override { task_.set_shadow(*shadow_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  Task& task_;
+  std::shared_ptr<Shadow> shadow_;
+  std::uint32_t trace_id_;
+};
+
+/// Ends the component's shadow, if there is one.
+class ShadowEnd final : public CommitAction {
+ public:
+  ShadowEnd(Task& its_task, ShadowCause why)
+      : task_(its_task), why_(why), trace_id_(TraceNames::intern("end_shadow")) {}
+  void take() noexcept override { task_.end_shadow(why_); }
+  std::uint32_t trace_id() const noexcept override { return trace_id_; }
+
+ private:
+  Task& task_;
+  ShadowCause why_;
   std::uint32_t trace_id_;
 };
 

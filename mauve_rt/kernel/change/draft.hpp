@@ -49,8 +49,11 @@ struct DraftComponent {
   int fsm_step{0};
   int core_step{0};
   std::optional<ProbationOptions> probation{};  // of the new core
-  bool core_unready{false};                     // the new core is put in as it is
-  int configure_step{0};                        // the last that configures it anew
+  std::shared_ptr<Shadow> promoted{};           // the new core is its candidate
+  std::shared_ptr<Shadow> shadow{};             // begins
+  int shadow_step{0};
+  bool core_unready{false};  // the new core is put in as it is
+  int configure_step{0};     // the last that configures it anew
   int first_step{0};
   std::vector<std::unique_ptr<CommitAction>>
       actions{};  // taken in by the commit beside all this; not of an added one
@@ -157,6 +160,7 @@ class Draft {
   static void check_structural(const DraftComponent& component);
   static void check_repaired(const DraftComponent& component);
   void check_probation(const DraftComponent& component) const;
+  static void check_shadow(const DraftComponent& component);
   static void check_core(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;
   void check_port_counts() const;

@@ -20,6 +20,7 @@ void Draft::finish() const {
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
     if (component.probation) check_probation(component);
+    if (component.shadow != nullptr) check_shadow(component);
     if (architecture_.is_configured()) check_required_ports(component);
     if (component.core_unready && component.runs) {
       throw Error(ErrorCode::not_configured, "the core is not configured",
@@ -104,6 +105,19 @@ void Draft::check_probation(const DraftComponent& component) const {
            "no structural property that a part on probation reads",
            "set it in a transaction without probation");
   }
+}
+
+/// The candidate has the parts and the inputs that the component has now.
+void Draft::check_shadow(const DraftComponent& component) {
+  const bool is_changed = component.has_new_parts() || component.configure_step != 0 ||
+                          component.sets_structural() || component.wires != component.wires_before;
+  if (!is_changed) return;
+  throw Error(ErrorCode::invalid_argument, "the transaction changes the component that it gives a shadow",
+              {.component = component.name(),
+               .element = "shadow",
+               .expected = "no new parts, wiring or structural properties, and no configure step",
+               .remedy = "make these changes in a transaction before",
+               .step = component.shadow_step});
 }
 
 /// A core that is put in is configured by then.

@@ -176,6 +176,7 @@ void PartsChange::exchange_fsm() noexcept {
 }
 
 void PartsChange::put_back() noexcept {
+  component_.task_.end_shadow(ShadowCause::changed);
   exchange_core();
   if (replaces_fsm()) {
     component_.task_.set_fallback(nullptr);  // made ready for the fsm that goes out; who settles renews it
@@ -191,6 +192,7 @@ void PartsChange::put_back() noexcept {
 
 void PartsChange::take() noexcept {
   component_.task_.end_probation(is_fallback_);
+  component_.task_.end_shadow(promotes_ ? ShadowCause::promotion : ShadowCause::changed);
   if (parts_.core != nullptr) {
     if (!afresh_ && !unready_) handover_->take();
     exchange_core();

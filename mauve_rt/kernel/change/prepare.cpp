@@ -152,6 +152,7 @@ void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
   changes_.push_back({.draft = &changed});
   Change& change = changes_.back();
   for (auto& action : changed.actions) keep(*changed.component, std::move(action));
+  if (changed.shadow != nullptr) at_step(changed.shadow_step, [&] { prepare_shadow(changed); });
   if (changed.has_new_parts()) {
     const int step = changed.core_step != 0  ? changed.core_step
                      : changed.fsm_step != 0 ? changed.fsm_step
@@ -180,6 +181,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     }
   }
   if (draft.is_repaired()) change.parts->start_afresh();
+  if (draft.promoted != nullptr) change.parts->promote();
   if (draft.probation) {
     change.parts->set_probation(std::make_shared<Probation>(component, change.parts->core()->implementation(),
                                                             std::move(*draft.probation)));
@@ -194,9 +196,37 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   }
 }
 
+void TransactionCommit::Work::prepare_shadow(const DraftComponent& changed) {
+  Component& component = *changed.component;
+  changed.shadow->prepare();
+  if (options_.dry_run) return;
+  if (component.task().has_thread()) prefault_allocated();
+  host_->run_shadow(changed.shadow);
+  keep(component, std::make_unique<ShadowBegin>(component.task(), changed.shadow));
+}
+
+/// The candidate of a refused promote goes on in the shadow.
+void TransactionCommit::Work::give_back_candidates() noexcept {
+  if (draft_ == nullptr) return;
+  for (DraftComponent& changed : draft_->components()) {
+    if (changed.shadow != nullptr)
+      changed.shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
+    if (changed.promoted == nullptr) continue;
+    std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);
+    for (Change& change : changes_) {
+      if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
+        core = change.parts->give_back_core();
+    }
+    changed.promoted->resume(std::move(core));
+  }
+}
+
 void TransactionCommit::Work::prepare_wiring(Change& change) {
   const DraftComponent& draft = *change.draft;
   Component& component = *draft.component;
+  const auto shadow = component.last_shadow();
+  if (draft.wires != draft.wires_before && shadow != nullptr && !shadow->has_ended())
+    keep(component, std::make_unique<ShadowEnd>(component.task(), ShadowCause::changed));
   for (const auto& [name, before] : draft.wires_before) {
     if (draft.wires.contains(name)) continue;
     keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
@@ -253,6 +283,7 @@ void TransactionCommit::Work::prepare_properties(Change& change) {
 void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component, bool was_listed) {
   Task& task = component->task();
   if (task.is_abandoned()) component->stop_listening();
+  component->conclude_shadow();
   const bool ended = host_ != nullptr ? host_->detach(task) : task.end_thread(monotonic_now_ns());
   if (task.is_parked()) {
     for (const auto& port : component->shell().ports()) port->disconnect();
@@ -284,6 +315,7 @@ void TransactionCommit::Work::leave_behind() {
 
 void TransactionCommit::Work::discard() noexcept {
   leave_behind();
+  give_back_candidates();
   settle_with_host();
   for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
   for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);

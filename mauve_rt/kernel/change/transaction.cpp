@@ -21,6 +21,19 @@ Transaction& Transaction::replace_core(const std::string& component, std::unique
   return add(steps::replace_core, component, {},
              CoreOnProbation{.core = std::move(core), .options = std::move(options)});
 }
+Transaction& Transaction::shadow(const std::string& component, const std::string& implementation,
+                                 ShadowOptions options) {
+  return add(steps::shadow, component, implementation, CoreInShadow{.options = options});
+}
+Transaction& Transaction::shadow(const std::string& component, std::unique_ptr<CoreBase> core,
+                                 ShadowOptions options, std::unique_ptr<Shell> shell) {
+  return add(steps::shadow, component, {},
+             CoreInShadow{.core = std::move(core), .options = options, .shell = std::move(shell)});
+}
+Transaction& Transaction::end_shadow(const std::string& component) {
+  return add(steps::end_shadow, component);
+}
+Transaction& Transaction::promote(const std::string& component) { return add(steps::promote, component); }
 Transaction& Transaction::place_core(const std::string& component, std::unique_ptr<CoreBase> core) {
   return add(steps::place_core, component, {}, std::move(core));
 }

@@ -104,6 +104,8 @@ void TransactionCommit::Work::require_preparable() const {
     refuse(draft_->resynchronise_step(), "a new epoch cannot be prepared");
   for (const DraftComponent& component : draft_->components()) {
     if (component.configure_step != 0) refuse(component.configure_step, "to configure cannot be prepared");
+    if (component.promoted != nullptr)
+      refuse(component.core_step, "a promote cannot be prepared: the candidate would stand still");
   }
 }
 
@@ -390,6 +392,16 @@ void TransactionCommit::Work::renew_fallback(Change& change) {
   component.renew_fallback_if_needed(std::move(out), is_outdated);
 }
 
+/// A shadow that begins has the properties that the same change sets.
+void TransactionCommit::Work::settle_shadow(const DraftComponent& changed) {
+  Component& component = *changed.component;
+  component.settle_shadow();  // the take may have ended it
+  if (changed.shadow != nullptr) component.keep_shadow(changed.shadow);
+  const auto shadow = component.last_shadow();
+  if (shadow == nullptr) return;
+  for (const auto& [name, property] : changed.properties) shadow->set_property(name, property.value);
+}
+
 void TransactionCommit::Work::retire() {
   for (const Change& change : changes_) {
     const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
@@ -401,6 +413,7 @@ void TransactionCommit::Work::retire() {
   for (Change& change : changes_) {
     Component& component = *change.draft->component;
     if (change.retreat == nullptr && component.is_configured()) component.update_listening();
+    settle_shadow(*change.draft);
     if (change.parts == nullptr) continue;
     component.settle_probation();  // the take has ended it
     if (!change.parts->has_probation()) change.parts->retire();

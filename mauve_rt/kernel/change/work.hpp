@@ -80,6 +80,7 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   void prepare_change(DraftComponent& changed);
   void prepare_removed(DraftComponent& removed);
   void prepare_parts(Change& change);
+  void prepare_shadow(const DraftComponent& changed);
   void configure_anew(DraftComponent& changed);
   void prepare_repair(const DraftComponent& changed);
   void prepare_wiring(Change& change);
@@ -104,6 +105,8 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   void set_epoch();
   void keep_for_report();
   static void renew_fallback(Change& change);
+  static void settle_shadow(const DraftComponent& changed);
+  void give_back_candidates() noexcept;
   void leave_behind();
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 

@@ -165,13 +165,19 @@ void Deployer::shut_down(bool for_good) noexcept {
   if (for_good) give_up_hung();
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   for (const auto& component : architecture().components()) component->task().end_thread(until);
-  watchdog_->stop();  // last: stopping is watched too
+  shadow_thread_.end(until);  // stop_all() has ended its shadows
+  watchdog_->stop();          // last: stopping is watched too
   architecture().release_host(*this);
   architecture().changes().bump();
 }
 
 void Deployer::attach(Task& task) {
   task.create_thread(nullptr, options_.require_realtime, options_.trace, watchdog_);
+}
+
+void Deployer::run_shadow(const std::shared_ptr<Shadow>& shadow) {
+  const std::lock_guard life(life_mutex_);
+  if (is_deployed()) shadow_thread_.add(shadow);  // else the change finds the host shut down
 }
 
 bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }

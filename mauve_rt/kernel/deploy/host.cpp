@@ -98,6 +98,14 @@ bool Host::revert_probation(const std::string& component, const std::string& rea
   return architecture_.hold_component(component)->revert_probation(reason, timeout_ns);
 }
 
+std::vector<ShadowRecord> Host::shadows() const {
+  std::vector<ShadowRecord> all;
+  for (const auto& component : architecture_.components()) {
+    if (const auto shadow = component->last_shadow()) all.push_back(shadow->record());
+  }
+  return all;
+}
+
 ArchitectureDescription Host::describe() const {
   architecture_.settle_if_idle();
   return architecture_.describe();
@@ -142,6 +150,7 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
   for (const auto& component : components) {
     if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);
     component->conclude_probation();
+    component->conclude_shadow();
   }
 }
 

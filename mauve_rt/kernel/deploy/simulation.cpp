@@ -194,7 +194,10 @@ void SimulatedHost::shutdown() noexcept {
   set_deployed(false);
   architecture().commit_gate().close();
   stop_all(0);
-  for (const auto& component : architecture().components()) component->task().end_simulation();
+  for (const auto& component : architecture().components()) {
+    component->settle_shadow();  // no thread of its own retires it
+    component->task().end_simulation();
+  }
   architecture().release_host(*this);
 }
 

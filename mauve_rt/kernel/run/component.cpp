@@ -533,6 +533,8 @@ void Component::check_cleanup() const { require_parked("cleanup"); }
 void Component::cleanup_hook() {
   conclude_probation();
   settle_probation();
+  conclude_shadow();
+  settle_shadow();
   task_.set_fallback(nullptr);
   spare_ = nullptr;
   if (fallback_ != nullptr) {

@@ -57,6 +57,18 @@ void Machine::start(time_ns_t instant_ns) noexcept {
   tell_wait();
 }
 
+void Machine::start_in(const State& wait, time_ns_t instant_ns) noexcept {
+  execution_.enter();
+  waiting_ = &wait;
+  next_ = nullptr;
+  is_cold_ = false;
+  event_settled_ = true;
+  set_clock_ns(instant_ns);
+  grid_place_ns_ = 0;
+  current_.store(wait.trace_id, std::memory_order_relaxed);
+  tell_wait();
+}
+
 void Machine::leave_event_to(const State& initial) noexcept {
   if (waiting_ == nullptr || waiting_->event == nullptr) return;
   if (!initial.is_wait) {

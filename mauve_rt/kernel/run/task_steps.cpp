@@ -74,6 +74,8 @@ void Task::take_up_start() {
 
 void Task::start_machine(time_ns_t instant_ns) noexcept {
   machine_.start(instant_ns);
+  if (shadow_.is_set()) [[unlikely]]
+    start_shadow();
   parked_.store(0, std::memory_order_release);
   publish_state(ComponentState::running);
   machine_.trace_deployment();
@@ -105,6 +107,8 @@ void Task::run_to_next_wait() {
           control_.fetch_or(kCommit, std::memory_order_acq_rel);
         if (probation_.is_set()) [[unlikely]]
           watch_probation();
+        if (shadow_.is_set()) [[unlikely]]
+          capture_release();
         return;
       case Machine::Entered::timed_out:
         return park_timed_out();

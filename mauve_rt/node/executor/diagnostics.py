@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import CallReport, TopicReport
-from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, allocation_counting
+from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, ShadowRecord, allocation_counting
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
@@ -51,6 +51,7 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
+        array.status += [self._shadow(record) for record in self._runtime.shadows()]
         array.status += [self._rule(facts) for facts in self._rules.facts()]
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
@@ -166,6 +167,33 @@ class Diagnostics:
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+
+    def _shadow(self, record: ShadowRecord) -> Any:
+        """A candidate core in the shadow of a component, and how its outputs differ."""
+        nans = sum(number.nan for output in record.outputs for number in output.numbers)
+        is_wrong = record.verdict == "faulted" or nans > 0
+        values: dict[str, object] = {
+            "core": record.core,
+            "live_core": record.live_core,
+            "verdict": record.verdict,
+            "releases": record.releases,
+            "compared": record.compared,
+            "skipped_late": record.skipped_late,
+            "skipped_budget": record.skipped_budget,
+            "over_budget": record.over_budget,
+            "budget_ns": record.budget_ns,
+            "largest_execution_ns": record.largest_execution_ns,
+        }
+        for output in record.outputs:
+            values[f"lag[{output.port}]"] = "" if output.lag is None else output.lag
+            for number in output.numbers:
+                name = f"{output.port}.{number.path}"
+                values[f"max_difference[{name}]"] = number.maximum
+                values[f"rms_difference[{name}]"] = number.rms
+                values[f"nan[{name}]"] = number.nan
+        message = f"{record.core}: {record.verdict}{f', {record.reason}' if record.reason else ''}"
+        level = DiagnosticStatus.WARN if is_wrong else DiagnosticStatus.OK
+        return self._status(f"{record.component} shadow", level, message, values)
 
     def _rule(self, facts: RuleFacts) -> Any:
         """What cannot be made ready is told before it is needed."""

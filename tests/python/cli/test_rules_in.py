@@ -144,6 +144,9 @@ STEPS = {
     "add_resource": "target: more, value: {kind: shared_data, type: std_msgs/msg/Float64}",
     "configure": "target: eager",
     "resynchronise": "",
+    "shadow": "target: eager, name: executor_tests/Backwards, value: {budget_us: 50}",
+    "end_shadow": "target: eager",
+    "promote": "target: eager",
 }
 
 

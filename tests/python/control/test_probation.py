@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from rebuilt_package import RebuiltPackage
 from reload_world import World, make_world
 
 from mauve_rt._kernel import ProbationRecord
-from mauve_rt.control.probations import ProbationWatch
+from mauve_rt.control.probations import ProbationWatch, Verdict
 from mauve_rt.control.requests import Code, Outcome, Step
 from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model.probation import read_probation
@@ -20,7 +22,7 @@ CORE = "reload_tests/{}"
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     rebuilt.build("NEW_CORE")
     with rebuilt.index.open("a", encoding="utf-8") as file:
-        for name in ("Throws", "Nan", "Loud"):
+        for name in ("Throws", "Nan", "Loud", "Louder"):
             file.write(f"core; reload_tests/{name}; reload_tests/LoopShell; reload_tests\n")
     yield from make_world(request.param, tmp_path, alternatives="installed")
 
@@ -160,3 +162,30 @@ def test_a_changed_shell_cannot_be_on_probation(world: World, rebuilt: RebuiltPa
 def test_the_value_of_a_step_is_that_of_the_request() -> None:
     value = {"probation_s": 2.0, "revert_on": ["nan", {"output": "a.b", "minimum": 1}], "releases": 3}
     assert read_probation(value).value() == value
+
+
+def test_each_verdict_is_told_once_and_in_its_order() -> None:
+    """The last one and the present one are both listed until the present one is settled."""
+    earlier: Any = SimpleNamespace(component="loop", verdict="inconclusive", begin_ns=1)
+    present: Any = SimpleNamespace(component="loop", verdict="reverted", begin_ns=2)
+    watch = ProbationWatch()
+    assert [told.record for told in watch.look([earlier, present])] == [earlier, present]
+    assert list(watch.look([earlier, present])) == []
+    assert list(watch.look([present])) == []
+
+
+def test_an_earlier_verdict_is_not_that_of_the_reload(world: World, rebuilt: RebuiltPackage) -> None:
+    assert _replace(world, "Other", "{probation_s: 60}").success
+    assert world.ask(Step("replace_core", "loop", CORE.format("Loop"))).success
+    earlier = Verdict(_decided(world))
+    assert earlier.record.verdict == "inconclusive"
+    rebuilt.build("THROWS", "STEP=2.0", "NEW_CORE")
+    assert world.reload("loop", probation="{probation_s: 60}").success
+    assert world.control.way_back(earlier) is None
+    for _ in range(1000):
+        (*_, record) = [each for each in world.runtime.probations() if each.component == "loop"]
+        if record.verdict == "reverted":
+            break
+        world.run(5)
+        world.runtime.host.settle_probations()
+    assert world.control.way_back(Verdict(record)) is not None

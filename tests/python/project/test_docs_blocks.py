@@ -187,6 +187,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "systemd-analyze verify": (UNIT_FILES,),
         "Description=MAUVE RT supervisor": (UNIT_FILES,),
     },
+    "docs/howto/compare_in_shadow.md": {
+        "control --promote": ("ros/executor/test_reload.py::test_the_commands_of_the_shadow_page",),
+    },
     "docs/howto/reload_code.md": {
         "mauve reload /robot_1/executor --back": (
             "ros/executor/test_reload.py::test_the_commands_of_the_page",

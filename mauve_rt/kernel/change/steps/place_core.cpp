@@ -13,6 +13,7 @@ constexpr StepKind steps::place_core{
       DraftComponent& changed = draft.touch(step.target);
       changed.component->check_reconfigurable();
       changed.component->require_parked("replace_core");
+      require_not_promoted(changed);
       changed.fresh.core = std::move(core);
       changed.core_step = draft.step();
       changed.probation.reset();

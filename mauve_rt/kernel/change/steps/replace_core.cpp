@@ -41,6 +41,7 @@ constexpr StepKind steps::replace_core{.name = "replace_core",
                                              object == nullptr ? draft.registry().make_core(step.name)
                                                                : take(*object);
                                          DraftComponent& changed = replacing(draft, step.target);
+                                         require_not_promoted(changed);
                                          if (object == nullptr && !changed.is_added)
                                            changed.component->check_allowed(core->implementation());
                                          if (changed.is_added) allow_first_core(changed, *core);

@@ -85,6 +85,15 @@ DraftComponent& replacing(Draft& draft, const std::string& component) {
               {.component = component, .remedy = "configure it first, or build it with the other part"});
 }
 
+void require_not_promoted(const DraftComponent& component) {
+  if (component.promoted == nullptr) return;
+  throw Error(ErrorCode::invalid_argument,
+              "a step before has promoted the candidate of the component's shadow",
+              {.component = component.name(),
+               .element = "core",
+               .remedy = "leave one of the two steps out, or make two transactions"});
+}
+
 Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm) {
   const PluginRegistry* registry = &draft.registry();
   return [registry, fsm] { return registry->make_fsm(fsm); };

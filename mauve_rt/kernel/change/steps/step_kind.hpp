@@ -37,6 +37,9 @@ struct StepKind {
   kind(replace_core) \
   kind(place_core) \
   kind(revert_core) \
+  kind(shadow) \
+  kind(end_shadow) \
+  kind(promote) \
   kind(replace_fsm) \
   kind(replace_shell) \
   kind(set_property) \
@@ -107,6 +110,8 @@ std::string part_words(const TransactionStep& step) {
 
 /// The component whose part is to be replaced. Throws Error.
 DraftComponent& replacing(Draft& draft, const std::string& component);
+/// Throws Error (invalid_argument) when a step before has promoted the candidate of its shadow.
+void require_not_promoted(const DraftComponent& component);
 /// Makes a registered fsm, as often as asked.
 Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm);
 

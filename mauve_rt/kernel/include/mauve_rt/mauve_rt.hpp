@@ -36,4 +36,5 @@
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/probation.hpp"
+#include "mauve_rt/run/shadow.hpp"
 #include "mauve_rt/run/watchdog.hpp"

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <shared_mutex>
 
@@ -12,6 +13,7 @@
 namespace mauve {
 
 class Task;
+class Shadow;
 
 /// A host, as architectures and changes see it. All functions [non-rt].
 ///
@@ -40,6 +42,8 @@ class Runner {
   virtual void attach(Task& task) = 0;
   /// The reverse; false when its thread would not end in time. [non-rt]
   virtual bool detach(Task& task) noexcept = 0;
+  /// Executes the releases of a shadow, once it has begun, until it has ended. [non-rt] Throws Error.
+  virtual void run_shadow(const std::shared_ptr<Shadow>& shadow) = 0;
   /// Held while a change uses the runner, which may end meanwhile where this owns nothing. [non-rt], the architecture's change
   /// lock held.
   std::shared_lock<std::shared_mutex> use() { return std::shared_lock(in_use_, std::try_to_lock); }

@@ -56,10 +56,18 @@ struct CoreOnProbation {
   ProbationOptions options{};
 };
 
+/// A core to execute in a component's shadow: by the step's name, or as an object. Without a shell as an object, the registry makes
+/// one of the component's shell's name.
+struct CoreInShadow {
+  std::unique_ptr<CoreBase> core{};
+  ShadowOptions options{};
+  std::unique_ptr<Shell> shell{};
+};
+
 /// What a step puts in, as its kind takes it.
 using StepValue =
     std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>, std::unique_ptr<FsmBase>,
-                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreOnProbation>;
+                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreOnProbation, CoreInShadow>;
 
 struct StepKind;
 
@@ -112,6 +120,16 @@ class Transaction {
                             ProbationOptions options);
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
                             ProbationOptions options);
+  /// Executes a candidate core in the component's shadow (shadow.hpp); the live core stays. Of a deployed component that runs or is
+  /// STOPPED and has no shadow, whose parts and wiring the transaction leaves alone. By name as in replace_core(). As an object:
+  /// `shell` is another instance of the component's shell class; nullptr: the registry makes it.
+  Transaction& shadow(const std::string& component, const std::string& implementation, ShadowOptions options);
+  Transaction& shadow(const std::string& component, std::unique_ptr<CoreBase> core, ShadowOptions options,
+                      std::unique_ptr<Shell> shell = nullptr);
+  /// Ends the component's shadow; without a shadow there is nothing to do.
+  Transaction& end_shadow(const std::string& component);
+  /// Replaces the live core by the candidate of the component's shadow, which keeps its own state: nothing is handed over.
+  Transaction& promote(const std::string& component);
   /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
   Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
   /// The new fsm goes on in the wait of the same name, where it has one in a cycle with its initial state and the pending

@@ -38,6 +38,8 @@ class ReadPort final : public PortBase {
     status_ = find(value, time);
     reader_.time_ns = time;
     if (time_ns != nullptr) *time_ns = time;
+    if (is_tapped()) [[unlikely]]
+      tell_read(&value, status_, time);
     return status_;
   }
 
@@ -51,6 +53,13 @@ class ReadPort final : public PortBase {
   }
 
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
+  std::unique_ptr<PortCell> make_cell() const override {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      return std::make_unique<ReadCell<T>>();
+    } else {
+      return nullptr;
+    }
+  }
   bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
     auto value = std::make_unique<T>(default_);
     status = read(*value, &time_ns);
@@ -78,6 +87,8 @@ class ReadPort final : public PortBase {
     Sample<T> sample = find();
     status_ = sample.status;
     reader_.time_ns = sample.time_ns;
+    if (is_tapped()) [[unlikely]]
+      tell_read(&sample.value, sample.status, sample.time_ns);
     return sample;
   }
   // Out of line: the reads of a running component are to cost what they cost without previews.
@@ -137,6 +148,8 @@ class WritePort final : public PortBase {
 
   /// False when the resource had no room. A value that an OutputWatch refuses is dropped. [rt]
   bool write(const T& value) MAUVE_RT {
+    if (is_tapped() && !is_closed() && !is_previewed()) [[unlikely]]
+      tell_write(&value);
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
     if (!admits(&value)) return true;
     const bool taken = service_->write(value, stamp_ns());
@@ -150,6 +163,13 @@ class WritePort final : public PortBase {
   }
   TryWrite try_write_zero() noexcept override {
     return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
+  }
+  std::unique_ptr<PortCell> make_cell() const override {
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      return std::make_unique<WriteCell<T>>();
+    } else {
+      return nullptr;
+    }
   }
   OutputOptions output() const noexcept override { return output_; }
   std::optional<NumberPlace> find_number(std::string_view path) const override {

@@ -17,6 +17,8 @@
 #include "mauve_rt/base/this_thread.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/output_watch.hpp"
+#include "mauve_rt/data/port_cell.hpp"
+#include "mauve_rt/data/port_tap.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -59,6 +61,7 @@ struct ConnectedTo {
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
 /// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
 /// | watch_      | the component's thread; who ends the watch | component            | its own: revocable_reference.hpp     |
+/// | tap_        | the component's thread; who ends the tap | component              | its own: revocable_reference.hpp     |
 /// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
 class PortBase {
  public:
@@ -134,6 +137,14 @@ class PortBase {
   void watch(OutputWatch& watch) MAUVE_RT { watch_.set(watch); }
   /// No thread asks the watch any more afterwards. [rt]
   void unwatch() MAUVE_RT { watch_.revoke(kForever); }
+  /// Passes each value read or written to the tap, until untap(). [rt], on the component's thread, or parked.
+  void tap(PortTap& tap) MAUVE_RT { tap_.set(tap); }
+  /// No thread uses this tap any more afterwards. [rt]
+  void untap(const PortTap& tap) MAUVE_RT {
+    if (tap_.is(tap)) tap_.revoke(kForever);
+  }
+  /// A cell for this port's values, not connected; nullptr: they are not trivially copyable, or not C++. [non-rt]
+  virtual std::unique_ptr<PortCell> make_cell() const { return nullptr; }
   /// Where the number at a path lies in a value that it writes; nothing: there is none at a fixed place. [non-rt]
   virtual std::optional<NumberPlace> find_number(std::string_view /*path*/) const { return {}; }
 
@@ -175,6 +186,15 @@ class PortBase {
     watch_.use([&](OutputWatch& watch) MAUVE_RT { is_admitted = watch.admits(value); });
     return is_admitted;
   }
+  bool is_tapped() const MAUVE_RT { return tap_.is_set(); }
+  /// Of a tapped port. [rt] Out of line: the ports without a tap are to cost what they cost without taps.
+  [[gnu::noinline, gnu::cold]] void tell_read(const void* value, DataStatus status, time_ns_t time_ns)
+      MAUVE_RT {
+    tap_.use([&](PortTap& tap) MAUVE_RT { tap.on_read(value, status, time_ns); });
+  }
+  [[gnu::noinline, gnu::cold]] void tell_write(const void* value) MAUVE_RT {
+    tap_.use([&](PortTap& tap) MAUVE_RT { tap.on_write(value); });
+  }
   bool is_closed() const MAUVE_RT { return closed_.load(std::memory_order_acquire) != kOpen; }
   /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
   bool keeps_zero() const MAUVE_RT { return closed_.load(std::memory_order_acquire) == kClosed; }
@@ -198,6 +218,7 @@ class PortBase {
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service
   RevocableReference<OutputWatch> watch_;
+  RevocableReference<PortTap> tap_;
   std::unique_ptr<PortBase> stand_in_;
   std::atomic<pthread_t> previewer_{kNobody};
 };

@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/run/shadow_thread.hpp"
 
 namespace mauve {
 
@@ -17,7 +18,7 @@ struct DeployerOptions {
 
 /// The host of threads: one for each component. Ordinary threads.
 ///
-/// All members are written and read by deploy(), shutdown() and end(), under life_mutex_.
+/// All members are written and read by deploy(), shutdown(), end() and run_shadow(), under life_mutex_.
 class Deployer final : public Host {
  public:
   /// How long a state may go on after a stop of all, before its component is given up.
@@ -48,6 +49,7 @@ class Deployer final : public Host {
 
   void attach(Task& task) override;
   bool detach(Task& task) noexcept override;
+  void run_shadow(const std::shared_ptr<Shadow>& shadow) override;
   /// What watches the components' executions while it is deployed; nullptr otherwise. [setup]
   const Watchdog* watchdog() const noexcept { return watchdog_.get(); }
 
@@ -63,6 +65,7 @@ class Deployer final : public Host {
   bool has_ended_{false};
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
+  ShadowThread shadow_thread_;
 };
 
 }  // namespace mauve

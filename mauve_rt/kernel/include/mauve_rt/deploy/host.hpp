@@ -68,6 +68,9 @@ class Host : public Runner {
   bool revert_probation(const std::string& component, const std::string& reason,
                         time_ns_t timeout_ns = s_to_ns(1));
 
+  /// Of each component the shadow that runs, or the last one that has ended. [non-rt]
+  std::vector<ShadowRecord> shadows() const;
+
   /// The instant that all grids are counted from; 0 before deployment.
   time_ns_t epoch_ns() const noexcept { return architecture_.deployment_epoch_ns(); }
   /// Now, as the components see it.

@@ -68,6 +68,8 @@ class SimulatedHost final : public Host {
 
   void attach(Task& task) override;
   bool detach(Task& task) noexcept override;
+  /// The simulated task itself executes it after each release.
+  void run_shadow(const std::shared_ptr<Shadow>& /*shadow*/) override {}
 
  private:
   friend class Simulation;

@@ -14,6 +14,7 @@
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/probation.hpp"
+#include "mauve_rt/run/shadow.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -87,6 +88,8 @@ class PartsChange final : public CommitAction {
   /// Gives the probation away; nullptr: there is none. [non-rt]
   std::shared_ptr<Probation> release_probation() noexcept { return std::move(probation_); }
   bool has_probation() const noexcept { return probation_ != nullptr; }
+  /// The new core is the candidate of the component's shadow, and keeps the state that it has. [setup]
+  void promote() noexcept { afresh_ = promotes_ = true; }
   /// After take, of a core, or of an fsm and a core: exchanges the parts once more. No code of theirs runs. A running component
   /// goes on in the wait of the same name; before its first release, and after a fault, the caller starts it anew
   /// (Task::keep_place()). [rt]
@@ -130,6 +133,7 @@ class PartsChange final : public CommitAction {
   bool fallen_back_{false};               // whether the component runs its fallback core, with that core
   std::shared_ptr<Probation> probation_{};
   bool afresh_{false};
+  bool promotes_{false};
   bool unready_{false};
   bool is_fallback_{false};
   bool taken_{false};
@@ -187,7 +191,7 @@ struct ShownParts {
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
-/// | probation_ ...   | changes, who settles; the component claimed | any ordinary thread | shown_mutex_   |
+/// | probation_ ... shadow_ | changes, who settles; the component claimed | any ordinary thread | shown_mutex_   |
 /// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
  public:
@@ -325,6 +329,17 @@ class Component final : public Configurable {
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 
+  // ---- a candidate core in its shadow (shadow.hpp)
+
+  /// The shadow that runs, or the last one that has ended; nullptr: there was none. [non-rt]
+  std::shared_ptr<Shadow> last_shadow() const;
+  /// Has a shadow that has begun. [non-rt], by the change.
+  void keep_shadow(std::shared_ptr<Shadow> shadow);
+  /// Ends the shadow that runs: the component is cleaned up, removed or shut down. [non-rt]
+  void conclude_shadow() noexcept;
+  /// Takes a shadow that has ended off the ports, and cleans it up. [non-rt], the component claimed.
+  void settle_shadow() noexcept;
+
   /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
   /// `out`: the core that was replaced, which may be the fallback itself.
   void renew_fallback(std::unique_ptr<CoreBase> out);
@@ -392,6 +407,7 @@ class Component final : public Configurable {
   std::vector<DescribedState> shown_states_;
   std::shared_ptr<Probation> probation_;
   std::optional<ProbationRecord> last_probation_;
+  std::shared_ptr<Shadow> shadow_;
 };
 
 /// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]

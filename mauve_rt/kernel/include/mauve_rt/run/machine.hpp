@@ -2,6 +2,7 @@
 // Machine: steps one component's fsm from wait to wait, on its grid. It has no thread and waits for nobody.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <exception>
@@ -108,6 +109,12 @@ class Machine {
   /// Waits for the initial state from now on. That is due at the instant; where it is no wait, not sooner after the last
   /// release than the fsm's waits for events allow. [rt]
   void start(time_ns_t instant_ns) MAUVE_RT;
+  /// Waits in this wait of its fsm from now on, which ends at the instant: the place of another machine of the same fsm. [rt]
+  void start_in(const State& wait, time_ns_t instant_ns) MAUVE_RT;
+  /// The end of the wait under way is no sooner than this; the instants in between are left out. [rt]
+  void skip_to(time_ns_t instant_ns) MAUVE_RT { set_clock_ns(std::max(clock_ns(), instant_ns)); }
+  /// The wait under way; nullptr: parked, or started and not released yet. [rt]
+  const State* present_wait() const MAUVE_RT { return next_ == nullptr ? waiting_ : nullptr; }
   /// Gives up its place. [rt]
   void park() MAUVE_RT;
   /// Whether it was started and not parked since. [rt]

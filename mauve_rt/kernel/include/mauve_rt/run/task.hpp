@@ -27,6 +27,8 @@
 namespace mauve {
 
 class Probation;
+class Shadow;
+enum class ShadowCause : std::uint8_t;
 
 /// Numbered as mauve_msgs/msg/ComponentInfo, whose 3 is no longer used.
 enum class ComponentState : std::uint32_t { unconfigured = 0, stopped, running, stopping = 4, faulted };
@@ -88,6 +90,7 @@ struct ChangeSignal {
 /// |                        |                                       | times out    |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
 /// | probation_             | machine, in a take; who settles it    | machine alone| its own: base/revocable_reference.hpp |
+/// | shadow_                | machine, in a take; who settles it    | machine alone| its own: base/revocable_reference.hpp |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
 /// | facts_                 | creator of the thread                 | anyone after | has_thread_                        |
 /// | machine_               | machine                               | machine      | its own: machine.hpp               |
@@ -146,6 +149,17 @@ class Task final : public Waiter {
   void put_back_parked(Probation& probation) noexcept;
   /// Whether the calling thread runs one of its own states. [non-rt]
   bool is_called_from_own_state() const noexcept;
+
+  // ---- a shadow of the component (shadow.hpp)
+
+  /// The releases from now on are captured for the shadow. [rt], in a take.
+  void set_shadow(Shadow& shadow) MAUVE_RT;
+  /// The component's parts or wiring change, which ends its shadow. [rt], in a take.
+  void end_shadow(ShadowCause why) MAUVE_RT;
+  /// No thread uses the shadow any more afterwards; the component may have another by now. [non-rt], the component claimed.
+  void forget_shadow(const Shadow& shadow) noexcept {
+    if (shadow_.is(shadow)) shadow_.revoke(kForever);
+  }
 
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
@@ -386,6 +400,8 @@ class Task final : public Waiter {
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;
+  void start_shadow() noexcept;
+  void capture_release() noexcept;
   void take_up_revert() noexcept;
   void put_back_in_wait(Probation& probation) noexcept;
   bool leaves_core_to_change() noexcept;
@@ -438,6 +454,7 @@ class Task final : public Waiter {
   std::atomic<CommitAction*> fallback_{nullptr};
   std::atomic<bool> fallen_back_{false};
   RevocableReference<Probation> probation_;
+  RevocableReference<Shadow> shadow_;
 
   // the machine's own
   QueuePlace queue_place_{};         // of a simulated one

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Candidates in the shadow of a component: what they cost, and how their outputs differ.
+#include "host.hpp"
+
+namespace mauve::bindings {
+
+void bind_shadow(py::module_& module) {
+  py::class_<NumberDifference>(module, "NumberDifference")
+      .def_readonly("path", &NumberDifference::path)
+      .def_readonly("count", &NumberDifference::count)
+      .def_readonly("maximum", &NumberDifference::maximum)
+      .def_readonly("rms", &NumberDifference::rms)
+      .def_readonly("nan", &NumberDifference::nan)
+      .def_readonly("live_nan", &NumberDifference::live_nan);
+  py::class_<OutputDifference>(module, "OutputDifference")
+      .def_readonly("port", &OutputDifference::port)
+      .def_readonly("type", &OutputDifference::type)
+      .def_readonly("both", &OutputDifference::both)
+      .def_readonly("live_only", &OutputDifference::live_only)
+      .def_readonly("shadow_only", &OutputDifference::shadow_only)
+      .def_readonly("is_truncated", &OutputDifference::is_truncated)
+      .def_readonly("numbers", &OutputDifference::numbers)
+      .def_readonly("lag", &OutputDifference::lag);
+  py::class_<ShadowRecord>(module, "ShadowRecord")
+      .def_readonly("component", &ShadowRecord::component)
+      .def_readonly("core", &ShadowRecord::core)
+      .def_readonly("live_core", &ShadowRecord::live_core)
+      .def_property_readonly("verdict",
+                             [](const ShadowRecord& self) { return std::string(to_string(self.verdict)); })
+      .def_readonly("reason", &ShadowRecord::reason)
+      .def_readonly("begin_ns", &ShadowRecord::begin_ns)
+      .def_readonly("end_ns", &ShadowRecord::end_ns)
+      .def_readonly("releases", &ShadowRecord::releases)
+      .def_readonly("compared", &ShadowRecord::compared)
+      .def_readonly("skipped_late", &ShadowRecord::skipped_late)
+      .def_readonly("skipped_budget", &ShadowRecord::skipped_budget)
+      .def_readonly("idle", &ShadowRecord::idle)
+      .def_readonly("over_budget", &ShadowRecord::over_budget)
+      .def_readonly("budget_ns", &ShadowRecord::budget_ns)
+      .def_readonly("largest_execution_ns", &ShadowRecord::largest_execution_ns)
+      .def_readonly("outputs", &ShadowRecord::outputs);
+}
+
+}  // namespace mauve::bindings

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Shadow: a candidate core that executes in parallel with a component's live core, on the same inputs, without effects.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/parts/core.hpp"
+#include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/parts/property.hpp"
+#include "mauve_rt/run/machine.hpp"
+#include "mauve_rt/run/output_comparison.hpp"
+#include "mauve_rt/run/shadow_capture.hpp"
+
+namespace mauve {
+
+class Component;
+struct ShadowSignal;
+
+struct ShadowOptions {
+  /// > 0: what the candidate may execute per release, on average. After a release that took n budgets, n - 1 releases are skipped.
+  /// On threads CPU time of the shadow's thread; in virtual time what the states declare (simulated_execution).
+  time_ns_t budget_ns{0};
+};
+
+/// Numbered for services: fields are added at the end.
+enum class ShadowVerdict : std::uint8_t {
+  running,
+  ended,     // by a request, a change of the component, or the host's shutdown
+  faulted,   // the candidate threw an exception
+  promoted,  // the candidate is the component's core now
+};
+/// "running", "ended", ... [rt]
+const char* to_string(ShadowVerdict verdict) MAUVE_RT;
+
+enum class ShadowCause : std::uint8_t {
+  none,
+  fault,
+  request,    // a step end_shadow
+  changed,    // the component's parts or wiring were changed
+  closed,     // the component was cleaned up or removed, or its host was shut down
+  promotion,  // a step promote
+  lost,       // a step promote was refused, and the candidate was cleaned up with it
+};
+
+/// One shadow as anyone may see it.
+struct ShadowRecord {
+  std::string component{};
+  std::string core{};       // the candidate
+  std::string live_core{};  // as the shadow began
+  ShadowVerdict verdict{ShadowVerdict::running};
+  std::string reason{};  // in words; empty while it runs
+  time_ns_t begin_ns{0};
+  time_ns_t end_ns{0};             // 0: it runs
+  std::int64_t releases{0};        // of the live core since the begin
+  std::int64_t compared{0};        // of them, those in which the candidate executed
+  std::int64_t skipped_late{0};    // the shadow's thread was late, and no slot was free
+  std::int64_t skipped_budget{0};  // to pay for releases over budget
+  std::int64_t idle{0};            // the candidate was in a longer wait, or between two places
+  std::int64_t over_budget{0};     // releases that took longer than the budget
+  time_ns_t budget_ns{0};
+  time_ns_t largest_execution_ns{0};        // of one release
+  std::vector<OutputDifference> outputs{};  // by write port
+};
+
+/// The parts of a candidate: a shell of the component's own class, the core, another instance of the component's fsm.
+struct ShadowParts {
+  std::unique_ptr<Shell> shell{};
+  std::unique_ptr<CoreBase> core{};
+  std::unique_ptr<FsmBase> fsm{};
+};
+
+/// A candidate next to the live core. The component's thread copies what the live core reads and writes (shadow_capture.hpp). The
+/// host's shadow thread (shadow_thread.hpp) then executes the candidate's fsm at the same nominal instant, on these inputs; what the
+/// candidate writes goes to cells, and is compared with what the live core wrote in that release. In virtual time the simulation
+/// does this right after the release, at the same instant, and no virtual time passes.
+///
+/// The candidate begins in the wait in which the live core is, and goes its own way from there; it begins anew in the initial state
+/// when the component is started. Of each captured release it executes one chain of states, where its own wait has ended by that
+/// instant; instants that were skipped are left out, as after an overrun. Events that it raises have no effect.
+///
+/// The shadow ends with a fault of the candidate, by a step end_shadow or promote, when the component's parts or wiring change, when
+/// the component is cleaned up or removed, and at the host's shutdown. A stop of the component pauses it. Properties that are set
+/// while it runs are set in the candidate's shell, too, soon after.
+///
+/// | member            | written by                                  | read by                | order                                |
+/// | ----------------- | ------------------------------------------- | ---------------------- | ------------------------------------ |
+/// | phase_            | who takes it; then who ends it first, by CAS | anyone                | acq_rel: hands over what it wrote before |
+/// | begin_ns_         | who takes it                                | anyone                 | phase_                               |
+/// | ended_ns_, cause_ | who ends it                                 | anyone                 | phase_                               |
+/// | capture_          | the component's thread, who executes        | both                   | its own: shadow_capture.hpp          |
+/// | parts_ ... debt_  | who executes, prepares, suspends, retires   | same                   | run_mutex_                           |
+/// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
+/// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
+/// | the rest          | [setup]                                     | anyone                 | -                                    |
+///
+/// The component's thread takes neither mutex, but in virtual time, where there is one thread.
+class Shadow {
+ public:
+  /// Throws Error: invalid_argument (budget), type_mismatch, out_of_range (ports). [non-rt]
+  Shadow(Component& component, ShadowParts parts, ShadowOptions options);
+  ~Shadow();
+  Shadow(const Shadow&) = delete;
+  Shadow& operator=(const Shadow&) = delete;
+
+  /// Connects, binds and configures the candidate's parts. [non-rt] Throws Error.
+  void prepare();
+  /// Whom the component's thread wakes; nullptr: the simulation executes it. [non-rt], before it begins.
+  void set_signal(std::shared_ptr<ShadowSignal> signal) noexcept { signal_ = std::move(signal); }
+
+  // ---- the component's thread, or who acts for a parked component
+
+  /// Captures from now on; the component is in this wait, or in none. [rt]
+  void begin(const State* wait, time_ns_t now_ns) MAUVE_RT;
+  /// The component starts in its initial state. [rt]
+  void start() MAUVE_RT { capture_.start(); }
+  /// A release has reached its next wait. [rt]
+  void end_release(time_ns_t instant_ns, const State* next_wait) MAUVE_RT;
+  /// Ends it; does nothing when it has ended before. [rt], any thread
+  void conclude(ShadowCause why, time_ns_t now_ns) MAUVE_RT;
+  /// Captures no more: the component's ports refer to it no longer. [rt], or an ordinary thread that has claimed the component
+  void detach() MAUVE_RT { capture_.detach(); }
+  bool has_ended() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kEnded; }
+
+  /// It has ended, and the component's ports still refer to it. [rt], any thread
+  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached(); }
+
+  // ---- who executes: the shadow's thread, or a simulation
+
+  /// Executes the oldest captured release; false: there is none, or it has ended. [non-rt]
+  bool run_pending() noexcept;
+  /// Cleans the candidate's parts up once it has ended, unless a state of it executes. May be called again. [non-rt]
+  void retire() noexcept;
+
+  // ---- changes
+
+  /// Takes the candidate's core out: it executes no more until resume(). [non-rt] Throws Error: timeout naming the state that still
+  /// executes; not_running: it has ended.
+  std::unique_ptr<CoreBase> suspend(time_ns_t timeout_ns);
+  /// Puts that core back in, after a refused change; nullptr, or one that was cleaned up, ends the shadow. [non-rt]
+  void resume(std::unique_ptr<CoreBase> core) noexcept;
+  /// Sets a property of the candidate's shell, before the candidate executes next, to a value that checked() returned. [non-rt]
+  void set_property(const std::string& name, const PropertyValue& value);
+  /// [non-rt]
+  ShadowRecord record() const;
+  const std::string& core_name() const noexcept { return core_; }
+
+ private:
+  enum Phase : std::uint32_t { kPrepared, kRunning, kEnding, kEnded };
+  /// Time that stands still while the candidate executes.
+  class StillClock;
+  struct Figures {
+    std::int64_t compared{0};
+    std::int64_t skipped_budget{0};
+    std::int64_t idle{0};
+    std::int64_t over_budget{0};
+    time_ns_t largest_execution_ns{0};
+  };
+
+  void connect_cells();
+  void bind();
+  void execute(const ShadowCapture::Release& release);
+  void take_properties();
+  void put_inputs();
+  bool advance_to(const ShadowCapture::Release& release);
+  void compare(const ShadowCapture::Release& release);
+  void count_execution(time_ns_t execution_ns);
+  void fault(const std::string& what, time_ns_t instant_ns);
+  void clean_up() noexcept;
+  std::string reason() const;
+
+  const std::string component_;
+  const std::string live_core_;
+  const std::string core_;
+  const ShadowOptions options_;
+  const TaskSettings settings_;
+  ShadowCapture capture_;
+  std::shared_ptr<ShadowSignal> signal_{};
+
+  std::atomic<std::uint32_t> phase_{kPrepared};
+  time_ns_t begin_ns_{0};
+  time_ns_t ended_ns_{0};
+  ShadowCause cause_{ShadowCause::none};
+
+  std::mutex run_mutex_;
+  std::vector<std::unique_ptr<PortCell>> cells_;  // by the port's place in the shell; outlive the parts
+  ShadowParts parts_;
+  std::unique_ptr<StillClock> clock_;
+  Machine machine_{settings_};
+  CoreBinding binding_{};
+  bool is_retired_{false};
+  std::int64_t debt_{0};  // releases to be skipped
+  bool is_anew_{false};   // as of a release that was skipped
+
+  mutable std::mutex figures_mutex_;
+  Figures figures_{};
+  std::string fault_{};
+  std::vector<std::pair<std::string, PropertyValue>> properties_{};    // to be set
+  std::vector<std::pair<std::size_t, OutputComparison>> comparisons_;  // by the port's place in the shell
+};
+
+}  // namespace mauve

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// ShadowThread: one ordinary thread, below all components, that executes the shadows of a host.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+
+#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/threads.hpp"
+
+namespace mauve {
+
+class Shadow;
+
+/// Wakes the shadow thread. The sleeper's flag saves the component's thread a system call while the shadow thread is awake.
+///
+/// | member       | written by         | read by         | order                                                          |
+/// | ------------ | ------------------ | --------------- | -------------------------------------------------------------- |
+/// | word (futex) | who has news       | the sleeper     | seq_cst with is_asleep: one of the two sees the other's        |
+/// | is_asleep    | the sleeper        | who has news    | seq_cst: as above                                              |
+struct ShadowSignal {
+  std::atomic<std::uint32_t> word{0};
+  std::atomic<bool> is_asleep{false};
+
+  /// [rt]
+  void bump() MAUVE_RT {
+    word.fetch_add(1, std::memory_order_seq_cst);
+    if (is_asleep.load(std::memory_order_seq_cst)) futex_wake_all(word);
+  }
+};
+
+/// The thread is SCHED_OTHER at nice 19. It is not SCHED_IDLE: such a thread gets nearly no time on a busy machine, and may hold a
+/// shadow's mutex meanwhile. All functions [non-rt], one thread at a time.
+class ShadowThread {
+ public:
+  ShadowThread();
+  ~ShadowThread();
+  ShadowThread(const ShadowThread&) = delete;
+  ShadowThread& operator=(const ShadowThread&) = delete;
+
+  /// Executes the shadow's releases until it has ended; creates the thread for the first one. Throws Error (internal): no thread.
+  void add(const std::shared_ptr<Shadow>& shadow);
+  /// Ends the thread, after its shadows have ended. A candidate whose state does not end by the instant keeps the thread, which then
+  /// ends with the state.
+  void end(time_ns_t until_ns) noexcept;
+
+ private:
+  struct Work;
+
+  static void* run(void* work) noexcept;
+
+  std::shared_ptr<Work> work_;
+  Thread thread_;
+  bool has_thread_{false};
+};
+
+}  // namespace mauve

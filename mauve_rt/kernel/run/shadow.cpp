@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A shadow's life; how it executes its candidate is in shadow_execution.cpp.
+#include "mauve_rt/run/shadow.hpp"
+
+#include <chrono>
+#include <thread>
+#include <typeinfo>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/run/component.hpp"
+#include "mauve_rt/run/shadow_thread.hpp"
+
+#include "run/still_clock.hpp"
+
+namespace mauve {
+
+namespace {
+
+/// How often a requester looks whether the candidate's state has ended.
+constexpr std::chrono::microseconds kShadowLook{500};
+
+std::string name_of(const CoreBase& core) {
+  return core.implementation().empty() ? "(an object)" : core.implementation();
+}
+
+void require_same_class(Component& component, const Shell& shell) {
+  const Shell& live = component.shell();
+  const auto same_port = [](const auto& one, const auto& other) {
+    return one->name() == other->name() && one->kind() == other->kind() && one->type() == other->type();
+  };
+  const bool is_same = typeid(live) == typeid(shell) && live.bytes() == shell.bytes() &&
+                       std::equal(live.ports().begin(), live.ports().end(), shell.ports().begin(),
+                                  shell.ports().end(), same_port);
+  if (is_same) return;
+  throw Error(ErrorCode::type_mismatch, "the shadow's shell is of another class than the component's",
+              {.component = component.name(),
+               .element = shell.description(),
+               .expected = "another instance of " + live.description(),
+               .remedy = "give the step a shell of the component's own class"});
+}
+
+}  // namespace
+
+const char* to_string(ShadowVerdict verdict) noexcept {
+  switch (verdict) {
+    case ShadowVerdict::running:
+      return "running";
+    case ShadowVerdict::ended:
+      return "ended";
+    case ShadowVerdict::faulted:
+      return "faulted";
+    case ShadowVerdict::promoted:
+      return "promoted";
+  }
+  return "ended";
+}
+
+Shadow::Shadow(Component& component, ShadowParts parts, ShadowOptions options)
+    : component_(component.name()),
+      live_core_(component.core_implementation()),
+      core_(name_of(*parts.core)),
+      options_(options),
+      settings_(component.task().settings()),
+      capture_(component.shell(), component.name()),
+      parts_(std::move(parts)),
+      clock_(std::make_unique<StillClock>()) {
+  if (options_.budget_ns <= 0) {
+    throw Error(ErrorCode::invalid_argument, "a shadow needs a budget",
+                {.component = component_,
+                 .element = "budget_ns",
+                 .expected = "more than 0 ns per release",
+                 .found = std::to_string(options_.budget_ns)});
+  }
+  require_same_class(component, *parts_.shell);
+  for (const ShownProperty& shown : component.shown().properties) {
+    PropertyBase* own = parts_.shell->find_property(shown.name);
+    PropertyValue value = own->checked(shown.value);
+    own->swap(value);
+  }
+  const auto& ports = component.shell().ports();
+  for (std::size_t place = 0; place < ports.size(); ++place) {
+    if (ports[place]->kind() == PortKind::write)
+      comparisons_.emplace_back(place, OutputComparison(*ports[place]));
+  }
+}
+
+Shadow::~Shadow() {
+  capture_.detach();
+  clean_up();
+}
+
+void Shadow::prepare() {
+  try {
+    connect_cells();
+    bind();
+  } catch (const Error& error) {
+    ErrorDetail detail = error.detail();
+    if (detail.component.empty()) detail.component = component_;
+    if (detail.element.empty()) detail.element = "shadow " + core_;
+    throw Error(ErrorCode::prepare_failed, error.statement(), detail);
+  }
+}
+
+/// Each port leads to a cell of its own; events lead nowhere.
+void Shadow::connect_cells() {
+  parts_.shell->set_context(&machine_.context());
+  for (const auto& port : parts_.shell->ports()) {
+    cells_.push_back(port->kind() == PortKind::event ? nullptr : port->make_cell());
+    if (cells_.back() != nullptr) port->connect(cells_.back()->service(), "shadow");
+  }
+}
+
+void Shadow::bind() {
+  CoreBase& core = *parts_.core;
+  FsmBase& fsm = *parts_.fsm;
+  if (!fsm.bind_shell(*parts_.shell)) {
+    throw Error(ErrorCode::type_mismatch, "the fsm was written for another shell",
+                {.element = fsm.description(), .expected = "an fsm for " + parts_.shell->description()});
+  }
+  fsm.declare_states(settings_.states);
+  parts_.shell->configure();
+  fsm.configure();
+  if (fsm.is_sporadic()) {
+    throw Error(ErrorCode::bad_fsm, "a component that waits for events has no shadow",
+                {.element = fsm.description(),
+                 .expected = "an fsm without event waits",
+                 .remedy = "try the core on probation instead"});
+  }
+  if (!core.bind_shell(*parts_.shell)) {
+    throw Error(ErrorCode::type_mismatch, "the core was written for another shell",
+                {.element = core.description(), .expected = "a core for " + parts_.shell->description()});
+  }
+  core.set_context(&machine_.context());
+  binding_ = fsm.bind_core(core);
+  binding_.core = &core;
+  if (!binding_.is_bound()) {
+    throw Error(ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
+                {.element = core.description(), .expected = "a core for " + fsm.description()});
+  }
+  core.configure();
+  machine_.set_clock(*clock_);
+  machine_.set_parts(fsm, &binding_, settings_.period_ns != 0 ? settings_.period_ns : fsm.period_ns());
+}
+
+// ---- the component's thread, or who acts for a parked component
+
+void Shadow::begin(const State* wait, time_ns_t now_ns) noexcept {
+  begin_ns_ = now_ns;
+  std::uint32_t expected = kPrepared;
+  // release: who finds it running finds its begin
+  if (!phase_.compare_exchange_strong(expected, kRunning, std::memory_order_acq_rel)) return;
+  capture_.attach(wait != nullptr ? static_cast<std::int64_t>(wait->index) : ShadowCapture::kStart);
+}
+
+void Shadow::end_release(time_ns_t instant_ns, const State* next_wait) noexcept {
+  if (phase_.load(std::memory_order_acquire) != kRunning) return;
+  const std::int64_t from =
+      next_wait != nullptr ? static_cast<std::int64_t>(next_wait->index) : ShadowCapture::kStart;
+  if (!capture_.end_release(instant_ns, from)) return;
+  if (signal_ != nullptr) return signal_->bump();
+  MAUVE_RT_TRUSTED(run_pending());  // in virtual time, where nothing is real-time
+}
+
+void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
+  std::uint32_t seen = phase_.load(std::memory_order_acquire);
+  do {
+    if (seen >= kEnding) return;
+    // acq_rel: one of all that would end it does
+  } while (!phase_.compare_exchange_weak(seen, kEnding, std::memory_order_acq_rel));
+  cause_ = why;
+  ended_ns_ = now_ns;
+  phase_.store(kEnded, std::memory_order_release);
+  if (signal_ != nullptr) signal_->bump();  // its thread retires it
+}
+
+// ---- changes
+
+std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
+  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
+  std::unique_lock run(run_mutex_, std::defer_lock);
+  while (!run.try_lock()) {
+    if (monotonic_now_ns() >= until) {
+      throw Error(
+          ErrorCode::timeout, "the candidate still executes",
+          {.component = component_,
+           .element = "state " + TraceNames::word(machine_.state_name()),
+           .expected = "the end of the state within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
+           .remedy = "try again, or end the shadow"});
+    }
+    std::this_thread::sleep_for(kShadowLook);
+  }
+  if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr)
+    return std::move(parts_.core);
+  throw Error(ErrorCode::not_running, "the shadow has ended",
+              {.component = component_,
+               .element = "shadow " + core_,
+               .found = record().reason,
+               .remedy = "give the component a new shadow, or replace its core"});
+}
+
+void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
+  if (core == nullptr || !core->is_configured() || !core->bind_shell(*parts_.shell)) {
+    const bool is_virtual = signal_ == nullptr;
+    return conclude(ShadowCause::lost, is_virtual ? clock_->now_ns() : monotonic_now_ns());
+  }
+  core->set_context(&machine_.context());
+  {
+    const std::lock_guard run(run_mutex_);  // it executes nothing without its core
+    if (is_retired_) return core->cleanup();
+    parts_.core = std::move(core);
+  }
+  if (signal_ != nullptr) signal_->bump();
+}
+
+void Shadow::set_property(const std::string& name, const PropertyValue& value) {
+  const std::lock_guard lock(figures_mutex_);
+  properties_.emplace_back(name, value);
+}
+
+ShadowRecord Shadow::record() const {
+  const std::uint32_t phase = phase_.load(std::memory_order_acquire);
+  ShadowRecord record{.component = component_,
+                      .core = core_,
+                      .live_core = live_core_,
+                      .begin_ns = begin_ns_,
+                      .releases = static_cast<std::int64_t>(capture_.captured()),
+                      .skipped_late = static_cast<std::int64_t>(capture_.skipped()),
+                      .budget_ns = options_.budget_ns};
+  const std::lock_guard lock(figures_mutex_);
+  if (phase == kEnded) {
+    record.verdict = cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
+                     : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
+                                                        : ShadowVerdict::ended;
+    record.end_ns = ended_ns_;
+    record.reason = reason();
+  }
+  record.compared = figures_.compared;
+  record.skipped_budget = figures_.skipped_budget;
+  record.idle = figures_.idle;
+  record.over_budget = figures_.over_budget;
+  record.largest_execution_ns = figures_.largest_execution_ns;
+  for (const auto& [place, comparison] : comparisons_) record.outputs.push_back(comparison.difference());
+  return record;
+}
+
+/// figures_mutex_ held.
+std::string Shadow::reason() const {
+  switch (cause_) {
+    case ShadowCause::none:
+      return {};
+    case ShadowCause::fault:
+      return fault_;
+    case ShadowCause::request:
+      return "a step end_shadow";
+    case ShadowCause::changed:
+      return "the component's parts or wiring were changed";
+    case ShadowCause::closed:
+      return "the component was cleaned up or removed, or its host was shut down";
+    case ShadowCause::promotion:
+      return "the candidate is the component's core now";
+    case ShadowCause::lost:
+      return "a step promote was refused, and the candidate was cleaned up";
+  }
+  return {};
+}
+
+void Shadow::retire() noexcept {
+  const std::unique_lock run(run_mutex_, std::try_to_lock);  // else its own thread retires it
+  if (run.owns_lock() && has_ended()) clean_up();
+}
+
+/// run_mutex_ held, or nobody else there. A core that was suspended is another's.
+void Shadow::clean_up() noexcept {
+  if (is_retired_) return;
+  is_retired_ = true;
+  if (parts_.core != nullptr) parts_.core->cleanup();
+  parts_.fsm->cleanup();
+  for (const auto& port : parts_.shell->ports()) port->disconnect();
+  parts_.shell->cleanup();
+}
+
+}  // namespace mauve

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// How a shadow executes its candidate: on the shadow's thread, or in a simulation.
+#include <ctime>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/run/shadow.hpp"
+
+#include "run/still_clock.hpp"
+
+namespace mauve {
+
+namespace {
+
+time_ns_t thread_cpu_ns() noexcept {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return s_to_ns(time.tv_sec) + time.tv_nsec;
+}
+
+/// What the candidate marks in the trace goes nowhere: in a simulation the ring at hand is the component's.
+class WithoutRing {
+ public:
+  WithoutRing() noexcept { TraceRing::set_for_this_thread(nullptr); }
+  ~WithoutRing() { TraceRing::set_for_this_thread(before_); }
+  WithoutRing(const WithoutRing&) = delete;
+  WithoutRing& operator=(const WithoutRing&) = delete;
+
+ private:
+  TraceRing* before_{detail::this_threads_ring};
+};
+
+}  // namespace
+
+bool Shadow::run_pending() noexcept {
+  const std::lock_guard run(run_mutex_);
+  const ShadowCapture::Release* const release = capture_.front();
+  if (phase_.load(std::memory_order_acquire) != kRunning || release == nullptr || parts_.core == nullptr)
+    return false;
+  const time_ns_t instant_ns = release->instant_ns;
+  const auto held_before = PiMutex::held_by_this_thread();
+  try {
+    execute(*release);
+  } catch (const std::exception& failure) {
+    PiMutex::let_go_of_all_but(held_before);
+    fault(failure.what(), instant_ns);
+  } catch (...) {
+    PiMutex::let_go_of_all_but(held_before);
+    fault("an exception that is no std::exception", instant_ns);
+  }
+  capture_.pop();
+  return true;
+}
+
+void Shadow::execute(const ShadowCapture::Release& release) {
+  is_anew_ = is_anew_ || release.is_anew;
+  if (debt_ > 0) {
+    --debt_;
+    const std::lock_guard lock(figures_mutex_);
+    ++figures_.skipped_budget;
+    return;
+  }
+  take_properties();
+  put_inputs();
+  clock_->set_now(release.instant_ns);
+  const WithoutRing none;
+  const time_ns_t began_ns = thread_cpu_ns();
+  const bool has_executed = advance_to(release);
+  const bool is_virtual = signal_ == nullptr;
+  const time_ns_t execution_ns = is_virtual ? clock_->spent_ns() : thread_cpu_ns() - began_ns;
+  const std::lock_guard lock(figures_mutex_);
+  ++(has_executed ? figures_.compared : figures_.idle);
+  if (has_executed) count_execution(execution_ns);
+  compare(release);
+}
+
+void Shadow::take_properties() {
+  const std::lock_guard lock(figures_mutex_);
+  for (auto& [name, value] : properties_) {
+    if (PropertyBase* property = parts_.shell->find_property(name)) property->swap(value);
+  }
+  properties_.clear();
+}
+
+void Shadow::put_inputs() {
+  const auto& ports = parts_.shell->ports();
+  for (std::size_t place = 0; place < ports.size(); ++place) {
+    if (ports[place]->kind() != PortKind::read) continue;
+    const ShadowCapture::PortNote& note = capture_.note(place);
+    cells_[place]->put(capture_.value(place), note.status, note.time_ns);
+  }
+}
+
+/// Whether the candidate's wait has ended by then, and it has executed up to its next one.
+bool Shadow::advance_to(const ShadowCapture::Release& release) {
+  if (is_anew_) {
+    is_anew_ = false;
+    if (release.from == ShadowCapture::kStart) {
+      machine_.start(release.instant_ns);
+    } else {
+      machine_.start_in(*parts_.fsm->states()[static_cast<std::size_t>(release.from)], release.instant_ns);
+    }
+  }
+  if (machine_.due_ns() > release.instant_ns) return false;
+  machine_.skip_to(release.instant_ns);
+  machine_.release(release.instant_ns);
+  machine_.leave_wait();
+  while (machine_.enter_next() == Machine::Entered::execution) {
+  }
+  return true;
+}
+
+/// figures_mutex_ held.
+void Shadow::compare(const ShadowCapture::Release& release) {
+  for (auto& [place, comparison] : comparisons_) {
+    const void* const live = capture_.note(place).is_noted ? capture_.value(place) : nullptr;
+    comparison.add(release.number, live, cells_[place]->take_written());
+  }
+}
+
+/// figures_mutex_ held.
+void Shadow::count_execution(time_ns_t execution_ns) {
+  figures_.largest_execution_ns = std::max(figures_.largest_execution_ns, execution_ns);
+  if (execution_ns <= options_.budget_ns) return;
+  ++figures_.over_budget;
+  debt_ = (execution_ns - 1) / options_.budget_ns;
+}
+
+void Shadow::fault(const std::string& what, time_ns_t instant_ns) {
+  {
+    const std::lock_guard lock(figures_mutex_);
+    fault_ = what + " in state " + TraceNames::word(machine_.state_name());
+  }
+  conclude(ShadowCause::fault, signal_ == nullptr ? instant_ns : monotonic_now_ns());
+}
+
+}  // namespace mauve

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A task's part in the shadow of its component (shadow.hpp): it has each release captured.
+#include "mauve_rt/run/shadow.hpp"
+#include "mauve_rt/run/task.hpp"
+
+namespace mauve {
+
+void Task::set_shadow(Shadow& shadow) noexcept {
+  shadow.begin(machine_.present_wait(), clock().now_ns());
+  shadow_.set(shadow);
+}
+
+void Task::end_shadow(ShadowCause why) noexcept {
+  if (!shadow_.is_set()) return;
+  shadow_.use([&](Shadow& shadow) {
+    shadow.conclude(why, clock().now_ns());
+    shadow.detach();
+  });
+  shadow_.revoke(kForever);  // waits for no thread: who runs the machine is the only user
+}
+
+void Task::start_shadow() noexcept {
+  shadow_.use([](Shadow& shadow) { shadow.start(); });
+}
+
+/// A release has reached its next wait.
+void Task::capture_release() noexcept {
+  shadow_.use([this](Shadow& shadow) { shadow.end_release(machine_.entered_ns(), machine_.present_wait()); });
+}
+
+}  // namespace mauve
