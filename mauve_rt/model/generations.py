@@ -48,6 +48,7 @@ class Generation:
     outdated: tuple[Name, ...]  # of other libraries, compiled for a shell as it was
     kept: PluginGeneration
     stamps: Stamps
+    packages_before: Mapping[str, tuple[int, tuple[str, ...]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,11 +127,12 @@ class CodeGenerations:
                 self._packages = before
                 raise
             registry.end_generation()
-        return self._keep(candidate, kept)
+        return self._keep(candidate, kept, before)
 
     def undo(self, generation: Generation, registry: PluginRegistry) -> None:
         """Put the code of before in force again: a generation that was loaded last is forgotten."""
         registry.exchange(generation.kept)
+        self._packages = dict(generation.packages_before)
         self._history.remove(generation)
 
     def commit(self, generation: Generation) -> None:
@@ -153,6 +155,7 @@ class CodeGenerations:
 
     def went_back(self, generation: Generation) -> None:
         """The parts of before run again; a reload loads what the disk has."""
+        self._packages = dict(generation.packages_before)
         self._history.remove(generation)
         for name in generation.outdated:
             self.outdated.pop(name, None)
@@ -274,7 +277,12 @@ class CodeGenerations:
         for kind, name in candidate.outdated:
             registry.drop(kind, name)
 
-    def _keep(self, candidate: _Candidate, kept: PluginGeneration) -> Generation:
+    def _keep(
+        self,
+        candidate: _Candidate,
+        kept: PluginGeneration,
+        packages_before: Mapping[str, tuple[int, tuple[str, ...]]],
+    ) -> Generation:
         for source in candidate.sources:
             if source.is_python:
                 for file, stamp in Stamps(self.module_files(source.target)).files.items():
@@ -288,6 +296,7 @@ class CodeGenerations:
             outdated=candidate.outdated,
             kept=kept,
             stamps=candidate.stamps,
+            packages_before=packages_before,
         )
         self._history.append(generation)
         return generation

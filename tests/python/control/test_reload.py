@@ -17,6 +17,7 @@ from reload_world import World, make_world
 
 from mauve_rt.api import Core
 from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Step
+from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.parts.state_fields import StateCells
 
 
@@ -206,6 +207,18 @@ def test_a_module_comes_with_the_modules_that_it_uses(world: World, rebuilt: Reb
     assert "SyntaxError" in refused.message
     assert world.reload(back=True).success
     assert world.generation("python") == 1
+
+
+def test_a_refused_module_is_not_that_of_later_parts(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.write("reload_tests_step", "STEP = 5.0\n")
+    rebuilt.build("WITHOUT_PORT")
+    assert not world.reload().success
+    assert PluginLoader.generations.module_of("reload_tests_cores") is None
+    rebuilt.build("STEP=2.0")
+    assert world.reload().success
+    assert PluginLoader.generations.module_of("reload_tests_cores") is not None
+    assert world.reload(back=True).success
+    assert PluginLoader.generations.module_of("reload_tests_cores") is None
 
 
 def test_from_cpp_to_python_and_back_the_state_goes_along(world: World, rebuilt: RebuiltPackage) -> None:
