@@ -111,8 +111,11 @@ class Reload:
             what = f"the code before {what} is in force again"
         else:
             what += " is in force"
+        verb = "runs" if len(components) == 1 else "run"
         runs = (
-            f"{counted(len(components), 'component')} run it: {', '.join(components)}" if components else ""
+            f"{counted(len(components), 'component')} {verb} it: {', '.join(components)}"
+            if components
+            else ""
         )
         kept = [
             resource.name
