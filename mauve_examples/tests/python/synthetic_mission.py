@@ -221,6 +221,8 @@ class FakeRobot:
             remark="",
             instant_ns=parked_ns,
             release_ns=pending_ns,
+            taken=[],
+            left=[],
         )
         event = self.messages.cdr(
             "mauve_msgs/msg/ReconfigurationEvent",
