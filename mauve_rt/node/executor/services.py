@@ -139,8 +139,7 @@ class Services:
         outcome = self._control.handle(request)
         if not outcome.replayed:
             self._untold.events.append(self._state.take_down(request, outcome))
-            changes = any(STEP_KINDS[step.kind].changes_parameters for step in request.steps)
-            if outcome.success and (changes or request.reload is not None):
+            if outcome.success and _changes_parameters(request):
                 self._follow()
         return outcome
 
@@ -240,6 +239,12 @@ class Services:
             return response
 
         return handle
+
+
+def _changes_parameters(request: Request) -> bool:
+    """Whether a request that was carried out may have changed parameters of the node."""
+    kinds = (STEP_KINDS[step.kind] for step in request.steps)
+    return request.reload is not None or any(kind.changes_parameters for kind in kinds)
 
 
 class _Untold(threading.local):
