@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.cli.arguments import add_executor_and_json
-from mauve_rt.cli.verb import OK, REFUSED
+from mauve_rt.cli.verb import OK
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
@@ -61,19 +61,12 @@ def load_rules(args: argparse.Namespace) -> int:
     """Let the executor run a file's rules, all or none."""
     from mauve_msgs.srv import LoadRules  # noqa: PLC0415
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_json  # noqa: PLC0415
-    from mauve_rt.control.requests import code_name  # noqa: PLC0415
+    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
     path = str(Path(args.file).absolute()) if args.file else ""
     with connected(first=True) as client:
         reply = client.call(LoadRules, f"{args.executor}/load_rules", LoadRules.Request(path=path))
-    if args.json:
-        print_json(reply)
-    elif reply.success:
-        print(reply.message)
-    else:
-        print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
-    return OK if reply.success else REFUSED
+    return print_reply(reply, as_json=args.json)
 
 
 def _row(rule: Any) -> tuple[str, str, str, str, str]:

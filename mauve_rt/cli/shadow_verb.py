@@ -6,7 +6,7 @@ from typing import Any
 
 from mauve_rt.cli.arguments import add_executor
 from mauve_rt.cli.completion import complete_components, complete_cores, completed_by
-from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED
+from mauve_rt.cli.verb import BAD_USAGE, OK
 
 _DEFAULT_BUDGET_US = 100.0
 _VERDICTS = {0: "running", 1: "ended", 2: "faulted", 3: "promoted"}
@@ -49,21 +49,14 @@ def _change(args: argparse.Namespace, kind: str) -> int:
     from mauve_msgs.msg import ReconfigurationStep  # noqa: PLC0415 - ROS takes its time to load
     from mauve_msgs.srv import Reconfigure  # noqa: PLC0415
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_json  # noqa: PLC0415
-    from mauve_rt.control.requests import code_name  # noqa: PLC0415
+    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
     value = f"{{budget_us: {args.budget_us!r}}}" if kind == "shadow" else ""
     step = ReconfigurationStep(kind=kind, target=args.component, name=args.core, value=value)
     request = Reconfigure.Request(steps=[step], requested_by="mauve")
     with connected(first=True) as client:
         reply = client.call(Reconfigure, f"{args.executor}/reconfigure", request)
-    if args.json:
-        print_json(reply)
-    elif reply.success:
-        print(reply.message)
-    else:
-        print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
-    return OK if reply.success else REFUSED
+    return print_reply(reply, as_json=args.json)
 
 
 def _show(args: argparse.Namespace) -> int:

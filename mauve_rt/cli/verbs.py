@@ -25,7 +25,7 @@ from mauve_rt.cli.completion import (
     complete_values,
     completed_by,
 )
-from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
+from mauve_rt.cli.verb import BAD_USAGE, OK, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
 _LOOK_S = 0.02  # between two looks at what a change cost
@@ -281,8 +281,7 @@ def _set(args: argparse.Namespace) -> int:
 
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import is_incomplete, print_json, report_lines  # noqa: PLC0415
-    from mauve_rt.control.requests import code_name  # noqa: PLC0415
+    from mauve_rt.cli.views import is_incomplete, print_reply, report_lines  # noqa: PLC0415
 
     request = service_type.Request(
         request_id=args.request_id,
@@ -298,13 +297,8 @@ def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: A
         while is_incomplete(reply) and time.monotonic() < until_s:
             time.sleep(_LOOK_S)
             reply = client.call(service_type, f"{args.executor}/{name}", request)
-    if args.json:
-        print_json(reply)
-    elif reply.success:
-        print("\n  ".join([reply.message, *getattr(reply, "loaded", ()), *report_lines(reply.report)]))
-    else:
-        print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
-    return OK if reply.success else REFUSED
+    lines = [*getattr(reply, "loaded", ()), *report_lines(reply.report)]
+    return print_reply(reply, as_json=args.json, lines=lines)
 
 
 def _nodes(args: argparse.Namespace) -> int:

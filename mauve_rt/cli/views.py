@@ -6,6 +6,8 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.cli.verb import OK, REFUSED
+
 if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text have no use for it
     from rich.console import Console
 
@@ -41,6 +43,19 @@ def console() -> "Console":
             raise BrokenPipeError
 
     return OurConsole(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
+
+
+def print_reply(reply: Any, *, as_json: bool, lines: Sequence[str] = ()) -> int:
+    """What came of a request, with `lines` below its message; the exit status."""
+    if as_json:
+        print_json(reply)
+    elif reply.success:
+        print("\n  ".join([reply.message, *lines]))
+    else:
+        from mauve_rt.control.requests import code_name  # noqa: PLC0415 - it loads messages
+
+        print(f"refused, {code_name(reply.code)} ({reply.code}): {reply.message}", file=sys.stderr)
+    return OK if reply.success else REFUSED
 
 
 def is_incomplete(reply: Any) -> bool:

@@ -10,7 +10,7 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.counts import counted
 from mauve_rt.model import PluginLoader
 from mauve_rt.model.code_layouts import shell_layout
-from mauve_rt.model.generations import Generation, Name, Source
+from mauve_rt.model.generations import Generation, Name, Source, names_of
 from mauve_rt.model.probation import Probation, read_probation
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.steps import Step
@@ -48,7 +48,7 @@ class Reload:
             sources = [source for source in chosen if source.target in rebuilt]
             if not sources:
                 return "no code was rebuilt since it was loaded; nothing has changed"
-            names = frozenset().union(*(source.names for source in sources))
+            names = names_of(sources)
             self._check_protected(names)
             self._note_defaults(loader, names)
             self.generation = loader.reload(sources, in_use=self._in_use(), dry_run=dry_run)
@@ -157,7 +157,7 @@ class Reload:
                 self._shells[name] = shell_layout(shell)
 
     def _new_defaults(self, part: ComponentDescription) -> dict[str, PropertyValue]:
-        """Properties that nobody has set, and that have another default in the new shell."""
+        """Properties that were never set, and that have another default in the new shell."""
         before = self._defaults.get(part.shell, {})
         present = {item.name: item.value for item in part.properties}
         declared = self.runtime.declared(part.name)
@@ -196,15 +196,13 @@ class Reload:
         if not self.order.targets:
             return sources
         known = {part.name: part for part in self.parts}
-        packages = {name.partition("/")[0] for source in sources for _, name in source.names}
+        packages = {name.partition("/")[0] for _, name in names_of(sources)}
         wanted: set[Name] = set()
         for target in self.order.targets:
             if target in known:
                 wanted |= {*self._names_of(known[target])}
             elif target in packages:
-                wanted |= {
-                    name for source in sources for name in source.names if name[1].startswith(f"{target}/")
-                }
+                wanted |= {name for name in names_of(sources) if name[1].startswith(f"{target}/")}
             else:
                 text = f"{shown(target)} is no component, and no package with code that is loaded"
                 raise RefusalError(

@@ -74,7 +74,7 @@ def component_info(
         generation=code[0],
         built_ns=code[1],
         probations=[_probation(record) for record in probations],
-        shadows=[shadow_message(record) for record in shadows],
+        shadows=[_shadow(record) for record in shadows],
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
@@ -199,8 +199,7 @@ def _probation(record: ProbationRecord) -> Any:
     )
 
 
-def shadow_message(record: ShadowRecord) -> Any:
-    """Shadow of a record."""
+def _shadow(record: ShadowRecord) -> Any:
     return Shadow(
         component=record.component,
         core=record.core,

@@ -6,7 +6,7 @@ loaded. Its parts are in force for the registry: whatever is made from then on i
 
 import itertools
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -35,6 +35,11 @@ class Source:
     target: str
     names: frozenset[Name]
     is_python: bool
+
+
+def names_of(sources: Iterable[Source]) -> frozenset[Name]:
+    """All that these sources register."""
+    return frozenset(name for source in sources for name in source.names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +74,7 @@ class CodeGenerations:
     def __init__(self, loaded: LoadedCode) -> None:
         self._loaded = loaded
         self._history: list[Generation] = []
-        self._gone_back: dict[str, Generation] = {}
+        self._gone_back: set[str] = set()  # sources whose newest build is loaded, and not in force
         self._copied: set[Path] = set()  # libraries of which the first one is no longer in force
         self._packages: dict[str, tuple[int, tuple[str, ...]]] = {}  # by top-level package
         self.outdated: dict[Name, str] = {}
@@ -108,7 +113,7 @@ class CodeGenerations:
         Returns None after a dry run.
 
         Raises:
-            PluginError: nothing has changed for this process then, but for code that nobody calls.
+            PluginError: nothing has changed for this process then, but for code that is never called.
         """
         import tempfile  # noqa: PLC0415 - needed by a reload only
 
@@ -138,8 +143,7 @@ class CodeGenerations:
     def commit(self, generation: Generation) -> None:
         """The generation's parts run: its files are the loaded ones now."""
         self._loaded.renew(generation.stamps)
-        for source in generation.sources:
-            self._gone_back.pop(source, None)
+        self._gone_back -= {*generation.sources}
         for name in generation.names:
             self.outdated.pop(name, None)
         text = "it was compiled for a shell that has other members by now"
@@ -159,7 +163,7 @@ class CodeGenerations:
         self._history.remove(generation)
         for name in generation.outdated:
             self.outdated.pop(name, None)
-        self._gone_back.update(dict.fromkeys(generation.sources, generation))
+        self._gone_back |= {*generation.sources}
 
     def module_of(self, module: str) -> ModuleType | None:
         """A module of a package that was loaded anew, in its newest generation; None: of no such package."""
@@ -229,8 +233,8 @@ class CodeGenerations:
         if stale:
             remedy = "wait for the end of the build, then reload again"
             raise PluginError(f"{stale[0]} was written while it was tried", remedy=remedy)
-        names = frozenset().union(*(source.names for source in sources))
-        _check_kept(answer, frozenset().union(*(source.names for source in libraries)), in_use)
+        names = names_of(sources)
+        _check_kept(answer, names_of(libraries), in_use)
         check_types(answer["types"], registry, names)
         outdated = [name for name in _outdated(answer, names, registry) if name not in in_python]
         _check_not_in_use(outdated, in_use)
@@ -271,7 +275,7 @@ class CodeGenerations:
                 self._packages[package] = (candidate.number, packages)
             loaded = load_module(module, generation=candidate.number, packages=packages)
             add_python_parts(module, loaded)
-        for kind, name in {name for source in candidate.sources for name in source.names}:
+        for kind, name in names_of(candidate.sources):
             if kind in PART_KINDS and registry.generation_of(kind, name) != candidate.number:
                 registry.drop(kind, name)
         for kind, name in candidate.outdated:
@@ -291,7 +295,7 @@ class CodeGenerations:
         generation = Generation(
             number=candidate.number,
             sources=tuple(source.target for source in candidate.sources),
-            names=frozenset().union(*(source.names for source in candidate.sources)),
+            names=names_of(candidate.sources),
             loaded=(*map(str, sorted(candidate.copied)), *candidate.modules),
             outdated=candidate.outdated,
             kept=kept,

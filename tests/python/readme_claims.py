@@ -839,7 +839,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "`adopt` and `take` see a core of another generation as one of no known C++ type.": (
         "Handover.ShowsACoreOfAnotherGenerationAsAStranger",
     ),
-    "A property that nobody has set takes the default of the new shell.": (
+    "A property that was never set takes the default of the new shell.": (
         f"{_RELOAD}_there_is_a_way_back_and_forward_again",
     ),
     "All other properties keep their values, and all ports their connections.": (

@@ -144,7 +144,7 @@ void Probation::begin(PartsChange& parts) noexcept {
   overruns_ = task.statistics().overruns.load(std::memory_order_relaxed);  // relaxed: this thread counts them
   begin_ns_ = task.clock().now_ns();
   end_ns_ = later_by(begin_ns_, options_.duration_ns);
-  phase_.store(kRunning, std::memory_order_release);  // release: whoever finds it running finds all this
+  phase_.store(kRunning, std::memory_order_release);  // release: who reads it finds all this
   for (const auto& limits : limits_) limits->port.watch(*limits);
   component_.task().set_probation(*this);
 }

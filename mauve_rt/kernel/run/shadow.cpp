@@ -269,7 +269,7 @@ void Shadow::retire() noexcept {
   if (run.owns_lock() && has_ended()) clean_up();
 }
 
-/// run_mutex_ held, or nobody else there. A core that was suspended is another's.
+/// run_mutex_ held, or no other thread there. A core that was suspended is another's.
 void Shadow::clean_up() noexcept {
   if (is_retired_) return;
   is_retired_ = true;
