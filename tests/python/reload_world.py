@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from rebuilt_package import RebuiltPackage
+
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.control.control import Control
 from mauve_rt.control.requests import Outcome, ReloadOrder, Request, Step
@@ -97,6 +99,15 @@ def make_world(kind: str, folder: Path, alternatives: str) -> Iterator[World]:
     yield world
     runtime.deactivate()
     runtime.cleanup()
+
+
+def make_world_of_bad_cores(kind: str, folder: Path, rebuilt: RebuiltPackage) -> Iterator[World]:
+    """As make_world(), of a package with cores that do one thing wrong each."""
+    rebuilt.build("NEW_CORE")
+    with rebuilt.index.open("a", encoding="utf-8") as file:
+        for name in ("Throws", "Nan", "Loud", "Louder"):
+            file.write(f"core; reload_tests/{name}; reload_tests/LoopShell; reload_tests\n")
+    yield from make_world(kind, folder, alternatives="installed")
 
 
 def _sleep(duration_ms: int) -> None:

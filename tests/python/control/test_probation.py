@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from rebuilt_package import RebuiltPackage
-from reload_world import World, make_world
+from reload_world import World, make_world_of_bad_cores
 
 from mauve_rt._kernel import ProbationRecord
 from mauve_rt.control.probations import ProbationWatch, Verdict
@@ -20,11 +20,7 @@ CORE = "reload_tests/{}"
 
 @pytest.fixture(params=["threads", "virtual time"])
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
-    rebuilt.build("NEW_CORE")
-    with rebuilt.index.open("a", encoding="utf-8") as file:
-        for name in ("Throws", "Nan", "Loud", "Louder"):
-            file.write(f"core; reload_tests/{name}; reload_tests/LoopShell; reload_tests\n")
-    yield from make_world(request.param, tmp_path, alternatives="installed")
+    yield from make_world_of_bad_cores(request.param, tmp_path, rebuilt)
 
 
 def _replace(world: World, core: str, probation: str) -> Outcome:
