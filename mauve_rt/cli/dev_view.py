@@ -20,8 +20,8 @@ _GREY = ("superseded", "stopped", "")
 def dev_view(name: str, *, is_there: bool, development: Development) -> RenderableType:
     """The whole screen."""
     cycles = development.cycles
-    there = "" if is_there else "  [bold red]does not answer[/]"
-    parts: list[RenderableType] = [Text.from_markup(f"[bold]{name}[/]{there}"), _state(development)]
+    there = "[green]answers[/]" if is_there else "[bold red]does not answer[/]"
+    parts: list[RenderableType] = [Text.from_markup(f"[bold]{name}[/]  {there}"), _state(development)]
     if cycles:
         parts.append(_cycles(cycles[-_MOST_CYCLES:]))
     stepped = next((each for each in reversed(cycles) if each.steps), None)

@@ -251,7 +251,7 @@ def test_keys_go_back_and_build_again(
 ) -> None:
     assert robot.process.poll() is None
     screen = terminal(*workspace.words, folder=workspace.folder, variables=workspace.variables)
-    screen.await_text(NODE, "watching", "q quit")
+    screen.await_text(f"{NODE}  answers", "watching", "q quit")
     workspace.save("thousand")
     text = screen.await_text("in force", "loop.sum:data", "step")
     assert max(len(line.strip()) for line in text.replace("\r", "").splitlines()) <= 80
