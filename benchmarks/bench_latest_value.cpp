@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Reading 16 bytes of a LatestValue through a port, beside a sequence lock: nobody else about, and while a
+// Reading and writing 16 bytes of a LatestValue through a port, next to a sequence lock: alone, and reading also while a
 // thread on another CPU writes to the one that is being read, as fast as it can or every so many nanoseconds.
 //   bench_latest_value [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--writer-cpu -1] [--pace-ns 0]
-// Prints {"alone_ps": [...], "seqlock_alone_ps": [...], "hammered_ps": [...], "seqlock_hammered_ps": [...],
+// Prints {"write_ps": [...], "seqlock_write_ps": [...], "alone_ps": [...], "seqlock_alone_ps": [...],
+// "hammered_ps": [...], "seqlock_hammered_ps": [...],
 // "reads": of either while it was hammered, "writes", "seqlock_writes": meanwhile, "failed": reads that found nothing,
-// "torn": reads that found halves of two values, "seqlock_retries"}; without a writer's CPU only the first two.
+// "torn": reads that found halves of two values, "seqlock_retries"}; without a writer's CPU only the first four.
 #include "mauve_rt/mauve_rt.hpp"
 
 #include "support/micro.hpp"
@@ -120,6 +121,14 @@ void read_seqlock(const Cells& cells, std::int64_t calls, Findings& found) {
   found.reads += calls;
 }
 
+void write_latest(Cells& cells, std::int64_t calls) {
+  for (std::int64_t i = 0; i < calls; ++i) cells.write_latest(i);
+}
+
+void write_seqlock(Cells& cells, std::int64_t calls) {
+  for (std::int64_t i = 0; i < calls; ++i) cells.seqlock.write({i, i});
+}
+
 void measure(const bench::Options& options) {
   const bench::Micro micro(options);
   const auto writer_cpu = static_cast<int>(options.number("writer-cpu", -1));
@@ -127,6 +136,8 @@ void measure(const bench::Options& options) {
   Findings ours;
   Findings theirs;
   bench::JsonLine line;
+  micro.compare(line, {{"write", [&](std::int64_t calls) { write_latest(cells, calls); }},
+                       {"seqlock_write", [&](std::int64_t calls) { write_seqlock(cells, calls); }}});
   micro.compare(line, {{"alone", [&](std::int64_t calls) { read_latest(cells, calls, ours); }},
                        {"seqlock_alone", [&](std::int64_t calls) { read_seqlock(cells, calls, theirs); }}});
   if (writer_cpu >= 0) {

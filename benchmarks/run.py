@@ -19,7 +19,14 @@ from command import command_rows
 from document import PAGE, around_figures, write_docs
 from echo import echo_rows, watch_rows
 from links import links_rows
-from micro import activation_rows, inversion_rows, latest_value_rows, shared_data_rows, trace_rows
+from micro import (
+    activation_rows,
+    inversion_rows,
+    latest_value_rows,
+    ring_buffer_rows,
+    shared_data_rows,
+    trace_rows,
+)
 from mission import mission_rows
 from native import BenchmarkError
 from reading import reading_rows
@@ -63,6 +70,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "refused": refused_rows,
     "rule-reaction": rule_rows,
     "shared-data": shared_data_rows,
+    "ring-buffer": ring_buffer_rows,
     "latest-value": latest_value_rows,
     "activation": activation_rows,
     "trace": trace_rows,

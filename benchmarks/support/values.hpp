@@ -20,9 +20,15 @@ struct Large {
   std::array<double, 512> items{};
 };
 
-static_assert(sizeof(Small) == 16 && sizeof(Large) == 4096);
+/// 1 MiB.
+struct Huge {
+  std::array<double, 131'072> items{};
+};
+
+static_assert(sizeof(Small) == 16 && sizeof(Large) == 4096 && sizeof(Huge) == 1'048'576);
 
 }  // namespace bench
 
 MAUVE_TYPE(bench::Small, "bench/Small", first, second)
 MAUVE_TYPE(bench::Large, "bench/Large", items)
+MAUVE_TYPE(bench::Huge, "bench/Huge", items)
