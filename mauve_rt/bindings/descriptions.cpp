@@ -51,7 +51,8 @@ ResourceDescription describe_resource(const Resource& resource) {
       resource.name(), resource.kind(), resource.type(), {}, resource.longest_hold_ns()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
-                                    service->is_call_serializable(), service->messages()});
+                                    service->is_call_serializable(), service->messages(),
+                                    service->is_wait_free()});
   }
   return description;
 }
@@ -189,7 +190,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("kind", &ServiceDescription::kind)
       .def_readonly("type", &ServiceDescription::type)
       .def_readonly("takes_messages", &ServiceDescription::takes_messages)
-      .def_readonly("messages", &ServiceDescription::messages);
+      .def_readonly("messages", &ServiceDescription::messages)
+      .def_readonly("is_wait_free", &ServiceDescription::is_wait_free);
   py::class_<ResourceDescription>(module, "ResourceDescription")
       .def_readonly("name", &ResourceDescription::name)
       .def_readonly("kind", &ResourceDescription::kind)

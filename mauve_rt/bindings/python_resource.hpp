@@ -35,7 +35,9 @@ class PythonCallPort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const PythonService*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override { service_ = static_cast<PythonService*>(service); }
+  void attach(ServiceBase* service, BiasedMutex::Seat* /*seat*/) noexcept override {
+    service_ = static_cast<PythonService*>(service);
+  }
   std::unique_ptr<PortBase> make_stand_in() const override {
     return std::make_unique<PythonCallPort>(name(), type());
   }

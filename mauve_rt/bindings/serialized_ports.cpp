@@ -22,7 +22,7 @@ class SerializedReadPort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const SerializedReadService*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override {
+  void attach(ServiceBase* service, BiasedMutex::Seat* /*seat*/) noexcept override {
     service_ = static_cast<SerializedReadService*>(service);  // fits() was asked
     seen_ = 0;
   }
@@ -64,7 +64,7 @@ class SerializedWritePort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const SerializedWriteService*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override {
+  void attach(ServiceBase* service, BiasedMutex::Seat* /*seat*/) noexcept override {
     service_ = static_cast<SerializedWriteService*>(service);
   }
   std::unique_ptr<PortBase> make_stand_in() const override {

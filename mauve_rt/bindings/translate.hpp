@@ -111,6 +111,7 @@ struct ServiceDescription {
   std::string type;
   bool takes_messages;
   std::vector<MessageShape> messages;
+  bool is_wait_free{false};  // of ports, as things are
 };
 struct ResourceDescription {
   std::string name;

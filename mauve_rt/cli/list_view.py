@@ -16,6 +16,7 @@ from mauve_rt.counts import counted
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
+_WAIT_FREE_KINDS = ("shared_data", "latest_value", "ring_buffer")  # the other kinds have a lock, or know best
 _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
 
 
@@ -112,10 +113,19 @@ def _connections(reply: Any) -> Table:
     """A line for each port; then the resources that none has but ROS."""
     table = _table("port", "connected to", "on ROS")
     on_ros = {resource.name: _ros_names(resource) for resource in reply.resources}
+    locked = {
+        f"{resource.name}.{name}"
+        for resource in reply.resources
+        if resource.kind in _WAIT_FREE_KINDS
+        for name in ("read", "write")
+        if name not in resource.wait_free
+    }
     connected = set()
     for component in reply.components:
         for port in component.ports:
             service = f"{port.resource}.{port.service}" if port.resource else "[yellow]nothing[/]"
+            if service in locked:
+                service += " [dim](lock)[/]"
             table.add_row(f"{component.name}.{port.name}", service, on_ros.get(port.resource, ""))
             connected.add(port.resource)
     for name, names in _lonely(on_ros, connected).items():

@@ -1159,20 +1159,54 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     "The clock is then set to the time of the event": ("Rule12Events.ReleaseAtTheEventsTimeOrAtTheTimeout",),
     "Such a component is *sporadic*: it has no period.": ("Rule12Events.AreNoPeriodNorPhase",),
     # ---- concepts: resources
-    "| `shared_data` | the newest value, under a priority-inheritance mutex |": (
-        "PriorityInheritance.TheHighestIsServedBeforeTheMiddle",
-        "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
+    (
+        "| `shared_data` | the newest value of any number of writers, for readers that neither block "
+        "nor fail |"
+    ): (
+        "LatestValueStress.ReadersSeeWholeValuesInOrder",
+        "SharedData.TakesReadersWhileItIsInUse",
     ),
     "| `ring_buffer` | a queue; each element goes to one reader |": (
         "RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",
     ),
     (
-        "| `latest_value` | the newest value of one writer, for any number of readers that "
-        "neither block nor fail |"
+        "| `latest_value` | the newest value of one writer, of a type without dynamic members; "
+        "`max_readers` is known from the start |"
     ): (
-        "LatestValueStress.ReadersSeeWholeValuesInOrder",
+        "LatestValue.TakesOneWriter",
+        "LatestValue.OfATypeThatCannotBeCopiedAsBytesIsRefused",
+        "LatestValue.TakesAsManyReadersAsDeclared",
         "LatestValue.AWriterNeverWaitsForReadersThatKeepOldValues",
         "bench: : reads that failed or found halves of two values",
+    ),
+    (
+        "**A port that is alone waits for nobody**: the only port that writes to one of these three kinds, "
+        "and the only port that reads a `ring_buffer` without `overwrite`."
+    ): (
+        "Ring.HasALockWithTwoPortsAtAnEnd",
+        "SharedData.ALockIsForWritersAmongThemselves",
+        "BiasedMutex.AThreadHoldsNoLockWhileItHasTheBias",
+        "python/project/test_loom_models.py::test_each_model_holds_and_each_weakened_twin_fails",
+    ),
+    ("Two ports at such an end, or a port and an incoming topic, have a mutex with priority inheritance."): (
+        "Ring.HasALockWithTwoPortsAtAnEnd",
+        "PriorityInheritance.TheHighestIsServedBeforeTheMiddle",
+        "bench: FIFO90 blocked by a 2 ms holder while a FIFO50 hog burns 50 ms, through SharedData, worst",
+    ),
+    (
+        "A transaction that adds or removes a port exchanges the one for the other while both ends are in "
+        "use, and loses no element."
+    ): (
+        "RingFixture.NoElementIsLostOrGivenTwiceWhilePortsComeAndGo",
+        "RingTransactions.GiveEveryElementOnceWhileAReaderComesAndGoes",
+    ),
+    "`goals.write (lock)`.": ("python/cli/test_list_view.py::test_a_port_that_takes_a_lock_is_marked",),
+    "`mauve list` marks a port that takes the mutex:": (
+        "python/cli/test_list_view.py::test_a_port_that_takes_a_lock_is_marked",
+        "python/bindings/test_kernel.py::test_a_second_writer_of_a_ring_gives_it_a_lock",
+    ),
+    "A type that only Python knows always has the mutex.": (
+        "python/bindings/test_kernel.py::test_a_type_that_only_python_knows_has_a_lock",
     ),
     "| your own | such as the mission's map with `get` and `update`, which take a callable |": (
         "UserResource.IsReachedByCallablesAndTellsListeners",
@@ -1946,7 +1980,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_values.py::test_values_of_every_kind_by_resource_and_by_port",
     ),
     "An element of a `ring_buffer` stays in it: the command shows the element that was written last.": (
-        "RingFixture.ALookShowsTheElementWrittenLastAndTakesNoneAway",
+        "Ring.ALookShowsTheElementWrittenLastAndTakesNoneAway",
         "ros/executor/test_values.py::test_a_look_takes_nothing_away",
     ),
     "mauve mirror /robot_1/executor pose # on /robot_1/executor/mirror/pose": (

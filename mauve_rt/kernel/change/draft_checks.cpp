@@ -167,7 +167,9 @@ void Draft::check_port_counts() const {
     if (count.step == 0) continue;
     try {
       // Others than components may have ports of their own.
-      service->check_ports(static_cast<std::uint32_t>(service->ports() + count.after - count.before));
+      const auto ports = static_cast<std::uint32_t>(service->ports() + count.after - count.before);
+      service->check_ports(ports);
+      service->make_room(ports);
     } catch (const Error& failure) {
       rethrow_as_of(failure, count.component, count.step);
     }

@@ -84,7 +84,10 @@ PortConnection PortBase::prepare(ServiceBase& service, const std::string& resour
 }
 
 void PortBase::swap(PortConnection& connection) noexcept {
-  attach(connection.service);
+  attach(nullptr, nullptr);
+  if (is_seated_) connection_.service->unseat(own_seat_);
+  is_seated_ = connection.service != nullptr && connection.service->seat(own_seat_);
+  attach(connection.service, is_seated_ ? &own_seat_ : nullptr);
   if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
   is_counted_ = true;
   if (connection.service != nullptr) connection.service->add_port();
@@ -102,14 +105,17 @@ bool PortBase::make_safe(bool may_wait) noexcept {
 }
 
 void PortBase::leave_behind() noexcept {
-  closed_.store(kLeft, std::memory_order_release);
+  set_special(kClosed | kLeft, kLeft);
   if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
   is_counted_ = false;
 }
 
 void PortBase::connect(ServiceBase& service, const std::string& resource_name) {
   PortConnection connection = prepare(service, resource_name);
-  if (&service != connection_.service) service.check_ports(service.ports() + 1);
+  if (&service != connection_.service) {
+    service.check_ports(service.ports() + 1);
+    service.make_room(service.ports() + 1);
+  }
   swap(connection);
 }
 
@@ -121,15 +127,17 @@ void PortBase::disconnect() noexcept {
 void PortBase::preview(const PortConnection& connection) {
   stand_in_ = make_stand_in();
   stand_in_->set_context(context_);
-  stand_in_->attach(connection.service);
+  stand_in_->attach(connection.service, nullptr);
   stand_in_->connection_ = connection;
   previewer_.store(pthread_self(), std::memory_order_relaxed);
+  set_special(kPreviewed, kPreviewed);
 }
 
 void PortBase::end_preview() noexcept {
+  set_special(kPreviewed, 0);
   previewer_.store(kNobody, std::memory_order_relaxed);
   if (stand_in_ == nullptr) return;
-  stand_in_->attach(nullptr);
+  stand_in_->attach(nullptr, nullptr);
   stand_in_.reset();
 }
 

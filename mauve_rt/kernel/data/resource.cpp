@@ -88,7 +88,9 @@ void Resource::bind_input() {
     if (service->kind() == PortKind::write) service->check_ports(service->ports() + 1);
   }
   for (ServiceBase* service : services_) {
-    if (service->kind() == PortKind::write) service->add_port();
+    if (service->kind() != PortKind::write) continue;
+    service->add_port();
+    service->share();
   }
 }
 

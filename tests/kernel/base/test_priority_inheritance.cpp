@@ -3,6 +3,10 @@
 #include <pthread.h>
 #include <sched.h>
 
+#include <optional>
+
+#include "mauve_rt/base/biased_mutex.hpp"
+
 #include "fixtures.hpp"
 
 namespace mauve::testing {
@@ -31,8 +35,26 @@ void spin(time_ns_t duration) {
   }
 }
 
-struct Scene {
+/// The lowest has a lock as everybody.
+struct ByLock {
+  void begin() { mutex.lock(); }
+  void end() { mutex.unlock(); }
   PiMutex mutex;
+};
+
+/// It has the bias, and no lock at all: who waits gives it a priority to inherit.
+struct ByBias {
+  ByBias() { mutex.add(seat); }
+  void begin() { hold.emplace(mutex, &seat); }
+  void end() { hold.reset(); }
+  BiasedMutex mutex;
+  BiasedMutex::Seat seat;
+  std::optional<BiasedMutex::Hold> hold;
+};
+
+template <typename Way>
+struct Scene {
+  Way way;
   std::atomic<bool> low_holds{false};
   std::atomic<bool> high_waits{false};
   std::atomic<int> order{0};
@@ -40,18 +62,24 @@ struct Scene {
   int middle_came{0};
 };
 
-TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {
+template <typename Way>
+class PriorityInheritance : public ::testing::Test {};
+using Ways = ::testing::Types<ByLock, ByBias>;
+TYPED_TEST_SUITE(PriorityInheritance, Ways, );
+
+TYPED_TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {
+  using Scene = Scene<TypeParam>;
   if (!may_use_fifo()) GTEST_SKIP() << "needs the right to SCHED_FIFO (rtprio limit)";
   Scene scene;
   const pthread_t low = make_thread(
       10,
       [](void* argument) -> void* {
         auto& scene = *static_cast<Scene*>(argument);
-        scene.mutex.lock();
+        scene.way.begin();
         scene.low_holds = true;
         while (!scene.high_waits) sched_yield();
         spin(ms_to_ns(5));  // with the middle one ready to run, only an inherited priority gets this done
-        scene.mutex.unlock();
+        scene.way.end();
         return nullptr;
       },
       &scene);
@@ -61,9 +89,9 @@ TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {
       [](void* argument) -> void* {
         auto& scene = *static_cast<Scene*>(argument);
         scene.high_waits = true;
-        scene.mutex.lock();
+        scene.way.mutex.lock();
         scene.high_came = ++scene.order;
-        scene.mutex.unlock();
+        scene.way.mutex.unlock();
         return nullptr;
       },
       &scene);

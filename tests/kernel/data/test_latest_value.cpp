@@ -23,9 +23,20 @@ struct Owning {
   }
   double value{};
 };
+/// Large enough to be torn, and not to be copied as bytes.
+struct OwningBlock {
+  OwningBlock() = default;
+  OwningBlock(const OwningBlock& other) : words(other.words) {}
+  OwningBlock& operator=(const OwningBlock& other) {
+    words = other.words;
+    return *this;
+  }
+  std::array<std::uint64_t, 64> words{};
+};
 
 }  // namespace mauve::testing
 
+MAUVE_TYPE(mauve::testing::OwningBlock, "test_msgs/msg/OwningBlock", words)
 MAUVE_TYPE(mauve::testing::Block, "test_msgs/msg/Block", words)
 MAUVE_TYPE(mauve::testing::Pair, "test_msgs/msg/Pair", words)
 MAUVE_TYPE(mauve::testing::Owning, "test_msgs/msg/Owning", value)
@@ -111,6 +122,66 @@ TEST(LatestValue, AWriterNeverWaitsForReadersThatKeepOldValues) {
   for (TestShell& reader : readers) EXPECT_EQ(999.0, reader.input.read().value.value);
 }
 
+TEST(SharedData, TakesReadersWhileItIsInUse) {
+  constexpr int kReaders = 30;
+  SharedData<Block> shared;
+  WritePort<Block> writer("writer");
+  writer.connect(shared.write, "shared");
+  std::atomic<bool> done{false};
+  std::atomic<std::uint64_t> written{0};
+  std::thread hammer([&] {
+    for (std::uint64_t number = 1; !done; ++number) {
+      ASSERT_TRUE(writer.write(filled<Block>(number))) << "a slot is always free";
+      written = number;
+    }
+  });
+  std::vector<std::unique_ptr<ReadPort<Block>>> readers;
+  for (int i = 0; i < kReaders; ++i) {
+    readers.push_back(std::make_unique<ReadPort<Block>>("reader"));
+    readers.back()->connect(shared.read, "shared");
+    EXPECT_TRUE(readers.back()->service()->is_wait_free());
+    for (const auto& reader : readers) {  // each keeps what it has read
+      const std::uint64_t at_least = written;
+      const Sample<Block> sample = reader->read();
+      EXPECT_TRUE(is_whole(sample.value));
+      EXPECT_GE(sample.value.words[0], at_least);
+    }
+  }
+  done = true;
+  hammer.join();
+}
+
+TEST(SharedData, TakesReadersWithoutAPort) {
+  SharedData<Number> shared;
+  EXPECT_TRUE(shared.write.write({1.0}, 10));
+  for (int i = 0; i < 100; ++i) {  // with one slot lost a round, the third write would find none
+    ReaderState passing;
+    Number number;
+    time_ns_t time_ns = 0;
+    EXPECT_EQ(DataStatus::new_data, shared.read.read(number, time_ns, passing));
+    EXPECT_EQ(DataStatus::old_data, shared.read.read(number, time_ns, passing));
+    EXPECT_EQ(1.0 + i, number.value);
+    EXPECT_EQ(10 + i, time_ns);
+    EXPECT_TRUE(shared.write.write({2.0 + i}, 11 + i));
+  }
+}
+
+TEST(SharedData, ALockIsForWritersAmongThemselves) {
+  if (!has_process_barrier()) GTEST_SKIP() << "needs membarrier(2)";
+  SharedData<Number> shared;
+  WritePort<Number> first("first");
+  WritePort<Number> second("second");
+  ReadPort<Number> reader("reader");
+  first.connect(shared.write, "shared");
+  reader.connect(shared.read, "shared");
+  EXPECT_TRUE(first.service()->is_wait_free());
+  second.connect(shared.write, "shared");
+  EXPECT_FALSE(first.service()->is_wait_free());
+  EXPECT_TRUE(reader.service()->is_wait_free());
+  first.disconnect();
+  EXPECT_TRUE(second.service()->is_wait_free());
+}
+
 TEST(LatestValue, ADisconnectedReaderKeepsNothing) {
   LatestValue<Number> latest(1);
   TestShell writer;
@@ -177,20 +248,36 @@ TEST(LatestValue, OfATypeThatCannotBeCopiedAsBytesIsRefused) {
   EXPECT_EQ(3U, resource->find_service("read")->max_ports());
 }
 
+/// A value of a type, and the resource that holds it.
+template <typename Value, typename Resource>
+struct Kept {
+  using Block = Value;
+  static std::unique_ptr<Resource> make(std::uint32_t readers) {
+    if constexpr (std::is_constructible_v<Resource, std::uint32_t>) {
+      return std::make_unique<Resource>(readers);
+    } else {
+      return std::make_unique<Resource>();
+    }
+  }
+};
+
 template <typename T>
 class LatestValueStress : public ::testing::Test {};
-using Sizes = ::testing::Types<Block, Pair>;
-TYPED_TEST_SUITE(LatestValueStress, Sizes, );
+using Cases = ::testing::Types<Kept<Block, LatestValue<Block>>, Kept<Pair, LatestValue<Pair>>,
+                               Kept<Block, SharedData<Block>>, Kept<Pair, SharedData<Pair>>,
+                               Kept<OwningBlock, SharedData<OwningBlock>>>;
+TYPED_TEST_SUITE(LatestValueStress, Cases, );
 
 /// Readers of every kind against a writer that never rests: a value is whole, sequences never go back, and no read
 /// finds less than was written, or found by anybody else, before it started.
 TYPED_TEST(LatestValueStress, ReadersSeeWholeValuesInOrder) {
-  using Block = TypeParam;
+  using Block = TypeParam::Block;
   constexpr int kReaders = 3;
   constexpr std::uint64_t kReads = 20'000;
   constexpr std::uint64_t kChanges = 200;  // each reader sees the writer go on that often at least
   constexpr std::uint64_t kReadsInARow = 16;
-  LatestValue<Block> latest(kReaders + 1);  // one more: a port that comes and goes
+  const auto owned = TypeParam::make(kReaders + 1);  // one more: a port that comes and goes
+  auto& latest = *owned;
   WritePort<Block> writer("writer");
   writer.connect(latest.write, "latest");
   ASSERT_TRUE(writer.write(filled<Block>(1)));
@@ -274,8 +361,9 @@ TYPED_TEST(LatestValueStress, ReadersSeeWholeValuesInOrder) {
 
 /// The watchdog zeroes the output of a component that hangs in mid-write: two threads write, none is torn.
 TYPED_TEST(LatestValueStress, ZerosBesideTheWriterTearNothing) {
-  using Block = TypeParam;
-  LatestValue<Block> latest(1);
+  using Block = TypeParam::Block;
+  const auto owned = TypeParam::make(1);
+  auto& latest = *owned;
   WritePort<Block> writer("writer");
   ReadPort<Block> reader("reader");
   writer.connect(latest.write, "latest");

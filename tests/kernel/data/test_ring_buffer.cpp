@@ -9,7 +9,6 @@ struct RingFixture : ::testing::Test {
   RingFixture() {
     writer.output.connect(ring.write, "ring");
     first.input.connect(ring.read, "ring");
-    second.input.connect(ring.read, "ring");
     first.set_context(&context);
   }
   Context context;
@@ -19,7 +18,51 @@ struct RingFixture : ::testing::Test {
   RingBuffer<Number> ring{2};
 };
 
+/// What holds with one port at each end, without a lock, holds with two, which have one.
+struct Ring : RingFixture, ::testing::WithParamInterface<bool> {
+  Ring() {
+    if (!has_two()) return;
+    second.input.connect(ring.read, "ring");
+    other_writer.output.connect(ring.write, "ring");
+  }
+  static bool has_two() { return GetParam(); }
+  TestShell other_writer;
+};
+INSTANTIATE_TEST_SUITE_P(Ports, Ring, ::testing::Bool(),
+                         [](const auto& each) { return each.param ? "two" : "one"; });
+
+TEST_P(Ring, HasALockWithTwoPortsAtAnEnd) {
+  if (!has_process_barrier()) GTEST_SKIP() << "needs membarrier(2)";
+  EXPECT_EQ(!has_two(), first.input.service()->is_wait_free());
+  EXPECT_EQ(!has_two(), writer.output.service()->is_wait_free());
+  second.input.disconnect();
+  other_writer.output.disconnect();
+  EXPECT_TRUE(first.input.service()->is_wait_free());
+  EXPECT_TRUE(writer.output.service()->is_wait_free());
+  ring.bind_input();
+  EXPECT_FALSE(writer.output.service()->is_wait_free()) << "an incoming topic writes as well";
+  EXPECT_TRUE(first.input.service()->is_wait_free());
+  RingBuffer<Number> overwriting(2, WhenFull::overwrite);
+  first.input.connect(overwriting.read, "overwriting");
+  EXPECT_FALSE(first.input.service()->is_wait_free()) << "its writer removes elements too";
+}
+
+TEST_P(Ring, GivesElementsInOrderAndRefusesWhatFindsNoRoom) {
+  for (int lap = 0; lap < 5; ++lap) {
+    EXPECT_TRUE(writer.output.write({1.0 + lap}));
+    EXPECT_TRUE(writer.output.write({2.0 + lap}));
+    EXPECT_FALSE(writer.output.write({3.0 + lap}));
+    EXPECT_EQ(lap + 1U, ring.lost());
+    EXPECT_EQ(1.0 + lap, first.input.read().value.value);
+    EXPECT_TRUE(writer.output.write({4.0 + lap}));
+    EXPECT_EQ(2.0 + lap, first.input.read().value.value);
+    EXPECT_EQ(4.0 + lap, first.input.read().value.value);
+    EXPECT_EQ(DataStatus::old_data, first.input.read().status);
+  }
+}
+
 TEST_F(RingFixture, EachElementGoesToOneReaderAndAFullRingRefuses) {
+  second.input.connect(ring.read, "ring");
   EXPECT_TRUE(writer.output.write({1.0}));
   EXPECT_TRUE(writer.output.write({2.0}));
   EXPECT_FALSE(writer.output.write({3.0}));
@@ -29,6 +72,7 @@ TEST_F(RingFixture, EachElementGoesToOneReaderAndAFullRingRefuses) {
 }
 
 TEST_F(RingFixture, StatusIsPerPort) {
+  second.input.connect(ring.read, "ring");
   EXPECT_EQ(DataStatus::none, first.input.read().status);
   writer.output.write({1.0});
   EXPECT_EQ(DataStatus::new_data, first.input.read().status);
@@ -39,7 +83,7 @@ TEST_F(RingFixture, StatusIsPerPort) {
   EXPECT_EQ(DataStatus::old_data, first.input.read().status);
 }
 
-TEST_F(RingFixture, AnEmptyRingLeavesTheLastElementsTimeAndThePlaceAlone) {
+TEST_P(Ring, AnEmptyRingLeavesTheLastElementsTimeAndThePlaceAlone) {
   Context clock;
   writer.set_context(&clock);
   clock.clock_ns = 10;
@@ -60,7 +104,7 @@ TEST_F(RingFixture, AnEmptyRingLeavesTheLastElementsTimeAndThePlaceAlone) {
   EXPECT_EQ(DataStatus::none, first.input.read().status);
 }
 
-TEST_F(RingFixture, ALookShowsTheElementWrittenLastAndTakesNoneAway) {
+TEST_P(Ring, ALookShowsTheElementWrittenLastAndTakesNoneAway) {
   std::vector<std::byte> message;
   time_ns_t time_ns = 0;
   std::uint64_t written = 7;
@@ -97,7 +141,8 @@ TEST_F(RingFixture, OverwritingKeepsTheNewestAndCountsTheLost) {
   EXPECT_EQ(3.0, first.input.read().value.value);
 }
 
-TEST_F(RingFixture, NoElementIsLostOrGivenTwiceBetweenThreads) {
+/// Beside whoever looks at the newest one, and whoever takes a recording, which both come without a port.
+TEST_P(Ring, NoElementIsLostOrGivenTwiceBetweenThreads) {
   constexpr int kElements = 20'000;
   std::atomic<bool> done{false};
   std::vector<double> taken[2];
@@ -117,7 +162,25 @@ TEST_F(RingFixture, NoElementIsLostOrGivenTwiceBetweenThreads) {
     }
   };
   std::thread one([&] { take(first, taken[0]); });
-  std::thread two([&] { take(second, taken[1]); });
+  std::thread two([&] {
+    if (has_two()) take(second, taken[1]);
+  });
+  std::thread looker([&] {
+    std::vector<std::byte> message;
+    time_ns_t time_ns = 0;
+    std::uint64_t last = 0;
+    std::uint64_t written = 0;
+    for (bool is_logged = false; !done; is_logged = !is_logged) {
+      if (!ring.peek_sample(message, time_ns, written)) continue;
+      Number number;
+      EXPECT_TRUE(CdrReader(message).get(number));
+      EXPECT_EQ(static_cast<double>(written - 1), number.value);
+      EXPECT_GE(written, last);
+      last = written;
+      is_logged ? ring.end_log() : ring.begin_log(4096);
+      std::this_thread::yield();
+    }
+  });
   for (int i = 0; i < kElements; ++i) {
     Backoff backoff;
     while (!writer.output.write({static_cast<double>(i)})) backoff();
@@ -125,12 +188,56 @@ TEST_F(RingFixture, NoElementIsLostOrGivenTwiceBetweenThreads) {
   done = true;
   one.join();
   two.join();
+  looker.join();
   std::vector<int> times(kElements, 0);
   for (const auto& list : taken) {
     EXPECT_TRUE(std::is_sorted(list.begin(), list.end()));
     for (const double value : list) ++times[static_cast<std::size_t>(value)];
   }
   EXPECT_EQ(kElements, std::count(times.begin(), times.end(), 1));
+}
+
+/// A second port at either end comes and goes while both ends are in use.
+TEST_F(RingFixture, NoElementIsLostOrGivenTwiceWhilePortsComeAndGo) {
+  constexpr std::uint64_t kElements = 20'000;
+  std::atomic<bool> done{false};
+  std::atomic<std::uint64_t> given{0};
+  const auto write = [&](WritePort<Number>& port) {
+    Backoff backoff;
+    while (!port.write({1.0})) backoff();
+  };
+  std::thread reader([&] {
+    Backoff backoff;
+    for (;;) {
+      const bool last_round = done;
+      if (first.input.read().is_new()) {
+        ++given;
+        backoff = {};
+      } else if (last_round) {
+        return;
+      } else {
+        backoff();
+      }
+    }
+  });
+  std::atomic<std::uint64_t> added{0};
+  std::thread visitor([&] {
+    while (!done) {
+      second.input.connect(ring.read, "ring");
+      second.output.connect(ring.write, "ring");
+      if (second.output.write({1.0})) ++added;
+      if (second.input.read().is_new()) ++given;
+      second.input.disconnect();
+      second.output.disconnect();
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  });
+  for (std::uint64_t i = 0; i < kElements; ++i) write(writer.output);
+  done = true;
+  visitor.join();
+  reader.join();
+  while (first.input.read().is_new()) ++given;
+  EXPECT_EQ(kElements + added, given);
 }
 
 TEST(RingBuffer, WithoutACapacityIsRefused) {

@@ -17,14 +17,15 @@ std::uint64_t follow(const TraceDrain& drain, std::uint64_t first) {
 
 TEST_F(TraceCollectorTest, NothingIsLostWhileNobodyTakes) {
   constexpr int kRecordsPerRelease = 4;
-  Component& component = add("fast", 1, {.trace_records = 2048});
+  Component& component = add("fast", 1, {.trace_records = 8192});
   TraceCollector collector(architecture, ms_to_ns(5));
   deploy();
-  wait_runs(component, 1000);  // which is more than the ring holds
+  wait_runs(component,
+            2100);  // which is more than the ring holds; it lasts two seconds without the collector
   deployer.stop("fast");
   const TraceDrain drain = collector.take();
   EXPECT_EQ(drain.dropped.at(0), 0U);
-  EXPECT_GT(drain.records.size(), 1000U * kRecordsPerRelease);
+  EXPECT_GT(drain.records.size(), 2100U * kRecordsPerRelease);
   EXPECT_EQ(follow(drain, 0), drain.written.at(0));
 }
 

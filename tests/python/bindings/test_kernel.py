@@ -19,6 +19,7 @@ from mauve_rt._kernel import (
     Transaction,
     monotonic_ns,
 )
+from mauve_rt.api import SharedData
 from mauve_rt.model.plugins import PluginIndex
 from mauve_rt.trace.format.records import RECORD, Kind
 
@@ -347,3 +348,30 @@ def test_a_drain_yields_the_records_of_every_component(deployer: Deployer):
     assert parked["a"] == armed["a"], "the pending instant was kept"
     assert metronome["kind"][-1] == Kind.STOP
     assert deployer.drain_trace().monotonic_ns >= drain.monotonic_ns >= int(metronome["time_ns"][-1])
+
+
+def wait_free(architecture: Architecture, resource: str) -> set[str]:
+    [found] = [each for each in architecture.resources() if each.name == resource]
+    return {service.name for service in found.services if service.is_wait_free}
+
+
+def test_a_second_writer_of_a_ring_gives_it_a_lock(architecture: Architecture):
+    architecture.add_resource("ring", kind="ring_buffer", type=FLOAT, capacity=4)
+    assert wait_free(architecture, "ring") == set(), "nobody is connected"
+    architecture.commit(
+        Transaction().disconnect("metronome", "beat").connect("metronome", "beat", "ring", "write")
+    )
+    assert wait_free(architecture, "ring") == {"write"}
+    architecture.connect("protected", "beat", "ring", "write")
+    assert wait_free(architecture, "ring") == set()
+    architecture.commit(
+        Transaction().disconnect("metronome", "beat").connect("metronome", "beat", "beat", "write")
+    )
+    assert wait_free(architecture, "ring") == {"write"}
+    assert wait_free(architecture, "beat") == {"read", "write"}
+
+
+def test_a_type_that_only_python_knows_has_a_lock():
+    architecture = Architecture(PluginRegistry())
+    architecture.add_resource("only", SharedData(Float64))
+    assert wait_free(architecture, "only") == set()

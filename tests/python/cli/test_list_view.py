@@ -84,6 +84,25 @@ def test_each_port_says_what_it_is_connected_to_and_where_that_goes() -> None:
     assert _line(lines, "idle") == ["-", "idle"]
 
 
+def test_a_port_that_takes_a_lock_is_marked() -> None:
+    ports = [
+        PortInfo(name="pose", kind=PortInfo.READ, resource="pose", service="read"),
+        PortInfo(name="goal", kind=PortInfo.WRITE, resource="goals", service="write"),
+        PortInfo(name="pulse", kind=PortInfo.READ, resource="pulse", service="read"),
+    ]
+    resources = [
+        ResourceInfo(name="pose", kind="shared_data", wait_free=["read"]),
+        ResourceInfo(name="goals", kind="ring_buffer", wait_free=["read"]),
+        ResourceInfo(name="pulse", kind="event"),
+    ]
+    lines = _printed(
+        ListComponents.Response(components=[ComponentInfo(name="c", ports=ports)], resources=resources)
+    )
+    assert _line(lines, "c.pose") == ["c.pose", "pose.read"]
+    assert _line(lines, "c.goal") == ["c.goal", "goals.write", "(lock)"]
+    assert _line(lines, "c.pulse") == ["c.pulse", "pulse.read"]
+
+
 @pytest.mark.parametrize("width", [80, 160])
 def test_forty_components_of_long_names_lose_no_word_on_a_narrow_terminal(width: int) -> None:
     name = "localisation_of_the_left_arm_{}"

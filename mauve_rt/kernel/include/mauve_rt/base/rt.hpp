@@ -3,7 +3,7 @@
 #pragma once
 
 /// Tags that close the first doc line of every public function:
-///   [rt]      bounded, no allocation, no system call but a futex; may be called on a component thread; throws nothing
+///   [rt]      bounded, no allocation, no system call but a futex or a membarrier; may be called on a component thread; throws nothing
 ///   [non-rt]  any thread but a component thread
 ///   [setup]   only before the component is started
 /// "[rt] as far as the core is": so is the function itself, but it runs code of others, which may throw.

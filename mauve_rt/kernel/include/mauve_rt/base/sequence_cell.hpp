@@ -37,9 +37,6 @@ class SequenceCell {
     version_.store(2 * sequence, std::memory_order_release);
   }
 
-  /// Sequence of the last value that was written whole; 0 before the first. [rt] wait-free.
-  std::uint64_t sequence() const MAUVE_RT { return version_.load(std::memory_order_acquire) / 2; }
-
   /// The value's sequence, 0 when nothing was ever written; false, and nothing changed, when a write came in
   /// between. [rt] wait-free.
   bool load(T& value, time_ns_t& time_ns, std::uint64_t& sequence) const MAUVE_RT {

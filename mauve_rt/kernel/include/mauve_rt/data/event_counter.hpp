@@ -39,7 +39,7 @@ const char* type_of(EventMessage said) MAUVE_RT;
 /// | member            | written by    | under  | hot |
 /// |-------------------|---------------|--------|-----|
 /// | count_, time_ns_  | raise service | mutex_ | yes |
-class EventCounter final : public LoggedResource<EventCount, Resource> {
+class EventCounter final : public LoggedResource<EventCount, Resource, PiMutex> {
  public:
   explicit EventCounter(EventMessage said = EventMessage::count);
   void set_name(const std::string& name) override;

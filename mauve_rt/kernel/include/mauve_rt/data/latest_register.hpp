@@ -2,11 +2,13 @@
 // A register for one writer and a fixed number of readers that neither block nor retry.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <type_traits>
+#include <vector>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/sequence_cell.hpp"
@@ -25,20 +27,23 @@ namespace mauve {
 /// one is the newest.
 ///
 /// Small values lie in front_ too, where a read costs what a sequence lock costs and writes nothing. A reader that
-/// meets writes there kCopies times goes to the slots. The writer fills front_ before it exchanges the word, so
-/// nobody who asks the slots is behind what front_ showed when he came, with one exception: the writer rests
-/// between the two. Then front_ is at rest too and can be copied; and if it is not, the exchange was made.
+/// meets writes there kCopies times goes to the slots, where it finds nothing older than front_ has shown to anybody before: it
+/// has seen a newer write begin, and each write begins after the exchange of the one before. look() asks only the slots, and may
+/// be one write behind what read() has shown.
+///
+/// More readers can come while it is in use: reserve() makes another table, with the same slots and new ones. Who reads the
+/// old one goes on with it, so it is kept to the end.
 ///
 /// | member         | written by             | read by         | order                                           |
 /// | -------------- | ---------------------- | --------------- | ----------------------------------------------- |
-/// | word_          | writer, readers        | writer, readers | writer releases what it filled, readers acquire |
+/// | word_          | writer, readers        | writer, readers | acq_rel: the reader finds what the writer filled, the writer finds what a reader gave back before it took |
+/// | table_         | reserve()              | writer, readers | release / acquire; who finds a slot's index in word_ finds the slot in the table |
+/// | slots_, tables_ | reserve()             | reserve()       | one thread at a time                            |
 /// | Slot::entry    | writer, nobody else in | who took it     | by word_ and released                           |
 /// | Slot::taken    | writer                 | writer          | -                                               |
 /// | Slot::released | readers; writer resets | writer          | readers release after the copy, writer acquires |
 template <typename T>
 class LatestRegister {
-  static_assert(std::is_trivially_copyable_v<T>, "a reader copies without a lock: use SharedData instead");
-
  public:
   struct Entry {
     std::uint64_t sequence{0};  // 0: never written
@@ -47,19 +52,31 @@ class LatestRegister {
   };
 
   /// [setup]
-  explicit LatestRegister(std::size_t readers)
-      : size_(readers + 2), slots_(std::make_unique<Slot[]>(readers + 2)) {}
+  explicit LatestRegister(std::size_t readers) { reserve(readers); }
 
-  /// Types up to this many bytes are copied from front_ first.
+  /// Trivially copyable types up to this many bytes are copied from front_ first.
   static constexpr std::size_t kSmall = 112;  // with version and time two cache lines
-  static constexpr bool kHasFront = sizeof(T) <= kSmall;
+  static constexpr bool kHasFront = std::is_trivially_copyable_v<T> && sizeof(T) <= kSmall;
+
+  /// Makes room for so many readers, also while the others read and write. [non-rt] One thread at a time.
+  void reserve(std::size_t readers) {
+    if (readers + 2 <= slots_.size()) return;
+    while (slots_.size() < readers + 2) slots_.push_back(std::make_unique<Slot>());
+    auto table = std::make_unique<Table>();
+    for (const auto& slot : slots_) table->push_back(slot.get());
+    tables_.push_back(std::move(table));
+    table_.store(tables_.back().get(), std::memory_order_release);
+  }
+  /// How many readers may keep a slot. [rt] As reserve().
+  std::size_t room() const MAUVE_RT { return slots_.size() - 2; }
 
   /// Publishes a value, in at most `readers` + 2 looks for a free slot. [rt] One thread at a time.
   /// False, and nothing written, only when more readers than declared keep slots.
   bool write(const T& value, time_ns_t time_ns) MAUVE_RT {
+    const Table& slots = *table_.load(std::memory_order_acquire);
     const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written here only
-    for (std::size_t i = next(newest); i != newest; i = next(i)) {
-      Slot& slot = slots_[i];
+    for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
+      Slot& slot = *slots[i];
       // acquire: what its readers copied, they have copied
       if (slot.released.load(std::memory_order_acquire) != slot.taken) continue;
       slot.released.store(0, std::memory_order_relaxed);  // relaxed: published with the word
@@ -67,9 +84,9 @@ class LatestRegister {
       slot.entry.time_ns = time_ns;
       slot.entry.sequence = ++sequence_;
       if constexpr (kHasFront) front_.store(value, time_ns, sequence_);
-      // release: publishes the slot; the count that comes back is the writer's own business
-      const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_release);
-      slots_[newest].taken = before & kCountMask;
+      // release: publishes the slot. acquire: who has taken one gave another one back before; else none might look free
+      const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_acq_rel);
+      slots[newest]->taken = before & kCountMask;
       return true;
     }
     return false;
@@ -106,7 +123,7 @@ class LatestRegister {
   /// Gives back what the reader keeps. [rt] wait-free.
   void let_go(std::uint32_t& held) MAUVE_RT {
     if (held == 0) return;
-    slots_[held - 1].released.fetch_add(1, std::memory_order_release);  // release: the copy is done
+    slot(held).released.fetch_add(1, std::memory_order_release);  // release: the copy is done
     held = 0;
   }
 
@@ -123,14 +140,19 @@ class LatestRegister {
     Entry entry;
   };
 
+  using Table = std::vector<Slot*>;
+
   static std::size_t index_of(std::uint64_t word) noexcept { return word >> kCountBits; }
-  std::size_t next(std::size_t i) const noexcept { return i + 1 == size_ ? 0 : i + 1; }
+  static std::size_t next(std::size_t i, const Table& slots) noexcept {
+    return i + 1 == slots.size() ? 0 : i + 1;
+  }
+  Slot& slot(std::uint32_t held) noexcept { return *(*table_.load(std::memory_order_acquire))[held - 1]; }
 
   /// The newest slot, untouched until the reader's next call.
   const Entry& newest(std::uint32_t& held) noexcept {
     // relaxed: a slot that is kept was acquired when it was taken, and is not filled anew while kept
     if (held != index_of(word_.load(std::memory_order_relaxed)) + 1) take_newest(held);
-    return slots_[held - 1].entry;
+    return slot(held).entry;
   }
   /// Returns the sequence found.
   std::uint64_t read_slot(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
@@ -142,26 +164,25 @@ class LatestRegister {
   }
   /// After a first copy of front_ that failed. Out of line: the common way stays short.
   [[gnu::noinline]] std::uint64_t read_contended(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    const std::uint64_t whole = front_.sequence();  // others may have seen it: no older one may be given
     std::uint64_t sequence = 0;
     for (int i = 1; i < kCopies; ++i) {
       if (front_.load(value, time_ns, sequence)) return sequence;
     }
-    if (newest(reader.held).sequence < whole && front_.load(value, time_ns, sequence)) return sequence;
     return read_slot(value, time_ns, reader);
   }
 
   void take_newest(std::uint32_t& held) noexcept {
     let_go(held);
-    // acquire: pairs with the exchange, through the additions of other readers (they continue its release)
-    held = static_cast<std::uint32_t>(index_of(word_.fetch_add(1, std::memory_order_acquire))) + 1;
+    // acquire: pairs with the exchange, through the additions of other readers. release: with the next exchange
+    held = static_cast<std::uint32_t>(index_of(word_.fetch_add(1, std::memory_order_acq_rel))) + 1;
   }
 
   [[no_unique_address]] std::conditional_t<kHasFront, SequenceCell<T>, Nothing> front_;
   alignas(kCacheLine) std::atomic<std::uint64_t> word_{0};
   alignas(kCacheLine) std::uint64_t sequence_{0};  // of the writer
-  std::size_t size_;
-  std::unique_ptr<Slot[]> slots_;
+  alignas(kCacheLine) std::atomic<const Table*> table_{nullptr};
+  std::vector<std::unique_ptr<Slot>> slots_;
+  std::vector<std::unique_ptr<Table>> tables_;
 };
 
 }  // namespace mauve

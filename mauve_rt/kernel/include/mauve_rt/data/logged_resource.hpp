@@ -2,14 +2,15 @@
 // A resource whose every write can be recorded.
 #pragma once
 
+#include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/data/cdr.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/write_log.hpp"
 
 namespace mauve {
 
-/// Puts a write log into a resource of values of type T, beside what it has from `Base`.
-template <Described T, typename Base>
+/// Puts a write log into a resource of values of type T, beside what it has from `Base`. `Lock`: what its writers hold.
+template <Described T, typename Base, typename Lock = BiasedMutex>
 class LoggedResource : public Base {
  public:
   using Base::Base;
@@ -29,7 +30,7 @@ class LoggedResource : public Base {
 
  private:
   /// The lock that every writer holds. [rt]
-  virtual PiMutex& writers() MAUVE_RT = 0;
+  virtual Lock& writers() MAUVE_RT = 0;
 
   WriteLog<WrittenValue<T>> log_;  // under writers()
 };

@@ -29,18 +29,12 @@ class ReadPort final : public PortBase {
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
-  Sample<T> read() MAUVE_RT { return is_previewed() ? read_ahead() : read_now(); }
+  Sample<T> read() MAUVE_RT { return is_special() ? read_specially() : read_now(); }
   /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
   DataStatus read(T& value, time_ns_t* time_ns = nullptr) MAUVE_RT {
-    if (is_previewed()) [[unlikely]]
-      return read_ahead(value, time_ns);
-    time_ns_t time = reader_.time_ns;
-    status_ = find(value, time);
-    reader_.time_ns = time;
-    if (time_ns != nullptr) *time_ns = time;
-    if (is_tapped()) [[unlikely]]
-      tell_read(&value, status_, time);
-    return status_;
+    if (is_special()) [[unlikely]]
+      return read_specially(value, time_ns);
+    return find(value, time_ns);
   }
 
   /// What the last read found, without reading; none before the first one. [rt]
@@ -71,11 +65,11 @@ class ReadPort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const ReadService<T>*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override {
+  void attach(ServiceBase* service, BiasedMutex::Seat* seat) noexcept override {
     if (service_ != nullptr) service_->let_go(reader_);
     service_ = static_cast<ReadService<T>*>(service);  // fits() was asked
-    latest_ = service_ != nullptr ? service_->latest() : nullptr;
-    reader_ = {};
+    latest_ = seat != nullptr ? service_->latest() : nullptr;
+    reader_ = {.seat = seat};
     status_ = DataStatus::none;
   }
   std::unique_ptr<PortBase> make_stand_in() const override {
@@ -83,26 +77,43 @@ class ReadPort final : public PortBase {
   }
 
  private:
+  // One variable in each function that returns a large value: a compiler then makes it in the caller's place.
   Sample<T> read_now() noexcept {
     Sample<T> sample = find();
-    status_ = sample.status;
-    reader_.time_ns = sample.time_ns;
-    if (is_tapped()) [[unlikely]]
-      tell_read(&sample.value, sample.status, sample.time_ns);
+    note(sample);
     return sample;
   }
-  // Out of line: the reads of a running component are to cost what they cost without previews.
-  [[gnu::noinline, gnu::cold]] Sample<T> read_ahead() noexcept {
+  // Out of line: the reads of a running component are to cost what they cost without previews, taps and watches.
+  [[gnu::noinline, gnu::cold]] Sample<T> read_specially() noexcept {
+    return is_previewed() ? read_ahead() : read_tapped();
+  }
+  Sample<T> read_ahead() noexcept {
     auto& other = stand_in<ReadPort>();
     Sample<T> sample = other.read();
     other.keep_nothing();
     return sample;
   }
-  [[gnu::noinline, gnu::cold]] DataStatus read_ahead(T& value, time_ns_t* time_ns) noexcept {
-    auto& other = stand_in<ReadPort>();
-    const DataStatus status = other.read(value, time_ns);
-    other.keep_nothing();
-    return status;
+  Sample<T> read_tapped() noexcept {
+    Sample<T> sample = find_unless_closed();
+    note(sample);
+    if (is_tapped()) tell_read(&sample.value, sample.status, sample.time_ns);
+    return sample;
+  }
+  [[gnu::noinline, gnu::cold]] DataStatus read_specially(T& value, time_ns_t* time_ns) noexcept {
+    if (is_previewed()) {
+      auto& other = stand_in<ReadPort>();
+      const DataStatus status = other.read(value, time_ns);
+      other.keep_nothing();
+      return status;
+    }
+    if (is_closed()) {
+      if (time_ns != nullptr) *time_ns = reader_.time_ns;
+      status_ = DataStatus::none;
+    } else {
+      find(value, time_ns);
+    }
+    if (is_tapped()) tell_read(&value, status_, reader_.time_ns);
+    return status_;
   }
   /// Gives back what the service keeps for a reader: a stand-in is one more than it may be made for.
   void keep_nothing() noexcept {
@@ -112,18 +123,29 @@ class ReadPort final : public PortBase {
     reader_.seen = known.seen;
     reader_.time_ns = known.time_ns;
   }
-  Sample<T> find() noexcept {
-    if constexpr (std::is_trivially_copyable_v<T>) {
-      if (latest_ != nullptr) return latest_->sample(default_, reader_);
-    }
-    if (service_ == nullptr || is_closed()) return {.value = default_};
-    return service_->sample(default_, reader_);
+  Sample<T> find_unless_closed() noexcept {
+    if (is_closed()) return {.value = default_};
+    return find();
   }
-  DataStatus find(T& value, time_ns_t& time_ns) noexcept {
-    if constexpr (std::is_trivially_copyable_v<T>) {
-      if (latest_ != nullptr) return latest_->read(value, time_ns, reader_);
+  Sample<T> find() noexcept {
+    if (latest_ != nullptr) return latest_->sample(default_, reader_);
+    if (service_ != nullptr) return service_->sample(default_, reader_);
+    return {.value = default_};
+  }
+  void note(const Sample<T>& sample) noexcept {
+    status_ = sample.status;
+    reader_.time_ns = sample.time_ns;
+  }
+  DataStatus find(T& value, time_ns_t* time_ns) noexcept {
+    time_ns_t time = reader_.time_ns;
+    if (latest_ != nullptr) {
+      status_ = latest_->read(value, time, reader_);
+    } else {
+      status_ = service_ != nullptr ? service_->read(value, time, reader_) : DataStatus::none;
     }
-    return service_ != nullptr && !is_closed() ? service_->read(value, time_ns, reader_) : DataStatus::none;
+    reader_.time_ns = time;
+    if (time_ns != nullptr) *time_ns = time;
+    return status_;
   }
 
   ReadService<T>* service_{nullptr};
@@ -148,18 +170,21 @@ class WritePort final : public PortBase {
 
   /// False when the resource had no room. A value that an OutputWatch refuses is dropped. [rt]
   bool write(const T& value) MAUVE_RT {
-    if (is_tapped() && !is_closed() && !is_previewed()) [[unlikely]]
-      tell_write(&value);
-    if (service_ == nullptr || is_closed() || is_previewed()) return true;
-    if (!admits(&value)) return true;
-    const bool taken = service_->write(value, stamp_ns());
-    // Closed in between: the zeros stay last, whoever wrote first.
-    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    if (service_ == nullptr || is_special()) [[unlikely]]
+      return write_specially(value);
+    const bool taken = put(value, stamp_ns());
+    if (is_special()) [[unlikely]]
+      keep_zero();
     return taken;
   }
   using PortBase::write_zero;
   void write_zero(time_ns_t time_ns) noexcept override {
-    if (service_ != nullptr) service_->write(zero_, time_ns);
+    if (service_ == nullptr) return;
+    if (seat_ != nullptr && !seat_->is_mine()) {
+      service_->write(zero_, time_ns);  // the component's thread may be inside
+    } else {
+      put(zero_, time_ns);
+    }
   }
   TryWrite try_write_zero() noexcept override {
     return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
@@ -186,13 +211,35 @@ class WritePort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override { service_ = static_cast<WriteService<T>*>(service); }
+  void attach(ServiceBase* service, BiasedMutex::Seat* seat) noexcept override {
+    service_ = static_cast<WriteService<T>*>(service);
+    seat_ = seat;
+  }
   std::unique_ptr<PortBase> make_stand_in() const override {
     return std::make_unique<WritePort>(name(), output_);
   }
 
  private:
+  // Out of line, as ReadPort::read_specially().
+  [[gnu::noinline, gnu::cold]] bool write_specially(const T& value) noexcept {
+    if (is_closed() || is_previewed()) return true;
+    if (is_tapped()) tell_write(&value);
+    if (service_ == nullptr || !admits(&value)) return true;
+    const bool taken = put(value, stamp_ns());
+    keep_zero();
+    return taken;
+  }
+  /// Of a port that was closed while it wrote: the zeros stay last, whoever wrote first.
+  void keep_zero() noexcept {
+    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+  }
+  bool put(const T& value, time_ns_t time_ns) noexcept {
+    return seat_ != nullptr ? service_->write_seated(value, time_ns, *seat_)
+                            : service_->write(value, time_ns);
+  }
+
   WriteService<T>* service_{nullptr};
+  BiasedMutex::Seat* seat_{nullptr};
   OutputOptions output_;
   T zero_{};  // kept here: large types do not belong on a small stack
 };
@@ -221,7 +268,7 @@ class CallPort<R(Args...)> final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const CallService<R(Args...)>*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override {
+  void attach(ServiceBase* service, BiasedMutex::Seat* /*seat*/) noexcept override {
     service_ = static_cast<CallService<R(Args...)>*>(service);
   }
   std::unique_ptr<PortBase> make_stand_in() const override {
@@ -250,7 +297,9 @@ class EventPort final : public PortBase {
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const EventService*>(&service) != nullptr;
   }
-  void attach(ServiceBase* service) noexcept override { service_ = static_cast<EventService*>(service); }
+  void attach(ServiceBase* service, BiasedMutex::Seat* /*seat*/) noexcept override {
+    service_ = static_cast<EventService*>(service);
+  }
   std::unique_ptr<PortBase> make_stand_in() const override { return std::make_unique<EventPort>(name()); }
 
  private:

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/revocable_reference.hpp"
@@ -51,14 +52,19 @@ struct ConnectedTo {
 /// A port seen without its type. Its connection changes only while the component is parked or held.
 /// A port does not know when its service ends: disconnect it before the resource goes.
 ///
+/// special_ says whether a read or a write may be anything but a look at the service: one load tells. Its bits: closed or left
+/// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with previewer_.
+///
 /// | member      | written by                     | read by                   | order                                |
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
 /// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
 /// | context_    | [setup]                        | component                 | -                                    |
 /// | optional_   | [setup]                        | any                       | -                                    |
-/// | closed_     | the watchdog; who removes it   | component                 | release/acquire: its zeros stay last |
+/// | special_    | see below                      | component                 | acq_rel: its zeros stay last; who sees a bit sees what it stands for |
 /// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
+/// | is_seated_  | swap()                         | same                      | one change at a time                 |
+/// | own_seat_   | the service that gave it       | same, the component       | its own: biased_mutex.hpp            |
 /// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
 /// | watch_      | the component's thread; who ends the watch | component            | its own: revocable_reference.hpp     |
 /// | tap_        | the component's thread; who ends the tap | component              | its own: revocable_reference.hpp     |
@@ -121,10 +127,10 @@ class PortBase {
   virtual TryWrite try_write_zero() MAUVE_RT { return TryWrite::done; }
   virtual OutputOptions output() const MAUVE_RT { return {OutputPolicy::hold, OutputPolicy::hold}; }
   /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
-  void close() MAUVE_RT { closed_.store(kClosed, std::memory_order_release); }
+  void close() MAUVE_RT { set_special(kClosed | kLeft, kClosed); }
   void reopen() MAUVE_RT {
     is_safe_ = false;
-    closed_.store(kOpen, std::memory_order_release);
+    set_special(kClosed | kLeft, 0);
   }
   /// Of a closed port: writes what `on_stop` says, once; waits for a lock only where the service cannot do without, and
   /// the caller allows it. [rt] Whether it is written.
@@ -134,14 +140,27 @@ class PortBase {
   void leave_behind() MAUVE_RT;
 
   /// Asks the watch before each write, until unwatch(). [rt], on the component's thread, or parked.
-  void watch(OutputWatch& watch) MAUVE_RT { watch_.set(watch); }
+  void watch(OutputWatch& watch) MAUVE_RT {
+    watch_.set(watch);
+    set_special(kWatched, kWatched);
+  }
   /// No thread asks the watch any more afterwards. [rt]
-  void unwatch() MAUVE_RT { watch_.revoke(kForever); }
+  void unwatch() MAUVE_RT {
+    watch_.revoke(kForever);
+    set_special(kWatched, 0);
+    if (watch_.is_set()) set_special(kWatched, kWatched);  // another one came in between
+  }
   /// Passes each value read or written to the tap, until untap(). [rt], on the component's thread, or parked.
-  void tap(PortTap& tap) MAUVE_RT { tap_.set(tap); }
+  void tap(PortTap& tap) MAUVE_RT {
+    tap_.set(tap);
+    set_special(kTapped, kTapped);
+  }
   /// No thread uses this tap any more afterwards. [rt]
   void untap(const PortTap& tap) MAUVE_RT {
-    if (tap_.is(tap)) tap_.revoke(kForever);
+    if (!tap_.is(tap)) return;
+    tap_.revoke(kForever);
+    set_special(kTapped, 0);
+    if (tap_.is_set()) set_special(kTapped, kTapped);  // another one came in between
   }
   /// A cell for this port's values, not connected; nullptr: they are not trivially copyable, or not C++. [non-rt]
   virtual std::unique_ptr<PortCell> make_cell() const { return nullptr; }
@@ -159,11 +178,13 @@ class PortBase {
  protected:
   /// Whether a service of equal kind and type name is of the C++ type this port needs.
   virtual bool fits(const ServiceBase& service) const noexcept = 0;
-  /// Lets go of the old service and takes the new one, which fits, or none. [rt]
-  virtual void attach(ServiceBase* service) MAUVE_RT = 0;
+  /// Lets go of the old service and takes the new one, which fits, or none. `seat`: the place that it has given. [rt]
+  virtual void attach(ServiceBase* service, BiasedMutex::Seat* seat) MAUVE_RT = 0;
   /// Another port of this type, for a preview; not connected.
   virtual std::unique_ptr<PortBase> make_stand_in() const = 0;
   bool is_previewed() const noexcept {
+    if (!is_special()) [[likely]]
+      return false;
     // Relaxed: only the thread that stored its own id here finds it, and that one has made the stand-in itself.
     const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
     return previewer != kNobody && is_this_thread(previewer);
@@ -180,8 +201,7 @@ class PortBase {
   }
   /// Whether the watch lets this value be written. [rt]
   bool admits(const void* value) MAUVE_RT {
-    if (!watch_.is_set()) [[likely]]
-      return true;
+    if (!watch_.is_set()) return true;
     bool is_admitted = true;
     watch_.use([&](OutputWatch& watch) MAUVE_RT { is_admitted = watch.admits(value); });
     return is_admitted;
@@ -195,12 +215,25 @@ class PortBase {
   [[gnu::noinline, gnu::cold]] void tell_write(const void* value) MAUVE_RT {
     tap_.use([&](PortTap& tap) MAUVE_RT { tap.on_write(value); });
   }
-  bool is_closed() const MAUVE_RT { return closed_.load(std::memory_order_acquire) != kOpen; }
+  /// Whether any of the others here may say something. [rt]
+  bool is_special() const MAUVE_RT { return special_.load(std::memory_order_acquire) != 0; }
+  bool is_closed() const MAUVE_RT { return has(kClosed | kLeft); }
   /// Closed, and its zeros are to stay last: its component has not been removed. [rt]
-  bool keeps_zero() const MAUVE_RT { return closed_.load(std::memory_order_acquire) == kClosed; }
+  bool keeps_zero() const MAUVE_RT { return has(kClosed); }
 
  private:
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread
+  static constexpr std::uint8_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16;
+
+  bool has(std::uint8_t bits) const noexcept {
+    return (special_.load(std::memory_order_acquire) & bits) != 0;
+  }
+  void set_special(std::uint8_t bits, std::uint8_t values) MAUVE_RT {
+    std::uint8_t before = special_.load(std::memory_order_relaxed);
+    while (!special_.compare_exchange_weak(before, static_cast<std::uint8_t>((before & ~bits) | values),
+                                           std::memory_order_acq_rel)) {
+    }
+  }
 
   const PortConnection& connection() const noexcept {
     return is_previewed() ? stand_in_->connection_ : connection_;
@@ -213,10 +246,11 @@ class PortBase {
   PortConnection connection_;
   const Context* context_{nullptr};
   bool optional_{false};
-  static constexpr std::uint8_t kOpen = 0, kClosed = 1, kLeft = 2;
-  std::atomic<std::uint8_t> closed_{kOpen};
+  std::atomic<std::uint8_t> special_{0};
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service
+  BiasedMutex::Seat own_seat_;
+  bool is_seated_{false};  // has its seat at connection_.service
   RevocableReference<OutputWatch> watch_;
   RevocableReference<PortTap> tap_;
   std::unique_ptr<PortBase> stand_in_;

@@ -2,12 +2,14 @@
 // RingBuffer: a queue of bounded length; a read removes, so each element goes to one reader.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
+#include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
@@ -20,9 +22,18 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// A bounded queue; services `read` (removes the oldest) and `write`. A reader that finds it empty gets status
 /// old if it ever got an element, and no value.
 ///
-/// | member                                   | written by           | under  | hot |
-/// |------------------------------------------|----------------------|--------|-----|
-/// | places_, first_, size_, sequence_, lost_ | read, write services | mutex_ | yes |
+/// Each end has a lock of its own, biased to its only port: between one writer port and one reader port it is a wait-free queue
+/// of a single producer and a single consumer (L. Lamport, 1977), each of which looks at the other one's index only when its
+/// copy of it does not suffice (P. Lee, T. Bu, G. Chandranmenon: "A lock-free, cache-efficient shared ring buffer", 2009). One that overwrites has one lock
+/// for both ends, without a bias: its writer removes elements too.
+///
+/// | member            | written by | read by    | under / order                                                    |
+/// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |
+/// | places_           | writers    | readers    | a place between head_ and tail_ is its reader's, else its writer's |
+/// | Writers::tail     | writers    | readers    | writers_mutex_; release / acquire: publishes the place           |
+/// | Readers::head     | readers    | writers    | readers_mutex_; release / acquire: the place may be filled again |
+/// | the rest of both  | the same   | the same   | that mutex                                                       |
+/// | Writers::lost     | writers    | any        | relaxed: a figure that nothing depends on                        |
 template <Described T>
 class RingBuffer final : public LoggedResource<T, Resource> {
  public:
@@ -33,22 +44,21 @@ class RingBuffer final : public LoggedResource<T, Resource> {
       throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
                   {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
     }
+    if (overwrites()) writers_mutex_.share();
     this->offer(read);
     this->offer(write);
   }
 
   void set_name(const std::string& name) override {
     Resource::set_name(name);
-    mutex_.set_trace_id(TraceNames::intern(name));
+    writers_mutex_.set_trace_id(TraceNames::intern(name));
+    readers_mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool is_serializable() const noexcept override { return true; }
   /// [rt]
   std::size_t capacity() const MAUVE_RT { return places_.size(); }
   /// Elements refused or overwritten since the start. [rt]
-  std::uint64_t lost() MAUVE_RT {
-    const std::lock_guard lock(mutex_);
-    return lost_;
-  }
+  std::uint64_t lost() const MAUVE_RT { return writers_.lost.load(std::memory_order_relaxed); }
 
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
     auto value = std::make_unique<T>();
@@ -62,11 +72,11 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
     auto value = std::make_unique<T>();
     {
-      const std::lock_guard lock(mutex_);
-      const Place& newest = places_[(first_ + size_ + places_.size() - 1) % places_.size()];
+      const std::lock_guard lock(writers_mutex_);
+      const Place& newest = places_[(writers_.place == 0 ? places_.size() : writers_.place) - 1];
       *value = newest.value;
       time_ns = newest.time_ns;
-      sequence = sequence_;
+      sequence = writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
     }
     CdrWriter(message).put(*value);
     return sequence != 0;
@@ -83,10 +93,23 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   }
 
  private:
+  static constexpr std::size_t kCacheLine = 64;
+
   struct Place {
     T value{};
     time_ns_t time_ns{0};
-    std::uint64_t sequence{0};
+  };
+  /// Elements are counted from 1 on, by their sequence.
+  struct alignas(kCacheLine) Writers {
+    std::atomic<std::uint64_t> tail{0};  // elements written so far
+    std::uint64_t head{0};               // as seen last
+    std::size_t place{0};                // of the next element
+    std::atomic<std::uint64_t> lost{0};
+  };
+  struct alignas(kCacheLine) Readers {
+    std::atomic<std::uint64_t> head{0};  // elements removed so far
+    std::uint64_t tail{0};               // as seen last
+    std::size_t place{0};                // of the oldest element
   };
   class Read final : public ReadService<T> {
    public:
@@ -94,6 +117,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
       return owner_.pop(value, time_ns, reader);
     }
+    bool seat(BiasedMutex::Seat& seat) noexcept override {
+      if (owner_.overwrites()) return false;
+      owner_.readers_mutex_.add(seat);
+      return true;
+    }
+    void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.readers_mutex_.remove(seat); }
+    bool is_wait_free() const noexcept override { return owner_.readers_mutex_.is_biased(); }
 
    private:
     RingBuffer& owner_;
@@ -101,39 +131,58 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   class Write final : public WriteService<T> {
    public:
     explicit Write(RingBuffer& owner) : WriteService<T>("write"), owner_(owner) {}
-    bool write(const T& value, time_ns_t time_ns) noexcept override { return owner_.push(value, time_ns); }
+    bool write(const T& value, time_ns_t time_ns) noexcept override {
+      return owner_.push(value, time_ns, nullptr);
+    }
+    bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& seat) noexcept override {
+      return owner_.push(value, time_ns, &seat);
+    }
     TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
       return owner_.try_push(value, time_ns);
     }
-    void raise_floor(time_ns_t instant_ns) noexcept override {
-      const std::lock_guard lock(owner_.mutex_);
-      owner_.floor_.raise(instant_ns);
+    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor_.raise(instant_ns); }
+    bool seat(BiasedMutex::Seat& seat) noexcept override {
+      owner_.writers_mutex_.add(seat);
+      return true;
     }
+    void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.writers_mutex_.remove(seat); }
+    bool is_wait_free() const noexcept override { return owner_.writers_mutex_.is_biased(); }
+    void share() noexcept override { owner_.writers_mutex_.share(); }
 
    private:
     RingBuffer& owner_;
   };
 
-  PiMutex& writers() noexcept override { return mutex_; }
+  BiasedMutex& writers() noexcept override { return writers_mutex_; }
+  bool overwrites() const noexcept { return when_full_ == WhenFull::overwrite; }
 
   DataStatus pop(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    const std::lock_guard lock(mutex_);
-    if (size_ == 0) {
-      if (reader.seen == 0) return DataStatus::none;
-      time_ns = reader.time_ns;
-      return DataStatus::old_data;
+    const BiasedMutex::Hold hold(overwrites() ? writers_mutex_ : readers_mutex_, reader.seat);
+    const std::uint64_t head =
+        readers_.head.load(std::memory_order_relaxed);  // relaxed: written under this lock
+    if (readers_.tail == head) {
+      readers_.tail = writers_.tail.load(std::memory_order_acquire);
+      if (readers_.tail == head) {
+        if (reader.seen == 0) return DataStatus::none;
+        time_ns = reader.time_ns;
+        return DataStatus::old_data;
+      }
     }
-    const Place& place = places_[first_];
+    const Place& place = places_[readers_.place];
     value = place.value;
     time_ns = place.time_ns;
-    first_ = (first_ + 1) % places_.size();
-    --size_;
-    reader.seen = place.sequence;
+    remove(head);
+    reader.seen = head + 1;
     return DataStatus::new_data;
   }
-  bool push(const T& value, time_ns_t time_ns) noexcept {
+  /// The oldest; under the readers' lock.
+  void remove(std::uint64_t head) noexcept {
+    if (++readers_.place == places_.size()) readers_.place = 0;
+    readers_.head.store(head + 1, std::memory_order_release);
+  }
+  bool push(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
     {
-      const std::lock_guard lock(mutex_);
+      const BiasedMutex::Hold hold(writers_mutex_, seat);
       if (!floor_.admits(time_ns)) return true;
       if (!put(value, time_ns)) return false;
     }
@@ -142,37 +191,41 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   }
   TryWrite try_push(const T& value, time_ns_t time_ns) noexcept {
     {
-      if (!mutex_.try_lock()) return TryWrite::busy;
-      const std::lock_guard lock(mutex_, std::adopt_lock);
+      if (!writers_mutex_.try_lock()) return TryWrite::busy;
+      const std::lock_guard lock(writers_mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !put(value, time_ns)) return TryWrite::done;
     }
     this->written(time_ns);
     return TryWrite::done;
   }
+  /// Under the writers' lock.
   bool put(const T& value, time_ns_t time_ns) noexcept {
-    if (size_ == places_.size()) {
-      ++lost_;
-      if (when_full_ == WhenFull::refuse) return false;
-      first_ = (first_ + 1) % places_.size();
-      --size_;
+    const std::uint64_t tail =
+        writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
+    if (tail - writers_.head == places_.size()) {
+      writers_.head = readers_.head.load(std::memory_order_acquire);
+      if (tail - writers_.head == places_.size()) {
+        writers_.lost.fetch_add(1, std::memory_order_relaxed);
+        if (!overwrites()) return false;
+        remove(writers_.head++);  // its readers have the same lock
+      }
     }
-    Place& place = places_[(first_ + size_) % places_.size()];
+    Place& place = places_[writers_.place];
     place.value = value;
     place.time_ns = time_ns;
-    place.sequence = ++sequence_;
-    ++size_;
+    if (++writers_.place == places_.size()) writers_.place = 0;
+    writers_.tail.store(tail + 1, std::memory_order_release);
     this->log(value, time_ns);
     return true;
   }
 
-  PiMutex mutex_;
+  Writers writers_;
+  Readers readers_;
+  BiasedMutex writers_mutex_;
   WriteFloor floor_;
   std::vector<Place> places_;
-  std::size_t first_{0};
-  std::size_t size_{0};
-  std::uint64_t sequence_{0};
-  std::uint64_t lost_{0};
   WhenFull when_full_;
+  alignas(kCacheLine) BiasedMutex readers_mutex_;
 
  public:
   Read read{*this};

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 
@@ -55,9 +56,10 @@ std::string type_name() {
 
 /// What a read port remembers between its reads; a new connection starts with a fresh one.
 struct ReaderState {
-  std::uint64_t seen{0};  // sequence number of the last sample read; 0: none yet
-  std::uint32_t held{0};  // what the service keeps for the reader from read to read; 0: nothing
-  time_ns_t time_ns{0};   // writer's time of the last sample read; set by the port
+  std::uint64_t seen{0};             // sequence number of the last sample read; 0: none yet
+  std::uint32_t held{0};             // what the service keeps for the reader from read to read; 0: nothing
+  time_ns_t time_ns{0};              // writer's time of the last sample read; set by the port
+  BiasedMutex::Seat* seat{nullptr};  // the port's, if the service has given it one: ServiceBase::seat()
 
   /// Whether the sample of this number is another one than the last; remembers it. [rt]
   DataStatus look(std::uint64_t sequence) MAUVE_RT {
@@ -68,17 +70,26 @@ struct ReaderState {
 };
 
 /// The instant before which a resource takes no writes any more: what a component that is late writes to an end that a change
-/// has moved does not replace what the new owner writes. Used under the resource's lock.
+/// has moved does not replace what the new owner writes. Writers ask under the resource's lock.
+///
+/// | member      | written by   | read by | order                                                                           |
+/// | ----------- | ------------ | ------- | ------------------------------------------------------------------------------- |
+/// | instant_ns_ | commits      | writers | relaxed: the new owner writes after the commit, under the same lock as the late one |
 class WriteFloor {
  public:
   /// [rt]
-  bool admits(time_ns_t time_ns) const MAUVE_RT { return time_ns >= instant_ns_; }
+  bool admits(time_ns_t time_ns) const MAUVE_RT {
+    return time_ns >= instant_ns_.load(std::memory_order_relaxed);
+  }
   void raise(time_ns_t instant_ns) MAUVE_RT {
-    if (instant_ns > instant_ns_) instant_ns_ = instant_ns;
+    time_ns_t before_ns = instant_ns_.load(std::memory_order_relaxed);
+    while (before_ns < instant_ns &&
+           !instant_ns_.compare_exchange_weak(before_ns, instant_ns, std::memory_order_relaxed)) {
+    }
   }
 
  private:
-  time_ns_t instant_ns_{INT64_MIN};
+  std::atomic<time_ns_t> instant_ns_{INT64_MIN};
 };
 
 class Resource;
@@ -120,6 +131,18 @@ class ServiceBase {
   /// A write of an earlier time is dropped from now on. [rt] Does nothing where the service takes no values.
   virtual void raise_floor(time_ns_t /*instant_ns*/) MAUVE_RT {}
 
+  /// A port comes: whether it has a place of its own, until unseat(). What it reads or writes by that place waits for no other
+  /// port. [rt] The port is in no use; its component is parked or held.
+  virtual bool seat(BiasedMutex::Seat& /*seat*/) MAUVE_RT { return false; }
+  /// The port goes, after seat() gave it a place. [rt] As seat().
+  virtual void unseat(BiasedMutex::Seat& /*seat*/) MAUVE_RT {}
+  /// Whether a port with a place takes no lock, as things are now. [rt]
+  virtual bool is_wait_free() const MAUVE_RT { return false; }
+  /// Others than ports use the service often, e.g. an incoming topic. [setup]
+  virtual void share() noexcept {}
+  /// Prepares places for so many ports. [non-rt]
+  virtual void make_room(std::uint32_t /*ports*/) {}
+
   /// How many ports may be connected at once; 0: any number. [rt]
   virtual std::uint32_t max_ports() const MAUVE_RT { return 0; }
   /// How many are connected. [rt]
@@ -153,10 +176,10 @@ class ReadService : public ServiceBase {
     found.status = read(found.value, found.time_ns, reader);
     return found;
   }
-  /// The register a port may read by itself, at a third of a call's price; nullptr: there is none. [rt]
+  /// The register that a port with a seat may read by itself, at a third of a call's price; nullptr: there is none. [rt]
   virtual LatestRegister<T>* latest() MAUVE_RT { return nullptr; }
-  /// Gives back what is held for a reader that goes; the state is fresh afterwards. [rt]
-  virtual void let_go(ReaderState& reader) MAUVE_RT { reader = {}; }
+  /// Gives back what is held for a reader that goes; the state is fresh afterwards, but for its seat. [rt]
+  virtual void let_go(ReaderState& reader) MAUVE_RT { reader = {.seat = reader.seat}; }
 };
 
 template <Described T>
@@ -166,6 +189,10 @@ class WriteService : public ServiceBase {
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
   /// Takes a copy; false when there was no room. [rt]
   virtual bool write(const T& value, time_ns_t time_ns) MAUVE_RT = 0;
+  /// The same, of a port with a seat. [rt]
+  virtual bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& /*seat*/) MAUVE_RT {
+    return write(value, time_ns);
+  }
   /// The same without waiting for a lock; for the outputs of a component that hangs. [rt]
   virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) MAUVE_RT {
     return TryWrite::must_wait;

@@ -9,7 +9,6 @@
 #include <mutex>
 #include <vector>
 
-#include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -46,14 +45,18 @@ class WriteLog {
   static constexpr std::size_t kMost = 8192;
 
   /// Keeps writes from now on, in about so many bytes; again: in a new place, what waited is gone. [non-rt]
-  void open(std::size_t bytes, PiMutex& writers, std::size_t place_bytes = sizeof(Place),
+  template <typename Lock>
+  void open(std::size_t bytes, Lock& writers, std::size_t place_bytes = sizeof(Place),
             const Place& blank = {}) {
     auto made = std::make_unique<Ring>();
     made->places.assign(std::clamp(bytes / place_bytes, kFewest, kMost), blank);
     exchange(std::move(made), writers);
   }
   /// Keeps no more. [non-rt]
-  void close(PiMutex& writers) { exchange(nullptr, writers); }
+  template <typename Lock>
+  void close(Lock& writers) {
+    exchange(nullptr, writers);
+  }
 
   /// Keeps a write; without anybody who asked for it, that is one load. [rt] Under the writers' lock.
   template <typename Value>
@@ -91,7 +94,8 @@ class WriteLog {
     std::atomic<std::uint64_t> taken{0};
   };
 
-  void exchange(std::unique_ptr<Ring> ring, PiMutex& writers) {
+  template <typename Lock>
+  void exchange(std::unique_ptr<Ring> ring, Lock& writers) {
     const std::lock_guard lock(mutex_);
     {
       const std::lock_guard no_writer(writers);

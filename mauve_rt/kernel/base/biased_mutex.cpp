@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/base/biased_mutex.hpp"
+
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <ctime>
+#include <mutex>
+
+namespace mauve {
+
+namespace {
+
+/// [rt] Bounded as PiMutex: who holds the word inherits the priority.
+bool futex_pi(std::atomic<std::uint32_t>& word, int operation) MAUVE_RT {
+  return MAUVE_RT_TRUSTED(
+      syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&word), operation, 0, nullptr, nullptr, 0) == 0);
+}
+
+}  // namespace
+
+void BiasedMutex::Seat::take_thread() noexcept {
+  id_.store(static_cast<std::uint32_t>(MAUVE_RT_TRUSTED(gettid())), std::memory_order_relaxed);
+  thread_.store(MAUVE_RT_TRUSTED(pthread_self()), std::memory_order_relaxed);
+}
+
+/// The user has left, and somebody has taken the bias away: unlocks the futex, if that one has locked it on our behalf.
+void BiasedMutex::Seat::hand_over() noexcept {
+  inside_.store(0, std::memory_order_seq_cst);  // once more: before the look at the futex, for all
+  const std::uint32_t id = id_.load(std::memory_order_relaxed);
+  std::uint32_t mine = id;
+  if (handover_.compare_exchange_strong(mine, 0, std::memory_order_seq_cst)) return;
+  if ((mine & FUTEX_TID_MASK) == id) futex_pi(handover_, FUTEX_UNLOCK_PI_PRIVATE);
+}
+
+/// Until the user has left, which inherits the caller's priority. One thread at a time.
+void BiasedMutex::Seat::await_leave() noexcept {
+  constexpr timespec kBetweenLooks{.tv_sec = 0, .tv_nsec = 20'000};
+  for (;;) {
+    std::uint32_t user = inside_.load(std::memory_order_acquire);
+    if (user == 0) return;
+    std::uint32_t nobody = 0;
+    handover_.compare_exchange_strong(nobody, user, std::memory_order_seq_cst);
+    if (inside_.load(std::memory_order_seq_cst) == 0) {
+      handover_.compare_exchange_strong(user, 0, std::memory_order_seq_cst);
+      continue;
+    }
+    if (futex_pi(handover_, FUTEX_LOCK_PI_PRIVATE)) {
+      futex_pi(handover_, FUTEX_UNLOCK_PI_PRIVATE);
+    } else {  // a thread of another process id namespace, or one that has ended
+      handover_.store(0, std::memory_order_seq_cst);
+      MAUVE_RT_TRUSTED(clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenLooks, nullptr));
+    }
+  }
+}
+
+/// Afterwards the user of the bias is not inside, and enters by the mutex. Under the mutex.
+void BiasedMutex::revoke(Seat& granted) noexcept {
+  owner_.store(nullptr, std::memory_order_relaxed);
+  process_barrier();
+  granted.await_leave();
+}
+
+void BiasedMutex::lock() noexcept {
+  mutex_.lock();
+  if (Seat* const granted = granted_.load(std::memory_order_relaxed)) revoke(*granted);
+}
+
+/// As lock(); the bias of this seat itself needs no revocation: its user is the caller.
+void BiasedMutex::lock_with(Seat& seat) noexcept {
+  mutex_.lock();
+  Seat* const granted = granted_.load(std::memory_order_relaxed);
+  if (granted != nullptr && granted != &seat) revoke(*granted);
+}
+
+bool BiasedMutex::try_lock() noexcept {
+  if (!mutex_.try_lock()) return false;
+  const Seat* const granted = granted_.load(std::memory_order_relaxed);
+  if (granted == nullptr) return true;
+  owner_.store(nullptr, std::memory_order_relaxed);
+  process_barrier();
+  if (granted->inside_.load(std::memory_order_acquire) == 0) return true;
+  unlock();
+  return false;
+}
+
+void BiasedMutex::unlock() noexcept {
+  owner_.store(granted_.load(std::memory_order_relaxed), std::memory_order_release);
+  mutex_.unlock();
+}
+
+/// Under the mutex; unlock() carries it out.
+void BiasedMutex::grant() noexcept {
+  const bool is_alone = first_ != nullptr && first_->next_ == nullptr;
+  const bool is_biased = is_alone && !is_shared_ && has_process_barrier();
+  granted_.store(is_biased ? first_ : nullptr, std::memory_order_relaxed);
+}
+
+void BiasedMutex::add(Seat& seat) noexcept {
+  const std::lock_guard lock(*this);
+  seat.next_ = first_;
+  first_ = &seat;
+  grant();
+}
+
+void BiasedMutex::remove(Seat& seat) noexcept {
+  lock_with(seat);
+  for (Seat** place = &first_; *place != nullptr; place = &(*place)->next_) {
+    if (*place != &seat) continue;
+    *place = seat.next_;
+    break;
+  }
+  seat.next_ = nullptr;
+  grant();
+  unlock();
+}
+
+void BiasedMutex::share() noexcept {
+  const std::lock_guard lock(*this);
+  is_shared_ = true;
+  grant();
+}
+
+}  // namespace mauve

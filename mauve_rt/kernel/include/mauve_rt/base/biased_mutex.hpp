@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A priority-inheritance mutex that one of its users enters without an atomic read-modify-write.
+#pragma once
+
+#include <pthread.h>
+
+#include <atomic>
+#include <cstdint>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/process_barrier.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/this_thread.hpp"
+
+namespace mauve {
+
+/// A biased lock (K. Kawachiya, A. Koseki, T. Onodera: "Lock reservation", OOPSLA 2002) with asymmetric barriers (D. Dice,
+/// H. Huang, M. Yang: "Asymmetric Dekker synchronization", 2001).
+///
+/// Who uses the mutex often takes a seat. While one seat is taken its user enters by two plain stores and two loads. Whoever has
+/// no seat takes the bias away first, by a process_barrier(), and waits until the user has left. A user that is inside then
+/// inherits the priority of the one that waits: that one locks a futex on the user's behalf, which the user unlocks.
+/// With two seats or more nobody has the bias: all use the PI mutex.
+/// tests/models/loom explores the protocol, and has what goes wrong without each order.
+///
+/// | member          | written by                 | read by          | order                                                    |
+/// | --------------- | -------------------------- | ---------------- | -------------------------------------------------------- |
+/// | owner_          | who holds mutex_           | users of seats   | release / acquire: the user sees what the others wrote   |
+/// | granted_        | add(), remove(), share()   | any              | relaxed: under mutex_, but for who only shows it         |
+/// | first_, Seat::next_ | add(), remove()        | the same         | mutex_                                                   |
+/// | is_shared_      | share()                    | add(), remove()  | mutex_                                                   |
+/// | Seat::inside_   | the seat's user            | who holds mutex_ | after inside_ the user looks at owner_, after owner_ the other one at inside_: a barrier between each; release: who finds 0 sees what the user wrote |
+/// | Seat::handover_ | both                       | both             | seq_cst: a futex word; one of them sees the other        |
+/// | Seat::thread_, Seat::id_ | the seat's user   | any              | relaxed: the user finds what it stored itself            |
+class BiasedMutex {
+ public:
+  /// Of one thread at a time.
+  class Seat {
+   public:
+    Seat() = default;
+    Seat(const Seat&) = delete;
+    Seat& operator=(const Seat&) = delete;
+
+    /// Whether the calling thread is the one that entered by this seat last. [rt]
+    bool is_mine() const MAUVE_RT { return is_this_thread(thread_.load(std::memory_order_relaxed)); }
+
+   private:
+    friend class BiasedMutex;
+
+    std::uint32_t thread_id() MAUVE_RT {
+      if (!is_mine()) [[unlikely]]
+        take_thread();
+      return id_.load(std::memory_order_relaxed);
+    }
+    void take_thread() MAUVE_RT;
+    void hand_over() MAUVE_RT;
+    void await_leave() MAUVE_RT;
+
+    std::atomic<std::uint32_t> inside_{0};
+    std::atomic<std::uint32_t> handover_{0};
+    std::atomic<pthread_t> thread_{};  // none, as glibc never calls a thread
+    std::atomic<std::uint32_t> id_{0};
+    Seat* next_{nullptr};
+  };
+
+  /// Holds the mutex to the end of a block: by the seat, or as one of the others.
+  class Hold {
+   public:
+    /// [rt]
+    Hold(BiasedMutex& mutex, Seat* seat) MAUVE_RT : mutex_(mutex), seat_(seat) {
+      if (seat_ == nullptr) {
+        mutex_.lock();
+      } else if (!mutex_.enter(*seat_)) {
+        seat_ = nullptr;
+      }
+    }
+    ~Hold() {
+      if (seat_ != nullptr) {
+        mutex_.leave(*seat_);
+      } else {
+        mutex_.unlock();
+      }
+    }
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+
+   private:
+    BiasedMutex& mutex_;
+    Seat* seat_;  // nullptr: by lock()
+  };
+
+  BiasedMutex() = default;
+  BiasedMutex(const BiasedMutex&) = delete;
+  BiasedMutex& operator=(const BiasedMutex&) = delete;
+
+  /// As one without a seat. [rt]
+  void lock() MAUVE_RT;
+  /// Locks if nobody is inside; waits for nobody. [rt]
+  bool try_lock() MAUVE_RT;
+  /// [rt]
+  void unlock() MAUVE_RT;
+
+  /// Gives a seat. It must not move, and its user is not inside. [rt] Waits for the user of the only other seat to leave.
+  void add(Seat& seat) MAUVE_RT;
+  /// Takes a seat away; its user is not inside. [rt]
+  void remove(Seat& seat) MAUVE_RT;
+  /// From now on nobody has the bias: others than those with seats come often. [setup]
+  void share() noexcept;
+  /// Whether a seat has the bias. [rt]
+  bool is_biased() const MAUVE_RT { return granted_.load(std::memory_order_relaxed) != nullptr; }
+
+  /// The name traced when it is contended. [setup]
+  void set_trace_id(std::uint32_t id) noexcept { mutex_.set_trace_id(id); }
+
+ private:
+  /// True: by the bias, to be left by leave(). False: by lock().
+  bool enter(Seat& seat) MAUVE_RT {
+    if (owner_.load(std::memory_order_relaxed) == &seat) [[likely]] {  // relaxed: a hint
+      seat.inside_.store(seat.thread_id(), std::memory_order_relaxed);
+      light_barrier();
+      if (owner_.load(std::memory_order_acquire) == &seat) [[likely]]
+        return true;
+      leave(seat);
+    }
+    lock_with(seat);
+    return false;
+  }
+  void leave(Seat& seat) MAUVE_RT {
+    seat.inside_.store(0, std::memory_order_release);
+    light_barrier();
+    if (owner_.load(std::memory_order_relaxed) != &seat) [[unlikely]]
+      seat.hand_over();
+  }
+  void lock_with(Seat& seat) MAUVE_RT;
+  void revoke(Seat& granted) MAUVE_RT;
+  void grant() MAUVE_RT;
+
+  std::atomic<Seat*> owner_{nullptr};
+  PiMutex mutex_;
+  std::atomic<Seat*> granted_{nullptr};
+  Seat* first_{nullptr};
+  bool is_shared_{false};
+};
+
+}  // namespace mauve

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// NewestValue: what shared_data and latest_value have in common, the newest value for readers that wait for nobody.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/latest_register.hpp"
+#include "mauve_rt/data/logged_resource.hpp"
+
+namespace mauve {
+
+/// How many ports may connect to each service; 0: any number.
+struct PortLimits {
+  std::uint32_t readers{0};
+  std::uint32_t writers{0};
+};
+
+/// One value; services `read` and `write`. A port that reads is wait-free: it has a place in the register, prepared when it
+/// was connected. A single port that writes takes no lock either. All others use locks with priority inheritance.
+///
+/// | member    | used by                                                | under                                        |
+/// | --------- | ------------------------------------------------------ | -------------------------------------------- |
+/// | register_ | ports that read, each with a ReaderState               | wait-free                                    |
+/// | register_ | the serialized face, rules, readers without a port: as one more reader | others_mutex_                |
+/// | register_ | who writes                                             | writers_mutex_, biased to the only port      |
+/// | seats_    | ports that come and go                                 | relaxed: a count, nothing depends on its order |
+/// | register_.reserve() | who prepares a connection                    | room_mutex_                                  |
+template <Described T>
+class NewestValue : public LoggedResource<T, NewestResource> {
+ public:
+  /// `readers`: places for ports that are there from the start. [setup]
+  NewestValue(std::string kind, PortLimits limits, std::uint32_t readers)
+      : LoggedResource<T, NewestResource>(std::move(kind), type_name<T>()),
+        limits_(limits),
+        register_(readers + kOthers) {
+    this->offer(read);
+    this->offer(write);
+  }
+
+  void set_name(const std::string& name) override {
+    Resource::set_name(name);
+    writers_mutex_.set_trace_id(TraceNames::intern(name));
+    others_mutex_.set_trace_id(TraceNames::intern(name));
+  }
+  bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
+    auto value = std::make_unique<T>();
+    return CdrReader(message).get(*value) && write.write(*value, time_ns);
+  }
+  std::optional<NumberPlace> find_number(std::string_view path) const override {
+    return mauve::find_number<T>(path);
+  }
+  bool read_number(const NumberPlace& place, double& number) noexcept override {
+    const std::lock_guard lock(others_mutex_);
+    std::uint32_t held = 0;
+    const T* const newest = register_.look(held);
+    if (newest != nullptr) number = place.of(newest);
+    register_.let_go(held);
+    return newest != nullptr;
+  }
+
+ private:
+  static constexpr std::size_t kOthers = 1;  // one at a time, under others_mutex_
+
+  class Read final : public ReadService<T> {
+   public:
+    explicit Read(NewestValue& owner) : ReadService<T>("read"), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return owner_.limits_.readers; }
+    DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      if (reader.seat != nullptr) return owner_.register_.read(value, time_ns, reader);
+      const std::lock_guard lock(owner_.others_mutex_);
+      const DataStatus status = owner_.register_.read(value, time_ns, reader);
+      owner_.register_.let_go(reader.held);
+      return status;
+    }
+    LatestRegister<T>* latest() noexcept override { return &owner_.register_; }
+    void let_go(ReaderState& reader) noexcept override {
+      owner_.register_.let_go(reader.held);
+      reader = {.seat = reader.seat};
+    }
+    bool seat(BiasedMutex::Seat& /*seat*/) noexcept override { return owner_.take_place(); }
+    void unseat(BiasedMutex::Seat& /*seat*/) noexcept override {
+      owner_.seats_.fetch_sub(1, std::memory_order_relaxed);
+    }
+    bool is_wait_free() const noexcept override { return true; }
+    void make_room(std::uint32_t ports) override { owner_.make_room(ports); }
+
+   private:
+    NewestValue& owner_;
+  };
+  class Write final : public WriteService<T> {
+   public:
+    explicit Write(NewestValue& owner) : WriteService<T>("write"), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return owner_.limits_.writers; }
+    bool write(const T& value, time_ns_t time_ns) noexcept override {
+      return owner_.put(value, time_ns, nullptr);
+    }
+    bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& seat) noexcept override {
+      return owner_.put(value, time_ns, &seat);
+    }
+    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+      {
+        if (!owner_.writers_mutex_.try_lock()) return TryWrite::busy;
+        const std::lock_guard lock(owner_.writers_mutex_, std::adopt_lock);
+        if (!owner_.floor_.admits(time_ns) || !owner_.register_.write(value, time_ns)) return TryWrite::done;
+        owner_.log(value, time_ns);
+      }
+      owner_.written(time_ns);
+      return TryWrite::done;
+    }
+    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor_.raise(instant_ns); }
+    bool seat(BiasedMutex::Seat& seat) noexcept override {
+      owner_.writers_mutex_.add(seat);
+      return true;
+    }
+    void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.writers_mutex_.remove(seat); }
+    bool is_wait_free() const noexcept override { return owner_.writers_mutex_.is_biased(); }
+    void share() noexcept override { owner_.writers_mutex_.share(); }
+
+   private:
+    NewestValue& owner_;
+  };
+
+  BiasedMutex& writers() noexcept override { return writers_mutex_; }
+
+  bool put(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
+    {
+      const BiasedMutex::Hold hold(writers_mutex_, seat);
+      if (!floor_.admits(time_ns)) return true;
+      if (!register_.write(value, time_ns)) return false;
+      this->log(value, time_ns);
+    }
+    this->written(time_ns);
+    return true;
+  }
+  DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
+    auto value = std::make_unique<T>();
+    ReaderState reader{.seen = seen};
+    const DataStatus status = read.read(*value, time_ns, reader);
+    seen = reader.seen;
+    CdrWriter(message).put(*value);
+    return status;
+  }
+
+  /// A reader whose component was removed while a state of it hung keeps its place until that ends: it is none of the ports.
+  void make_room(std::uint32_t ports) {
+    const std::lock_guard lock(room_mutex_);
+    const std::uint32_t seats = seats_.load(std::memory_order_relaxed);
+    const std::uint32_t left_behind = seats > read.ports() ? seats - read.ports() : 0;
+    register_.reserve(ports + left_behind + kOthers);
+    room_.store(static_cast<std::uint32_t>(register_.room() - kOthers), std::memory_order_relaxed);
+  }
+  bool take_place() noexcept {
+    std::uint32_t seats = seats_.load(std::memory_order_relaxed);
+    do {
+      if (seats >= room_.load(std::memory_order_relaxed)) return false;
+    } while (!seats_.compare_exchange_weak(seats, seats + 1, std::memory_order_relaxed));
+    return true;
+  }
+
+  PortLimits limits_;
+  LatestRegister<T> register_;
+  BiasedMutex writers_mutex_;
+  WriteFloor floor_;
+  PiMutex others_mutex_;
+  std::mutex room_mutex_;
+  std::atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
+  std::atomic<std::uint32_t> seats_{0};
+
+ public:
+  Read read{*this};
+  Write write{*this};
+};
+
+}  // namespace mauve
