@@ -34,6 +34,8 @@ namespace mauve {
 /// More readers can come while it is in use: reserve() makes another table, with the same slots and new ones. Who reads the
 /// old one goes on with it, so it is kept to the end.
 ///
+/// tests/models/loom has what goes wrong without each order and each guard.
+///
 /// | member         | written by             | read by         | order                                           |
 /// | -------------- | ---------------------- | --------------- | ----------------------------------------------- |
 /// | word_          | writer, readers        | writer, readers | acq_rel: the reader finds what the writer filled, the writer finds what a reader gave back before it took |

@@ -223,15 +223,14 @@ class PortBase {
 
  private:
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread
-  static constexpr std::uint8_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16;
+  static constexpr std::uint32_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16;
 
-  bool has(std::uint8_t bits) const noexcept {
+  bool has(std::uint32_t bits) const noexcept {
     return (special_.load(std::memory_order_acquire) & bits) != 0;
   }
-  void set_special(std::uint8_t bits, std::uint8_t values) MAUVE_RT {
-    std::uint8_t before = special_.load(std::memory_order_relaxed);
-    while (!special_.compare_exchange_weak(before, static_cast<std::uint8_t>((before & ~bits) | values),
-                                           std::memory_order_acq_rel)) {
+  void set_special(std::uint32_t bits, std::uint32_t values) MAUVE_RT {
+    std::uint32_t before = special_.load(std::memory_order_relaxed);
+    while (!special_.compare_exchange_weak(before, (before & ~bits) | values, std::memory_order_acq_rel)) {
     }
   }
 
@@ -246,7 +245,7 @@ class PortBase {
   PortConnection connection_;
   const Context* context_{nullptr};
   bool optional_{false};
-  std::atomic<std::uint8_t> special_{0};
+  std::atomic<std::uint32_t> special_{0};
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service
   BiasedMutex::Seat own_seat_;

@@ -25,7 +25,7 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// Each end has a lock of its own, biased to its only port: between one writer port and one reader port it is a wait-free queue
 /// of a single producer and a single consumer (L. Lamport, 1977), each of which looks at the other one's index only when its
 /// copy of it does not suffice (P. Lee, T. Bu, G. Chandranmenon: "A lock-free, cache-efficient shared ring buffer", 2009). One that overwrites has one lock
-/// for both ends, without a bias: its writer removes elements too.
+/// for both ends, without a bias: its writer removes elements too. tests/models/loom explores the queue and its biased mutex.
 ///
 /// | member            | written by | read by    | under / order                                                    |
 /// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |
