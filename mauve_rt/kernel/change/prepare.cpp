@@ -15,6 +15,7 @@ void connect_all(Shell& shell, const std::map<std::string, Wire>& wires) {
   for (const auto& [name, wire] : wires) {
     PortBase& port = *shell.find_port(name);
     PortConnection connection = port.prepare(*wire.service, wire.resource);
+    wire.service->make_room(wire.service->ports() + 1);  // beside the old shell's ports, until the commit
     port.swap(connection);
   }
 }

@@ -90,6 +90,9 @@ TEST_F(Rule9Parts, AShellKeepsConnectionsAndPropertiesByName) {
   EXPECT_EQ(PropertyValue(std::int64_t{5}), property("c", "period_ms"));
   EXPECT_EQ(ms_to_ns(5), facts("c").period_ns);
   EXPECT_EQ(2U, architecture.resource("x").find_service("read")->ports()) << "the old shell's ports are gone";
+  for (const char* port : {"input", "second_input", "output"})
+    EXPECT_TRUE(architecture.component("c").shell().find_port(port)->is_seated()) << port;
+  EXPECT_EQ(has_process_barrier(), architecture.resource("x").find_service("write")->is_wait_free());
   expect_running("c");
   Transaction back;  // an fsm that was replaced by name is made once more by name
   back.replace_fsm("c", "t/Syncopated");

@@ -91,6 +91,8 @@ class PortBase {
   void make_optional() noexcept { optional_ = true; }
   /// [rt]
   bool is_connected() const MAUVE_RT { return connection().service != nullptr; }
+  /// Whether its service has given it a place of its own: ServiceBase::seat(). [rt]
+  bool is_seated() const MAUVE_RT { return is_seated_; }
   /// The connected service, or nullptr; for the component itself and for who connects it. [rt]
   ServiceBase* service() const MAUVE_RT { return connection().service; }
   const std::string& resource_name() const MAUVE_RT { return connection().resource; }
