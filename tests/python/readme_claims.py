@@ -1165,6 +1165,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ): (
         "LatestValueStress.ReadersSeeWholeValuesInOrder",
         "SharedData.TakesReadersWhileItIsInUse",
+        "bench: SharedData read, 16 B, against a hammering writer",
     ),
     "| `ring_buffer` | a queue; each element goes to one reader |": (
         "RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",
