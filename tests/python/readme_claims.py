@@ -1165,7 +1165,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ): (
         "LatestValueStress.ReadersSeeWholeValuesInOrder",
         "SharedData.TakesReadersWhileItIsInUse",
-        "bench: SharedData read, 16 B, against a hammering writer",
+        "bench:  B, against a hammering ",
     ),
     "| `ring_buffer` | a queue; each element goes to one reader |": (
         "RingFixture.EachElementGoesToOneReaderAndAFullRingRefuses",
