@@ -134,7 +134,7 @@ class ServiceDescription:
     type: Final[str]
     takes_messages: Final[bool]  # a call that can be a ROS service
     messages: Final[list[MessageShape]]  # a call's request and response; none where C++ has no struct
-    is_wait_free: Final[bool]  # whether a port waits for nobody, as things are
+    is_wait_free: Final[bool]  # whether a port takes no lock, as ports are connected now
 
 @final
 class ResourceDescription:

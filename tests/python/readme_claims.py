@@ -1181,7 +1181,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "bench: : reads that failed or found halves of two values",
     ),
     (
-        "**A port that is alone waits for nobody**: the only port that writes to one of these three kinds, "
+        "**A port that is alone never waits**: the only port that writes to one of these three kinds, "
         "and the only port that reads a `ring_buffer` without `overwrite`."
     ): (
         "Ring.HasALockWithTwoPortsAtAnEnd",

@@ -40,8 +40,8 @@ void BiasedMutex::Seat::await_leave() noexcept {
   for (;;) {
     std::uint32_t user = inside_.load(std::memory_order_acquire);
     if (user == 0) return;
-    std::uint32_t nobody = 0;
-    handover_.compare_exchange_strong(nobody, user, std::memory_order_seq_cst);
+    std::uint32_t unlocked = 0;
+    handover_.compare_exchange_strong(unlocked, user, std::memory_order_seq_cst);
     if (inside_.load(std::memory_order_seq_cst) == 0) {
       handover_.compare_exchange_strong(user, 0, std::memory_order_seq_cst);
       continue;

@@ -17,10 +17,10 @@ namespace mauve {
 /// A biased lock (K. Kawachiya, A. Koseki, T. Onodera: "Lock reservation", OOPSLA 2002) with asymmetric barriers (D. Dice,
 /// H. Huang, M. Yang: "Asymmetric Dekker synchronization", 2001).
 ///
-/// Who uses the mutex often takes a seat. While one seat is taken its user enters by two plain stores and two loads. Whoever has
-/// no seat takes the bias away first, by a process_barrier(), and waits until the user has left. A user that is inside then
-/// inherits the priority of the one that waits: that one locks a futex on the user's behalf, which the user unlocks.
-/// With two seats or more nobody has the bias: all use the PI mutex.
+/// A frequent user takes a seat. While one seat is taken, its user enters by two plain stores and two loads: it has the bias.
+/// A caller without a seat first takes the bias away, by a process_barrier(), and waits until the user has left. A user that is
+/// inside then inherits the priority of that caller: the caller locks a futex on the user's behalf, which the user unlocks.
+/// With two seats or more no seat has the bias: all users take the PI mutex.
 /// tests/models/loom explores the protocol, and has what goes wrong without each order.
 ///
 /// | member          | written by                 | read by          | order                                                    |
@@ -95,7 +95,7 @@ class BiasedMutex {
 
   /// As one without a seat. [rt]
   void lock() MAUVE_RT;
-  /// Locks if nobody is inside; waits for nobody. [rt]
+  /// Locks if no user is inside; never waits. [rt]
   bool try_lock() MAUVE_RT;
   /// [rt]
   void unlock() MAUVE_RT;
@@ -104,7 +104,7 @@ class BiasedMutex {
   void add(Seat& seat) MAUVE_RT;
   /// Takes a seat away; its user is not inside. [rt]
   void remove(Seat& seat) MAUVE_RT;
-  /// From now on nobody has the bias: others than those with seats come often. [setup]
+  /// From now on no seat has the bias: callers without a seat are frequent. [setup]
   void share() noexcept;
   /// Whether a seat has the bias. [rt]
   bool is_biased() const MAUVE_RT { return granted_.load(std::memory_order_relaxed) != nullptr; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// NewestValue: what shared_data and latest_value have in common, the newest value for readers that wait for nobody.
+// NewestValue: what shared_data and latest_value have in common, the newest value for readers that never wait.
 #pragma once
 
 #include <atomic>
@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/latest_register.hpp"
 #include "mauve_rt/data/logged_resource.hpp"
 
@@ -31,7 +31,7 @@ struct PortLimits {
 /// | --------- | ------------------------------------------------------ | -------------------------------------------- |
 /// | register_ | ports that read, each with a ReaderState               | wait-free                                    |
 /// | register_ | the serialized face, rules, readers without a port: as one more reader | others_mutex_                |
-/// | register_ | who writes                                             | writers_mutex_, biased to the only port      |
+/// | register_ | who writes                                             | write.mutex(), biased to the only port       |
 /// | seats_    | ports that come and go                                 | relaxed: a count, nothing depends on its order |
 /// | register_.reserve() | who prepares a connection                    | room_mutex_                                  |
 template <Described T>
@@ -48,7 +48,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
 
   void set_name(const std::string& name) override {
     Resource::set_name(name);
-    writers_mutex_.set_trace_id(TraceNames::intern(name));
+    write.mutex().set_trace_id(TraceNames::intern(name));
     others_mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
@@ -96,49 +96,13 @@ class NewestValue : public LoggedResource<T, NewestResource> {
    private:
     NewestValue& owner_;
   };
-  class Write final : public WriteService<T> {
-   public:
-    explicit Write(NewestValue& owner) : WriteService<T>("write"), owner_(owner) {}
-    std::uint32_t max_ports() const noexcept override { return owner_.limits_.writers; }
-    bool write(const T& value, time_ns_t time_ns) noexcept override {
-      return owner_.put(value, time_ns, nullptr);
-    }
-    bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& seat) noexcept override {
-      return owner_.put(value, time_ns, &seat);
-    }
-    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
-      {
-        if (!owner_.writers_mutex_.try_lock()) return TryWrite::busy;
-        const std::lock_guard lock(owner_.writers_mutex_, std::adopt_lock);
-        if (!owner_.floor_.admits(time_ns) || !owner_.register_.write(value, time_ns)) return TryWrite::done;
-        owner_.log(value, time_ns);
-      }
-      owner_.written(time_ns);
-      return TryWrite::done;
-    }
-    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor_.raise(instant_ns); }
-    bool seat(BiasedMutex::Seat& seat) noexcept override {
-      owner_.writers_mutex_.add(seat);
-      return true;
-    }
-    void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.writers_mutex_.remove(seat); }
-    bool is_wait_free() const noexcept override { return owner_.writers_mutex_.is_biased(); }
-    void share() noexcept override { owner_.writers_mutex_.share(); }
+  friend class BiasedWrite<T, NewestValue>;
 
-   private:
-    NewestValue& owner_;
-  };
+  BiasedMutex& writers() noexcept override { return write.mutex(); }
 
-  BiasedMutex& writers() noexcept override { return writers_mutex_; }
-
-  bool put(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
-    {
-      const BiasedMutex::Hold hold(writers_mutex_, seat);
-      if (!floor_.admits(time_ns)) return true;
-      if (!register_.write(value, time_ns)) return false;
-      this->log(value, time_ns);
-    }
-    this->written(time_ns);
+  bool take(const T& value, time_ns_t time_ns) noexcept {
+    if (!register_.write(value, time_ns)) return false;
+    this->log(value, time_ns);
     return true;
   }
   DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
@@ -168,8 +132,6 @@ class NewestValue : public LoggedResource<T, NewestResource> {
 
   PortLimits limits_;
   LatestRegister<T> register_;
-  BiasedMutex writers_mutex_;
-  WriteFloor floor_;
   PiMutex others_mutex_;
   std::mutex room_mutex_;
   std::atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
@@ -177,7 +139,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
 
  public:
   Read read{*this};
-  Write write{*this};
+  BiasedWrite<T, NewestValue> write{*this, limits_.writers};
 };
 
 }  // namespace mauve

@@ -11,6 +11,7 @@
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
 
@@ -30,7 +31,7 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// | member            | written by | read by    | under / order                                                    |
 /// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |
 /// | places_           | writers    | readers    | a place between head_ and tail_ is its reader's, else its writer's |
-/// | Writers::tail     | writers    | readers    | writers_mutex_; release / acquire: publishes the place           |
+/// | Writers::tail     | writers    | readers    | write.mutex(); release / acquire: publishes the place           |
 /// | Readers::head     | readers    | writers    | readers_mutex_; release / acquire: the place may be filled again |
 /// | the rest of both  | the same   | the same   | that mutex                                                       |
 /// | Writers::lost     | writers    | any        | relaxed: a figure that nothing depends on                        |
@@ -44,14 +45,14 @@ class RingBuffer final : public LoggedResource<T, Resource> {
       throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
                   {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
     }
-    if (overwrites()) writers_mutex_.share();
+    if (overwrites()) write.mutex().share();
     this->offer(read);
     this->offer(write);
   }
 
   void set_name(const std::string& name) override {
     Resource::set_name(name);
-    writers_mutex_.set_trace_id(TraceNames::intern(name));
+    write.mutex().set_trace_id(TraceNames::intern(name));
     readers_mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool is_serializable() const noexcept override { return true; }
@@ -72,7 +73,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
     auto value = std::make_unique<T>();
     {
-      const std::lock_guard lock(writers_mutex_);
+      const std::lock_guard lock(write.mutex());
       const Place& newest = places_[(writers_.place == 0 ? places_.size() : writers_.place) - 1];
       *value = newest.value;
       time_ns = newest.time_ns;
@@ -128,36 +129,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
    private:
     RingBuffer& owner_;
   };
-  class Write final : public WriteService<T> {
-   public:
-    explicit Write(RingBuffer& owner) : WriteService<T>("write"), owner_(owner) {}
-    bool write(const T& value, time_ns_t time_ns) noexcept override {
-      return owner_.push(value, time_ns, nullptr);
-    }
-    bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& seat) noexcept override {
-      return owner_.push(value, time_ns, &seat);
-    }
-    TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
-      return owner_.try_push(value, time_ns);
-    }
-    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor_.raise(instant_ns); }
-    bool seat(BiasedMutex::Seat& seat) noexcept override {
-      owner_.writers_mutex_.add(seat);
-      return true;
-    }
-    void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.writers_mutex_.remove(seat); }
-    bool is_wait_free() const noexcept override { return owner_.writers_mutex_.is_biased(); }
-    void share() noexcept override { owner_.writers_mutex_.share(); }
+  friend class BiasedWrite<T, RingBuffer>;
 
-   private:
-    RingBuffer& owner_;
-  };
-
-  BiasedMutex& writers() noexcept override { return writers_mutex_; }
+  BiasedMutex& writers() noexcept override { return write.mutex(); }
   bool overwrites() const noexcept { return when_full_ == WhenFull::overwrite; }
 
   DataStatus pop(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    const BiasedMutex::Hold hold(overwrites() ? writers_mutex_ : readers_mutex_, reader.seat);
+    const BiasedMutex::Hold hold(overwrites() ? write.mutex() : readers_mutex_, reader.seat);
     const std::uint64_t head =
         readers_.head.load(std::memory_order_relaxed);  // relaxed: written under this lock
     if (readers_.tail == head) {
@@ -180,26 +158,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     if (++readers_.place == places_.size()) readers_.place = 0;
     readers_.head.store(head + 1, std::memory_order_release);
   }
-  bool push(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
-    {
-      const BiasedMutex::Hold hold(writers_mutex_, seat);
-      if (!floor_.admits(time_ns)) return true;
-      if (!put(value, time_ns)) return false;
-    }
-    this->written(time_ns);
-    return true;
-  }
-  TryWrite try_push(const T& value, time_ns_t time_ns) noexcept {
-    {
-      if (!writers_mutex_.try_lock()) return TryWrite::busy;
-      const std::lock_guard lock(writers_mutex_, std::adopt_lock);
-      if (!floor_.admits(time_ns) || !put(value, time_ns)) return TryWrite::done;
-    }
-    this->written(time_ns);
-    return TryWrite::done;
-  }
   /// Under the writers' lock.
-  bool put(const T& value, time_ns_t time_ns) noexcept {
+  bool take(const T& value, time_ns_t time_ns) noexcept {
     const std::uint64_t tail =
         writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
     if (tail - writers_.head == places_.size()) {
@@ -221,15 +181,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
 
   Writers writers_;
   Readers readers_;
-  BiasedMutex writers_mutex_;
-  WriteFloor floor_;
   std::vector<Place> places_;
   WhenFull when_full_;
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
  public:
   Read read{*this};
-  Write write{*this};
+  alignas(kCacheLine) BiasedWrite<T, RingBuffer> write{*this};
 };
 
 /// As architectures name and make it. All functions [setup].

@@ -9,7 +9,7 @@
 
 namespace mauve {
 
-/// One value; services `read` and `write`, any number of each. Readers wait for nobody; writers among themselves have a lock
+/// One value; services `read` and `write`, any number of each. Readers never wait; writers among themselves have a lock
 /// with priority inheritance.
 template <Described T>
 class SharedData final : public NewestValue<T> {

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// BiasedWrite: the service `write` of a resource, for its only port without a lock.
+#pragma once
+
+#include <mutex>
+#include <string>
+
+#include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/service.hpp"
+
+namespace mauve {
+
+/// Keeps writers apart. The resource has `bool take(value, time_ns)`, which it calls under mutex(), and written().
+///
+/// | member | written by             | under   |
+/// | ------ | ---------------------- | ------- |
+/// | floor_ | commits                | its own |
+template <Described T, typename Owner>
+class BiasedWrite final : public WriteService<T> {
+ public:
+  /// `max_ports`: 0: any number. [setup]
+  explicit BiasedWrite(Owner& owner, std::uint32_t max_ports = 0)
+      : WriteService<T>("write"), owner_(owner), max_ports_(max_ports) {}
+
+  std::uint32_t max_ports() const noexcept override { return max_ports_; }
+  bool write(const T& value, time_ns_t time_ns) noexcept override { return put(value, time_ns, nullptr); }
+  bool write_seated(const T& value, time_ns_t time_ns, BiasedMutex::Seat& seat) noexcept override {
+    return put(value, time_ns, &seat);
+  }
+  TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
+    {
+      if (!mutex_.try_lock()) return TryWrite::busy;
+      const std::lock_guard lock(mutex_, std::adopt_lock);
+      if (!floor_.admits(time_ns) || !owner_.take(value, time_ns)) return TryWrite::done;
+    }
+    owner_.written(time_ns);
+    return TryWrite::done;
+  }
+  void raise_floor(time_ns_t instant_ns) noexcept override { floor_.raise(instant_ns); }
+  bool seat(BiasedMutex::Seat& seat) noexcept override {
+    mutex_.add(seat);
+    return true;
+  }
+  void unseat(BiasedMutex::Seat& seat) noexcept override { mutex_.remove(seat); }
+  bool is_wait_free() const noexcept override { return mutex_.is_biased(); }
+  void share() noexcept override { mutex_.share(); }
+
+  /// What every writer holds. [rt]
+  BiasedMutex& mutex() MAUVE_RT { return mutex_; }
+
+ private:
+  bool put(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
+    {
+      const BiasedMutex::Hold hold(mutex_, seat);
+      if (!floor_.admits(time_ns)) return true;
+      if (!owner_.take(value, time_ns)) return false;
+    }
+    owner_.written(time_ns);
+    return true;
+  }
+
+  Owner& owner_;
+  std::uint32_t max_ports_;
+  BiasedMutex mutex_;
+  WriteFloor floor_;
+};
+
+}  // namespace mauve
