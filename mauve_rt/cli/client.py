@@ -102,6 +102,8 @@ class Client:
         offered = self._discovery.offered()  # before the next look, which sees whether anything came since
         if not self._discovery.is_complete() or service in offered:
             return False  # in the second case its endpoints are being matched
+        if service.rpartition("/")[0] in self._discovery.nodes():
+            return False  # on a loaded machine a node's services arrive seconds after its name
         return bool(_executors(offered)) or waited_s >= STARTING_S
 
     def _unanswered(self, service: str) -> str:

@@ -9,6 +9,7 @@ every participant has a port of those that RTPS defines.
 import os
 import resource
 import time
+from collections import Counter
 from typing import NamedTuple
 
 import rclpy
@@ -64,15 +65,24 @@ class Discovery:
             if participant.node.count_services(name)  # clients have such names too
         }
 
+    def nodes(self) -> Counter[str]:
+        """The full name of each node that any of ours knows, with the number of nodes that have it."""
+        nodes: Counter[str] = Counter()
+        for participant in self.participants:
+            pairs = participant.node.get_node_names_and_namespaces()
+            nodes |= Counter(f"{namespace.rstrip('/')}/{name}" for name, namespace in pairs)
+        return nodes
+
     def is_complete(self) -> bool:
         """Whether every participant is known, with all it has; False where they cannot be counted."""
         now = time.monotonic()
-        known = self._known()
+        known, nodes = self._known(), self.nodes()
         services = [participant.node.get_service_names_and_types() for participant in self.participants]
-        seen = (known, services)
+        seen = (known, nodes, services)
         if seen != self._seen:
             self._seen, self._seen_s = seen, now
-        return self._can_count and len(known) >= self._count() and now - self._seen_s >= _SETTLED_S
+        is_all = len(known) >= self._count() and nodes.total() >= len(known)  # each has a node at least
+        return self._can_count and is_all and now - self._seen_s >= _SETTLED_S
 
     def hurry(self) -> None:
         """Speak anew, when it is time and somebody is there whom we do not know."""

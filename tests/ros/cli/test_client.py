@@ -4,6 +4,7 @@ import contextlib
 import signal
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -93,6 +94,7 @@ def test_an_interrupt_inside_of_rclpy_is_not_lost(peer: Peer) -> None:
 
 
 LONG_S = 1000.0  # far beyond this test's own time-out
+STEADY = 100  # polls, each 10 ms at least: far beyond the time for which a complete graph must be steady
 
 
 def _list(peer: Peer, name: str) -> None:
@@ -134,6 +136,46 @@ def test_an_executor_that_is_seen_between_two_looks_is_no_wrong_name(
     with connected() as client:
         client.call(ListComponents, "/late/executor/list_components", ListComponents.Request())
     assert looks
+
+
+def test_a_node_whose_services_arrive_late_is_no_wrong_name(
+    peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(client_module, "STARTING_S", 0.0)
+    _list(peer, "/other/executor")
+    peer.start()
+    poll = Discovery.is_complete
+    polls: list[bool] = []
+
+    def poll_and_begin_at_the_fifth(discovery: Discovery) -> bool:
+        is_complete = poll(discovery)
+        polls.append(is_complete)
+        if polls.count(True) == 5:
+            _list(peer, "/peer")
+        return is_complete
+
+    monkeypatch.setattr(Discovery, "is_complete", poll_and_begin_at_the_fifth)
+    with connected() as client:
+        client.call(ListComponents, "/peer/list_components", ListComponents.Request())
+    assert polls.count(True) >= 5
+
+
+def test_a_participant_is_known_when_its_nodes_are(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    peer.start()
+    nodes = Discovery.nodes
+    polls: list[int] = []
+
+    def nodes_much_later(discovery: Discovery) -> Counter[str]:
+        polls.append(1)
+        known = nodes(discovery)
+        return known if len(polls) >= STEADY else Counter(list(known)[:1])
+
+    monkeypatch.setattr(Discovery, "nodes", nodes_much_later)
+    with connected() as client:
+        assert client.find_executors(wait_s=LONG_S) == []
+    assert len(polls) >= STEADY
 
 
 def test_executors_are_told_as_soon_as_all_are_known(
