@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Add up the JUnit files of a test run and print `N passed, N failed, N skipped`.
+"""Add up the JUnit files of a test run and print its failed cases and `N passed, N failed, N skipped`.
 
     scripts/count_results.py [--failed-stages N] FOLDER
     scripts/count_results.py --skipped FILE     print the skipped cases of a ctest run and why
@@ -19,6 +19,8 @@ import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+
+MOST_LINES, MOST_CHARACTERS = 40, 300  # of a failed case's output
 
 
 def outcome(case: ET.Element) -> str:
@@ -53,15 +55,29 @@ def cases_of(folder: Path) -> Iterator[tuple[str, ET.Element]]:
             yield path.stem, case
 
 
+def name_of(case: ET.Element) -> str:
+    """Return the name of a case with its group: ctest repeats the name as the group."""
+    group, name = case.get("classname") or "", case.get("name") or ""
+    return name if group in ("", name) else f"{group}::{name}"
+
+
 def print_slowest(folder: Path, count: int) -> None:
     """Print one line per case, the slowest first."""
-    cases = [
-        (float(case.get("time") or 0), stage, case.get("classname") or "", case.get("name") or "")
-        for stage, case in cases_of(folder)
-    ]
-    for seconds, stage, group, name in sorted(cases, reverse=True)[:count]:
-        shown = name if group in ("", name) else f"{group}::{name}"  # ctest repeats the name
-        sys.stdout.write(f"{seconds:7.1f} s  {stage:7} {shown}\n")
+    cases = [(float(case.get("time") or 0), stage, name_of(case)) for stage, case in cases_of(folder)]
+    for seconds, stage, name in sorted(cases, reverse=True)[:count]:
+        sys.stdout.write(f"{seconds:7.1f} s  {stage:7} {name}\n")
+
+
+def print_failed(folder: Path) -> None:
+    """Print each failed case with the end of its output: the log of a long run may be cut before it."""
+    for stage, case in cases_of(folder):
+        if outcome(case) != "failed":
+            continue
+        texts = [case.findtext("failure"), case.findtext("error"), case.findtext("system-out")]
+        lines = "\n".join(text for text in texts if text).splitlines()
+        sys.stdout.write(f"FAILED {stage}: {name_of(case)}\n")
+        for line in lines[-MOST_LINES:]:
+            sys.stdout.write(f"    {line[:MOST_CHARACTERS]}\n")
 
 
 def main() -> int:
@@ -81,6 +97,7 @@ def main() -> int:
         with contextlib.suppress(BrokenPipeError):  # `| head`
             print_slowest(arguments.path, arguments.slowest)
         return 0
+    print_failed(arguments.path)
     counts = Counter(outcome(case) for _, case in cases_of(arguments.path))
     if arguments.failed_stages and not counts["failed"]:
         counts["failed"] = arguments.failed_stages

@@ -288,3 +288,18 @@ def test_the_slowest_cases_are_listed(tmp_path: Path):
     said = subprocess.run(words, check=True, capture_output=True, text=True).stdout
     assert said == "    3.2 s  python  tests.x::slow\n    2.0 s  kernel  a.B\n"
     assert "--slowest 30" in (SCRIPTS / "test").read_text("utf-8")
+
+
+def test_failed_cases_are_named_with_the_end_of_their_output(tmp_path: Path):
+    out = "<system-out>" + "\n".join(f"line {i}" for i in range(100)) + "</system-out>"
+    kernel = f'<testsuite><testcase name="a.B" classname="a.B" status="fail">{out}</testcase></testsuite>'
+    (tmp_path / "tsan.xml").write_text(kernel)
+    (tmp_path / "python.xml").write_text('<testsuite><testcase classname="tests.x" name="good"/></testsuite>')
+    words = [sys.executable, SCRIPTS / "count_results.py", tmp_path]
+    done = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    first, *lines, last = done.stdout.splitlines()
+    assert first == "FAILED tsan: a.B"
+    assert lines[-1] == "    line 99"
+    assert len(lines) < 100
+    assert last == "1 passed, 1 failed, 0 skipped"
