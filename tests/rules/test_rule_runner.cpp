@@ -185,9 +185,15 @@ TYPED_TEST(RuleRunnerTest, DoesAndUndoes) {
   EXPECT_GE(done.decision.stamp_ns - done.decision.cause_ns, 0);
   this->beat.write.write({}, 1);
   this->see("done");
-  EXPECT_EQ("t/Core", this->present());
-  EXPECT_THAT(this->words,
-              ElementsAre("armed", "condition_true", "do", "done", "condition_false", "undo", "done"));
+  const auto undo = std::find(this->words.begin(), this->words.end(), "undo");
+  const auto undone =
+      std::find(undo, this->words.end(), "done");  // where the computer stalls, silence is first
+  ASSERT_NE(this->words.end(), undone);
+  const auto& report = this->whole[static_cast<std::size_t>(undone - this->words.begin())].action.report;
+  ASSERT_TRUE(report);
+  EXPECT_EQ("t/Core", report->steps.at(0).to_core);
+  EXPECT_THAT(std::vector(this->words.begin(), undo + 1),
+              ElementsAre("armed", "condition_true", "do", "done", "condition_false", "undo"));
 }
 
 When too_high(double above = 3.0) {
