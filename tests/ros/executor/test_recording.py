@@ -96,11 +96,16 @@ def test_a_bag_begun_and_ended_while_the_executor_runs(executor: ExecutorProcess
     }
 
 
+def children_of(executor: ExecutorProcess) -> list[int]:
+    """The processes that the executor has started and that have not been waited for."""
+    threads = Path(f"/proc/{executor.process.pid}/task").glob("*/children")
+    return [int(child) for file in threads for child in file.read_text("utf-8").split()]
+
+
 def test_a_keeper_writes_the_bag(executor: ExecutorProcess, graph: Any, tmp_path: Path):
     def keepers() -> list[str]:
-        children = Path(f"/proc/{executor.process.pid}/task").glob("*/children")
-        ids = [child for file in children for child in file.read_text("utf-8").split()]
-        return [name for child in ids if (name := Path(f"/proc/{child}/comm").read_text("utf-8").strip())]
+        names = [Path(f"/proc/{child}/comm").read_text("utf-8").strip() for child in children_of(executor)]
+        return [name for name in names if name]
 
     assert keepers() == []
     assert start(graph, bag="kept").success
@@ -183,7 +188,9 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     graph.spin_until(lambda: file.stat().st_size > ROOM, "records on the disk")
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     limit = file.stat().st_size + MORE
-    resource.prlimit(executor.process.pid, resource.RLIMIT_FSIZE, (limit, hard))
+    (keeper,) = children_of(executor)  # it writes the file
+    for process in (executor.process.pid, keeper):
+        resource.prlimit(process, resource.RLIMIT_FSIZE, (limit, hard))
     told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
 
     def failed() -> bool:
