@@ -74,7 +74,7 @@ def component_info(
         generation=code[0],
         built_ns=code[1],
         probations=[_probation(record) for record in probations],
-        shadows=[_shadow(record) for record in shadows],
+        shadows=[shadow_message(record) for record in shadows],
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
@@ -200,7 +200,8 @@ def _probation(record: ProbationRecord) -> Any:
     )
 
 
-def _shadow(record: ShadowRecord) -> Any:
+def shadow_message(record: ShadowRecord) -> Any:
+    """Shadow as the kernel describes it."""
     return Shadow(
         component=record.component,
         core=record.core,

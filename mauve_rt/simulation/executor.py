@@ -22,6 +22,7 @@ from mauve_rt.interfaces.descriptions import (
     trace_architecture,
 )
 from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.interfaces.told_decisions import DECISION_TYPE, Done
 from mauve_rt.model import load_architecture
 from mauve_rt.model.schema import ResourceModel, TopicModel
@@ -88,6 +89,7 @@ class SimulatedExecutor:
         self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
         self._values = RecordedValues(self._runtime, choose(self._runtime, model.recorded, self.name))
         self._values.keep_messages(on=True)
+        self._shadows = RecordedShadows(self._runtime, self.name, serialize)
         self._rules_file = RulesFile(rules) if rules is not None else None
         if self._rules_file is not None:
             rule_actions(self._rules_file, self._runtime)  # whether they can be used
@@ -190,7 +192,7 @@ class SimulatedExecutor:
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
         waiting, self._waiting = self._waiting, []
-        waiting += self._values.take_messages()
+        waiting += [*self._values.take_messages(), *self._shadows.take_messages()]
         drain = self._runtime.host.drain_trace()
         if self._architecture:
             self._bag.tell_architecture(self._architecture, drain)

@@ -21,6 +21,7 @@ from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.interfaces.descriptions import trace_architecture
 from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.model import message_class
 from mauve_rt.model.schema import QOS_NAMES
 from mauve_rt.node.executor.bound_resources import BoundResources
@@ -38,6 +39,7 @@ _OWN = {  # recorded in any case
     "~/state": "mauve_msgs/msg/ArchitectureState",
     "~/events": "mauve_msgs/msg/ReconfigurationEvent",
     "~/decisions": "mauve_msgs/msg/SupervisorDecision",
+    "~/shadow": "mauve_msgs/msg/Shadow",
     "~/trace/batches": "mauve_msgs/msg/TraceBatch",
     "~/trace/names": "mauve_msgs/msg/TraceNames",
     "~/trace/architecture": "mauve_msgs/msg/TraceArchitecture",
@@ -75,6 +77,7 @@ class Recording:
     | member           | written by       | guarded by      |
     | ---------------- | ---------------- | --------------- |
     | `_recorder`      | start(), stop()  | exchanged whole |
+    | `_shadows`       | start()          | `_lock`         |
     | `_subscriptions` | start(), stop()  | `_lock`         |
     | `_chosen`        | start(), stop()  | exchanged whole |
     | `_told`          | look()           |                 |
@@ -91,6 +94,7 @@ class Recording:
         self._data_group = data_group
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
+        self._shadows: RecordedShadows | None = None
         self._last: RecordingStatus | None = None
         self._subscriptions: list[Any] = []
         self._chosen: tuple[ChosenTopic, ...] = ()
@@ -125,13 +129,14 @@ class Recording:
         with self._lock:
             self.stop()
             self._subscribe(chosen)  # first: what is refused here leaves no folder behind
+            self._shadows = RecordedShadows(self._runtime, name, _serialized)
             recorder = Recorder(
                 self._runtime.host,
                 bag.absolute(),
                 node_name=name,
                 split=split,
                 on_error=self._node.get_logger().error,
-                messages=_Sources(self._bound, RecordedValues(self._runtime, recorded)),
+                messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), self._shadows),
                 keeper=keeper_program(),
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
@@ -145,6 +150,8 @@ class Recording:
             recorder = self._recorder
             self._unsubscribe()
             if recorder is not None:
+                if self._shadows is not None:
+                    self._shadows.finish()
                 recorder.stop()
                 self._last = self.status()
                 self._recorder = None
@@ -194,7 +201,7 @@ class Recording:
             recorder.tell_architecture(self._architecture(observed))
 
     def _architecture(self, observed: Observed) -> bytes:
-        return bytes(serialize_message(trace_architecture(self._runtime, observed)))
+        return _serialized(trace_architecture(self._runtime, observed))
 
     def _choose(self, topics: Sequence[str]) -> Iterator[ChosenTopic]:
         """Each topic once; those that are recorded in any case are left out."""
@@ -285,6 +292,10 @@ class Recording:
 
     def _warn(self, topic: ChosenTopic, what: str) -> None:
         self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
+
+
+def _serialized(message: Any) -> bytes:
+    return bytes(serialize_message(message))
 
 
 class _Sources:

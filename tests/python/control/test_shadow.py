@@ -1,15 +1,21 @@
-"""A candidate core in the shadow of a component, as requests ask for it; threads and virtual time."""
+"""A candidate core in the shadow of a component: by requests, and in bags; threads and virtual time."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
+from rclpy.serialization import deserialize_message
 from rebuilt_package import RebuiltPackage
 from reload_world import World, make_world_of_bad_cores
 
+from mauve_msgs.msg import Shadow
 from mauve_rt._kernel import ShadowRecord
 from mauve_rt.control.requests import Code, Step
 from mauve_rt.interfaces.descriptions import component_infos
+from mauve_rt.interfaces.recorded_shadows import RecordedShadows
+from mauve_rt.simulation.messages import serialize
 
 BUDGET = "{budget_us: 50000}"
 
@@ -86,3 +92,90 @@ def test_what_makes_no_sense_is_refused(world: World) -> None:
         assert not outcome.success, step
         assert words in outcome.message
         assert code in (None, outcome.code)
+
+
+class Bag:
+    """What a recorder takes, each message with its time in ns."""
+
+    def __init__(self, world: World) -> None:
+        self.source = RecordedShadows(world.runtime, "/executor", serialize)
+        self.source.keep_messages(on=True)
+        self.found: list[tuple[int, Any]] = []
+        self._world = world
+
+    def take(self, duration_ms: int = 0) -> int:
+        """Let time pass, then take; returns how many messages there were."""
+        self._world.run(duration_ms)
+        taken = self.source.take_messages()
+        assert {(one.topic, one.type_name) for one in taken} <= {
+            ("/executor/shadow", "mauve_msgs/msg/Shadow")
+        }
+        self.found += [(one.monotonic_ns, deserialize_message(one.data, Shadow)) for one in taken]
+        return len(taken)
+
+    def verdicts(self) -> list[int]:
+        return [message.verdict for _, message in self.found]
+
+
+def test_a_bag_has_a_message_each_second_and_one_after_the_end(world: World) -> None:
+    bag = Bag(world)
+    assert bag.take() == 0
+    _shadow(world, "Louder")
+    while len(bag.found) < 3:
+        bag.take(50)
+    assert world.ask(Step("end_shadow", "loop")).success
+    while bag.take(50) or bag.verdicts()[-1] == Shadow.RUNNING:
+        pass
+    running = bag.verdicts().count(Shadow.RUNNING)
+    assert bag.verdicts()[:running] == [Shadow.RUNNING] * running
+    times = [time_ns for time_ns, _ in bag.found[:running]]
+    assert min(after - before for before, after in pairwise(times)) >= 1_000_000_000
+    counts = [message.compared for _, message in bag.found]
+    assert counts == sorted(counts)
+    record = _record(world, verdict="ended")
+    _, last = bag.found[-1]
+    assert (last.verdict, last.reason, last.end_ns) == (Shadow.ENDED, record.reason, record.end_ns)
+    assert (last.compared, last.outputs[0].maximum) == (
+        record.compared,
+        record.outputs[0].numbers[0].maximum,
+    )
+    assert bag.take(1100) == 0, "it has ended"
+
+
+def test_a_bag_that_ends_has_the_last_figures_of_a_shadow_that_runs(world: World) -> None:
+    bag = Bag(world)
+    _shadow(world, "Louder")
+    _record(world, compared=5)
+    assert bag.take() == 1
+    _record(world, compared=bag.found[0][1].compared + 1)
+    bag.source.finish()
+    assert bag.take() == 1
+    first, last = (message.compared for _, message in bag.found)
+    assert bag.verdicts() == [Shadow.RUNNING] * 2
+    assert last > first
+
+
+def test_a_bag_has_the_shadows_of_its_own_time(world: World) -> None:
+    _shadow(world, "Throws")
+    before = _record(world, verdict="faulted")
+    bag = Bag(world)
+    assert bag.take() == 0
+    _shadow(world, "Louder")
+    _record(world, compared=1)
+    assert bag.take() == 1
+    _, message = bag.found[0]
+    assert message.core == "reload_tests/Louder"
+    assert message.begin_ns > before.end_ns
+
+
+def test_the_shadow_of_a_removed_component_has_ended(world: World) -> None:
+    bag = Bag(world)
+    _shadow(world, "Louder")
+    _record(world, compared=5)
+    assert bag.take() == 1
+    outcome = world.ask(Step("stop", "loop"), Step("remove_component", "loop"))
+    assert outcome.success, outcome.message
+    assert [bag.take(), bag.take()] == [1, 0]
+    _, last = bag.found[-1]
+    assert (last.verdict, last.reason) == (Shadow.ENDED, "the component was removed")
+    assert last.end_ns > last.begin_ns

@@ -1,0 +1,79 @@
+"""The shadows of an executor's components as messages for its bag."""
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from typing import Any, NamedTuple
+
+from mauve_msgs.msg import Shadow
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.interfaces.descriptions import shadow_message
+from mauve_rt.trace.bag.recorded import SentMessage
+
+_PERIOD_NS = 1_000_000_000
+
+
+class _Recorded(NamedTuple):
+    message: Any
+    time_ns: int
+
+
+class RecordedShadows:
+    """A source of messages for a recorder. All but `finish` for one thread.
+
+    A shadow that runs has a message once a second, and one more after its end. A shadow that ends and is
+    replaced between two calls of take_messages() has no message after its end.
+    """
+
+    def __init__(self, runtime: Runtime, node_name: str, serialize: Callable[[Any], bytes]) -> None:
+        """`node_name`: the executor's; `serialize`: makes CDR of a message."""
+        self._runtime = runtime
+        self._topic = f"{node_name}/shadow"
+        self._serialize = serialize
+        self._seen: dict[str, Any] = {}  # by component, as of the last call
+        self._recorded: dict[str, _Recorded] = {}  # by component
+        self._is_finishing = False
+
+    def keep_messages(self, *, on: bool) -> None:
+        """Begin with the shadows that run now: a shadow that has ended is not of this bag."""
+        if on:
+            ended = {name: one for name, one in self._found().items() if one.verdict != Shadow.RUNNING}
+            self._recorded = {name: _Recorded(message, 0) for name, message in ended.items()}
+
+    def finish(self) -> None:
+        """Give the present figures with each take_messages() from now on: the recording ends. Any thread."""
+        self._is_finishing = True
+
+    def take_messages(self) -> Sequence[SentMessage]:
+        """What is due since the last call."""
+        found = self._found()
+        if not found and not self._seen:
+            return ()
+        now_ns = self._runtime.host.now_ns()
+        for name, message in self._seen.items():
+            if name not in found and message.verdict == Shadow.RUNNING:
+                found[name] = ended = copy(message)
+                ended.verdict, ended.end_ns, ended.reason = Shadow.ENDED, now_ns, "the component was removed"
+        self._seen = found
+        due = [(name, message) for name, message in found.items() if self._is_due(name, message, now_ns)]
+        self._recorded |= {name: _Recorded(message, now_ns) for name, message in due}
+        return [
+            SentMessage(self._topic, "mauve_msgs/msg/Shadow", self._serialize(message), now_ns, None)
+            for _, message in due
+        ]
+
+    def dropped_messages(self) -> int:
+        """None: they are made when they are taken."""
+        return 0
+
+    def _found(self) -> dict[str, Any]:
+        """By component."""
+        return {record.component: shadow_message(record) for record in self._runtime.shadows()}
+
+    def _is_due(self, component: str, message: Any, now_ns: int) -> bool:
+        before = self._recorded.get(component)
+        if before is None:
+            return True
+        goes_on = message.verdict == Shadow.RUNNING and message.begin_ns == before.message.begin_ns
+        if goes_on and not self._is_finishing:
+            return now_ns >= before.time_ns + _PERIOD_NS
+        return bool(message != before.message)  # its thread may complete a release after its end
