@@ -7,9 +7,9 @@ from typing import Any
 from mauve_rt.cli.arguments import add_executor
 from mauve_rt.cli.completion import complete_components, complete_cores, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK
+from mauve_rt.trace.reading.shadows import verdict_word
 
 _DEFAULT_BUDGET_US = 100.0
-_VERDICTS = {0: "running", 1: "ended", 2: "faulted", 3: "promoted"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +90,7 @@ def _print(shadow: Any) -> None:
     from mauve_rt.counts import counted  # noqa: PLC0415
 
     out = console()
-    verdict = _VERDICTS.get(shadow.verdict, str(shadow.verdict))
+    verdict = verdict_word(shadow.verdict)
     skipped = [
         text
         for count, text in (

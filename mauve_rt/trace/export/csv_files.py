@@ -26,6 +26,7 @@ _FRAMES: dict[str, Callable[[Trace], pd.DataFrame]] = {
     "contention": frames.contention,
     "marks": frames.marks,
     "decisions": frames.decisions,
+    "shadows": frames.shadows,
     "records": frames.records,
 }
 _ROWS_AT_ONCE = 100_000

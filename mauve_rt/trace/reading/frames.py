@@ -18,6 +18,7 @@ from mauve_rt.trace.reading.facts import Deployment, TracedDecision
 from mauve_rt.trace.reading.pairs import Indices, following, nested
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.reconfigurations import reconfigurations as find_reconfigurations
+from mauve_rt.trace.reading.shadows import Shadow, ShadowOutput
 from mauve_rt.trace.reading.trace import Trace
 
 _Int64s = npt.NDArray[np.int64]
@@ -101,6 +102,22 @@ def decisions(trace: Trace) -> pd.DataFrame:
     kinds = {"time_ns": "int64", "cause_ns": "int64", "took_s": "float64", "bound_s": "float64"}
     words = dict.fromkeys(("rule", "decision", "why"), "category")
     return pd.DataFrame(columns).astype(kinds | words)
+
+
+def shadows(trace: Trace) -> pd.DataFrame:
+    """Reports of shadows, a row per number: the fields of `Shadow` and of `ShadowOutput`.
+
+    compared: releases in which both cores wrote the number.
+    """
+    found = [(one, output) for one in trace.shadow_reports for output in one.outputs]
+    of_output = [field.name for field in fields(ShadowOutput)]
+    of_shadow = [field.name for field in fields(Shadow) if field.name not in (*of_output, "outputs")]
+    columns = {name: [getattr(one, name) for one, _ in found] for name in of_shadow}
+    columns |= {name: [getattr(output, name) for _, output in found] for name in of_output}
+    words = ("component", "core", "live_core", "verdict", "reason", "port", "field")
+    kinds = dict.fromkeys(words, "category") | dict.fromkeys(("maximum", "rms"), "float64")
+    kinds |= dict.fromkeys(("end_ns", "lag"), "Int64")
+    return pd.DataFrame(columns).astype({name: kinds.get(name, "int64") for name in columns})
 
 
 def deployments(trace: Trace) -> pd.DataFrame:
@@ -268,6 +285,11 @@ class Frames:
     def decisions(self) -> pd.DataFrame:
         """As frames.decisions."""
         return decisions(self._trace)
+
+    @cached_property
+    def shadows(self) -> pd.DataFrame:
+        """As frames.shadows."""
+        return shadows(self._trace)
 
     @cached_property
     def deployments(self) -> pd.DataFrame:

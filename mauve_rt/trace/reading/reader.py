@@ -7,6 +7,7 @@ killed, gives all it has. metadata.yaml is not consulted: the files tell the sam
 import heapq
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.architecture import ComponentInfo, with_known_policies
 from mauve_rt.trace.reading.decisions import RULES, traced_decisions
 from mauve_rt.trace.reading.facts import OWN_TYPES, BagFile, Deployment, Loss, Message
+from mauve_rt.trace.reading.shadows import SHADOW_TYPE, Shadow
 from mauve_rt.trace.reading.trace import Trace
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
     for file, size in zip(files, sizes, strict=True):
         with _scan(file) as scan:
             for channel, message in scan.messages():
-                content.add(scan, channel, message.data)
+                content.add(scan, channel, message.data, published_ns=message.publish_time)
                 progress((done + scan.whole_bytes) / max(sum(sizes), 1), "reading")
             content.files.append(BagFile(file, scan.library, scan.whole_bytes, scan.damage))
         done += size
@@ -94,11 +96,12 @@ class _Content:
         self._known: set[tuple[Path, int]] = set()
         self._types = _Types()
         self._kinds: dict[int, RecordKind] = {}
+        self._shadows: list[Shadow] = []  # with times of CLOCK_REALTIME
 
-    def add(self, scan: "McapScan | SqliteScan", channel: Channel, data: bytes) -> None:
+    def add(self, scan: "McapScan | SqliteScan", channel: Channel, data: bytes, *, published_ns: int) -> None:
         type_name = scan.type_of(channel)
         self._all_topics[channel.topic] = (type_name, self._all_topics.get(channel.topic, ("", 0))[1] + 1)
-        if type_name not in OWN_TYPES:
+        if type_name not in (*OWN_TYPES, SHADOW_TYPE):
             return
         if (scan.path, channel.id) not in self._known:
             self._known.add((scan.path, channel.id))
@@ -112,6 +115,9 @@ class _Content:
             elif type_name == _NAMES_TYPE:
                 said = self._types.decoded(scan, channel, data)
                 self._components, self._names = tuple(said.components), tuple(said.names)
+            elif type_name == SHADOW_TYPE:
+                said = self._types.decoded(scan, channel, data)
+                self._shadows.append(Shadow.of_message(said, published_ns))
             else:
                 self._add_architecture(self._types.decoded(scan, channel, data))
         except TraceError as error:
@@ -159,6 +165,9 @@ class _Content:
             topics=self._all_topics,
             kinds=self._kinds,
             decisions=traced_decisions(decided, self._names, self._kinds),
+            shadow_reports=tuple(
+                replace(one, time_ns=_monotonic_ns(one.time_ns, pairs)) for one in self._shadows
+            ),
         )
 
 

@@ -2,7 +2,7 @@
 
 import heapq
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from mauve_rt.trace.format.kinds import RecordKind, kinds_known
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, MessageSource, TracedDecision
+from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
@@ -47,6 +48,8 @@ class Trace:
     """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
     decisions: tuple[TracedDecision, ...] = ()
     """Of the executor's rules, by time; empty when it ran none."""
+    shadow_reports: tuple[Shadow, ...] = ()
+    """Of each shadow one report a second, and one after its end; in the order of the bag."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -65,6 +68,11 @@ class Trace:
         if self.decisions:
             rows.append(np.array([one.time_ns for one in self.decisions], np.int64))
         return (min(int(row.min()) for row in rows), max(int(row.max()) for row in rows)) if rows else (0, 0)
+
+    @property
+    def shadows(self) -> tuple[Shadow, ...]:
+        """Each shadow by its last report, by component, then by begin; empty when there was none."""
+        return last_reports(self.shadow_reports)
 
     def of(self, component: str, *kinds: int) -> Records:
         """Records of one component, of these kinds (all when none is named).
@@ -175,6 +183,11 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         topics=_all_topics(traces.values()),
         kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
         decisions=_all_decisions(traces),
+        shadow_reports=tuple(
+            replace(one, component=f"{key}/{one.component}")
+            for key, trace in traces.items()
+            for one in trace.shadow_reports
+        ),
     )
 
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import OWN_TYPES
+from mauve_rt.trace.reading.shadows import SHADOW_TYPE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +31,7 @@ VALUES_TYPE, NAMES_TYPE = "mauve_msgs/msg/Values", "mauve_msgs/msg/ValueNames"
 NO_VALUES = (
     *OWN_TYPES,
     DECISION_TYPE,
+    SHADOW_TYPE,
     NAMES_TYPE,
     "mauve_msgs/msg/ReconfigurationEvent",
     "mauve_msgs/msg/ArchitectureState",

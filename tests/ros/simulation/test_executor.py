@@ -1,5 +1,6 @@
 """An executor in virtual time tells what a real one tells."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,25 @@ def test_each_component_is_told_of_its_own_change(architecture: Path, tmp_path: 
         ("counter", f"set_property step, replace_core {FALLBACK}", FALLBACK),
         ("sleepy", "set_property step", ""),
     ]
+
+
+def test_a_bag_has_the_shadows_by_virtual_time(architecture: Path, tmp_path: Path) -> None:
+    simulation, topics = Simulation(), SimulatedTopics()
+    executor = SimulatedExecutor(simulation, topics, architecture, tmp_path / "bag", complain=pytest.fail)
+    simulation.every(simulation.now_ns(), S // 10, executor.record)
+    simulation.deploy()
+    executor.activate()
+    simulation.run_until(simulation.epoch_ns() + S)
+    step = Step("shadow", "counter", FALLBACK, "{budget_us: 1000}")
+    outcome = executor.handle(Request(steps=(step,)))
+    assert outcome.success, outcome.message
+    simulation.run_until(simulation.epoch_ns() + 4 * S)
+    executor.close()
+    trace = open_trace(tmp_path / "bag")
+    *running, last = trace.shadow_reports
+    times = [one.time_ns for one in running]
+    assert [after - before for before, after in pairwise(times)] == [S, S]
+    assert {one.verdict for one in running} == {"running"}
+    assert (last.verdict, last.end_ns) == ("ended", simulation.now_ns())
+    assert trace.shadows == (last,)
+    assert 0 < last.compared <= last.releases

@@ -1,0 +1,118 @@
+"""The shadows that a bag reports: candidates in parallel with live cores, and how their outputs differed."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Self
+
+SHADOW_TYPE = "mauve_msgs/msg/Shadow"
+_VERDICTS = ("running", "ended", "faulted", "promoted")  # by the constants of mauve_msgs/msg/Shadow
+
+
+def verdict_word(number: int) -> str:
+    """Return the word for a constant of mauve_msgs/msg/Shadow."""
+    return _VERDICTS[number] if number < len(_VERDICTS) else f"verdict {number}"
+
+
+@dataclass(frozen=True)
+class ShadowOutput:
+    """The difference between a candidate and the live core, for one number of a write port."""
+
+    port: str
+    field: str
+    """Path of the number, e.g. `linear.x`."""
+    compared: int
+    """Releases in which both cores wrote a number."""
+    maximum: float
+    """Largest absolute difference."""
+    rms: float
+    """Root mean square of the difference."""
+    nan: int
+    """Releases in which the candidate wrote NaN."""
+    live_nan: int
+    """Releases in which the live core wrote NaN."""
+    live_only: int
+    """Releases in which only the live core wrote to the port."""
+    shadow_only: int
+    """Releases in which only the candidate wrote to the port."""
+    lag: int | None
+    """Releases by which the candidate's first number of the port is later; None where that is not known."""
+
+    @property
+    def name(self) -> str:
+        """Port and number, e.g. `command.linear.x`."""
+        return f"{self.port}.{self.field}"
+
+    @classmethod
+    def of_message(cls, message: Any) -> Self:
+        """Take it from a mauve_msgs/msg/ShadowOutput, of whichever library."""
+        counts = ("compared", "nan", "live_nan", "live_only", "shadow_only")
+        return cls(
+            port=message.port,
+            field=message.field,
+            maximum=float(message.maximum),
+            rms=float(message.rms),
+            lag=int(message.lag) if message.has_lag else None,
+            **{name: int(getattr(message, name)) for name in counts},
+        )
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """A shadow as one message of the bag reports it. Times in ns of CLOCK_MONOTONIC, or of virtual time."""
+
+    time_ns: int
+    """When the figures were taken."""
+    component: str
+    core: str
+    """The candidate."""
+    live_core: str
+    """Core of the component when the shadow began."""
+    verdict: str
+    """running, ended, faulted or promoted"""
+    reason: str
+    """Why it ended; empty while it runs."""
+    begin_ns: int
+    end_ns: int | None
+    """None while it runs."""
+    releases: int
+    """Releases of the component since the begin."""
+    compared: int
+    """Releases in which the candidate executed."""
+    skipped_late: int
+    """Releases that the candidate skipped because its thread was late."""
+    skipped_budget: int
+    """Releases that the candidate skipped to stay within its budget."""
+    idle: int
+    """Releases in which the candidate was in a longer wait."""
+    over_budget: int
+    """Releases in which the candidate took longer than its budget."""
+    budget_ns: int
+    """Execution time for one release, on average."""
+    largest_execution_ns: int
+    """Largest execution time of one release."""
+    outputs: tuple[ShadowOutput, ...]
+
+    @classmethod
+    def of_message(cls, message: Any, time_ns: int) -> Self:
+        """Take it from a mauve_msgs/msg/Shadow, of whichever library."""
+        counts = (
+            *("begin_ns", "releases", "compared", "skipped_late", "skipped_budget", "idle", "over_budget"),
+            *("budget_ns", "largest_execution_ns"),
+        )
+        return cls(
+            time_ns=time_ns,
+            component=message.component,
+            core=message.core,
+            live_core=message.live_core,
+            verdict=verdict_word(int(message.verdict)),
+            reason=message.reason,
+            end_ns=int(message.end_ns) or None,
+            outputs=tuple(ShadowOutput.of_message(output) for output in message.outputs),
+            **{name: int(getattr(message, name)) for name in counts},
+        )
+
+
+def last_reports(reports: Iterable[Shadow]) -> tuple[Shadow, ...]:
+    """Return the last report of each shadow, by component, then by begin."""
+    last = {(one.component, one.begin_ns): one for one in sorted(reports, key=lambda one: one.time_ns)}
+    return tuple(last[key] for key in sorted(last))

@@ -1,0 +1,146 @@
+"""Shadows in a bag: read back, in frames and tables."""
+
+import csv
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from synthetic_traces import MS, ROOT, deploy, record_small_bag, run
+
+import mauve_rt.trace
+from mauve_rt.trace.export.csv_files import export_csv
+from mauve_rt.trace.reading.shadows import SHADOW_TYPE
+from mauve_rt.trace.reading.trace import Trace, merge_traces
+from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.synthetic import SyntheticSource
+
+TYPES = get_typestore(Stores.EMPTY)
+for name in ("ShadowOutput", "Shadow"):
+    text = (ROOT / "mauve_msgs" / "msg" / f"{name}.msg").read_text(encoding="utf-8")
+    TYPES.register(get_types_from_msg(text, f"mauve_msgs/msg/{name}"))
+RUNNING, ENDED, FAULTED = 0, 1, 2
+
+
+@pytest.fixture(autouse=True)
+def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(ROOT / "mauve_msgs" / "msg", tmp_path / "prefix" / "share" / "mauve_msgs" / "msg")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+
+
+def shadow(component: str, verdict: int, compared: int, *, begin_ms: int = 30, **told: Any) -> bytes:
+    output = TYPES.types["mauve_msgs/msg/ShadowOutput"](
+        port="cmd",
+        field="linear.x",
+        compared=compared,
+        maximum=compared / 8,
+        rms=0.25,
+        nan=3,
+        live_nan=0,
+        live_only=1,
+        shadow_only=2,
+        has_lag=True,
+        lag=-1,
+    )
+    other = replace(output, field="linear.y", maximum=float("inf"), nan=0, has_lag=False, lag=0)
+    message = TYPES.types[SHADOW_TYPE](
+        component=component,
+        core="my_robot/Pid2",
+        live_core="my_robot/Pid",
+        verdict=verdict,
+        reason="",
+        begin_ns=begin_ms * MS,
+        end_ns=0,
+        releases=1000,
+        compared=compared,
+        skipped_late=4,
+        skipped_budget=5,
+        idle=6,
+        over_budget=7,
+        budget_ns=50_000,
+        largest_execution_ns=61_000,
+        outputs=[output, other],
+    )
+    return bytes(TYPES.serialize_cdr(replace(message, **told), SHADOW_TYPE))
+
+
+@pytest.fixture
+def trace(tmp_path: Path) -> Trace:
+    """Two shadows of `c`, of which one ended and one still runs, and one of `b`, which failed."""
+    source = SyntheticSource(["c", "b"])
+    deploy(source, "c")
+    run(source, "c", 200)
+    recorder = Recorder(source, tmp_path / "bag", node_name="/robot_1/executor")
+    recorder.start()
+    for at_ms, data in (
+        (40, shadow("c", RUNNING, 10)),
+        (1040, shadow("c", RUNNING, 80)),
+        (1300, shadow("c", ENDED, 90, end_ns=1250 * MS, reason="a step end_shadow")),
+        (1350, shadow("b", FAULTED, 1, end_ns=1340 * MS, reason="too far in state act")),
+        (1400, shadow("c", RUNNING, 2, begin_ms=1390)),
+    ):
+        recorder.record("/robot_1/executor/shadow", SHADOW_TYPE, data, monotonic_ns=at_ms * MS)
+    recorder.stop()
+    return mauve_rt.trace.open(tmp_path / "bag")
+
+
+def test_each_shadow_is_read_by_its_last_report(trace: Trace) -> None:
+    assert [(one.component, one.begin_ns // MS, one.verdict, one.compared) for one in trace.shadows] == [
+        ("b", 30, "faulted", 1),
+        ("c", 30, "ended", 90),
+        ("c", 1390, "running", 2),
+    ]
+    failed, ended, running = trace.shadows
+    assert (failed.reason, ended.reason) == ("too far in state act", "a step end_shadow")
+    assert (ended.core, ended.live_core) == ("my_robot/Pid2", "my_robot/Pid")
+    assert (ended.time_ns, ended.end_ns, running.end_ns) == (1300 * MS, 1250 * MS, None)
+    assert (ended.releases, ended.skipped_late, ended.skipped_budget) == (1000, 4, 5)
+    assert (ended.idle, ended.over_budget) == (6, 7)
+    assert (ended.budget_ns, ended.largest_execution_ns) == (50_000, 61_000)
+    first, other = ended.outputs
+    assert (first.name, first.compared, first.maximum, first.rms) == ("cmd.linear.x", 90, 11.25, 0.25)
+    assert (first.nan, first.live_nan, first.live_only, first.shadow_only) == (3, 0, 1, 2)
+    assert (first.lag, other.lag) == (-1, None)
+    assert [one.compared for one in trace.shadow_reports] == [10, 80, 90, 1, 2]
+
+
+def test_merged_traces_name_the_components_of_each_executor(trace: Trace) -> None:
+    merged = merge_traces({"left": trace, "right": trace})
+    assert [one.component for one in merged.shadows] == [
+        *("left/b", "left/c", "left/c"),
+        *("right/b", "right/c", "right/c"),
+    ]
+
+
+def test_shadows_are_a_frame_and_a_table(trace: Trace, tmp_path: Path) -> None:
+    frame = trace.frames.shadows
+    assert frame[frame["field"] == "linear.x"]["maximum"].tolist() == [1.25, 10, 11.25, 0.125, 0.25]
+    export_csv(trace, tmp_path / "out")
+    with (tmp_path / "out" / "shadows.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 10
+    told = {name: rows[4][name] for name in ("component", "verdict", "end_ns", "field", "compared", "lag")}
+    assert told == {
+        "component": "c",
+        "verdict": "ended",
+        "end_ns": str(1250 * MS),
+        "field": "linear.x",
+        "compared": "90",
+        "lag": "-1",
+    }
+    assert (rows[0]["end_ns"], rows[1]["lag"]) == ("", "")
+    with (tmp_path / "out" / "topic.robot_1.executor.shadow.csv").open(encoding="utf-8") as file:
+        assert len(list(csv.DictReader(file))) == 5
+
+
+def test_figures_of_shadows_are_no_values_of_the_robot(trace: Trace) -> None:
+    assert trace.topics["/robot_1/executor/shadow"] == (SHADOW_TYPE, 5)
+    assert trace.values.names == ()
+
+
+def test_a_bag_without_shadows_tells_of_none(tmp_path: Path) -> None:
+    trace = mauve_rt.trace.open(record_small_bag(tmp_path / "small"))
+    assert trace.shadows == ()
+    assert trace.frames.shadows.empty
