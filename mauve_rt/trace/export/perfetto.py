@@ -4,7 +4,8 @@ Every executor is a process, every component a track of it: states and services 
 time from the nominal to the actual instant, overruns, faults, stops and marks instants with their figures.
 Each reconfiguration is a slice from parked to armed, and a flow from the request to it to the next release.
 A track `requests` has who asked for what, a track `rules` what the executor's rules decided; a counter below
-each component its wake-up latency. A track `values` has a counter for each recorded value.
+each component its wake-up latency. A track `values` has a counter for each recorded value, a track `shadows`
+one for the largest difference of each output of a shadow.
 
 Timestamps are the records' own, ns of CLOCK_MONOTONIC, which the file declares to be the trace's clock and
 relates to CLOCK_REALTIME by the pairs that the bag has.
@@ -86,6 +87,7 @@ def _write_executor(
         ComponentTrack(trace, component, track, own).draw(counter.of(f"{name}: {component}"))
         counter.add(len(trace.of(component)))
     _write_values(file, process, trace, rank=len(swaps) + 1)
+    _write_shadows(file, process, trace, rank=len(swaps) + 2)
     return flow
 
 
@@ -101,6 +103,21 @@ def _write_values(file: PacketFile, process: int, trace: Trace, *, rank: int) ->
         times, values = samples.monotonic_ns[finite].tolist(), samples.values[finite].tolist()
         for time_ns, value in zip(times, values, strict=True):
             track.count(time_ns, value)
+
+
+def _write_shadows(file: PacketFile, process: int, trace: Trace, *, rank: int) -> None:
+    """Write a counter of the largest difference for each number of a shadow, on a track `shadows`."""
+    if not trace.shadow_reports:
+        return
+    group = file.add_track("shadows", parent=process, sibling_order_rank=rank)
+    counters: dict[str, Track] = {}
+    for one in trace.shadow_reports:
+        for output in one.outputs:
+            name = f"{one.component} {output.name}"
+            if name not in counters:
+                counters[name] = Track(file, file.add_track(name, parent=group, counter={}))
+            if np.isfinite(output.maximum):
+                counters[name].count(one.time_ns, output.maximum)
 
 
 def _description(one: ComponentInfo) -> str:

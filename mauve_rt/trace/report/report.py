@@ -15,6 +15,7 @@ from mauve_rt.trace.report.detail import BUDGET
 from mauve_rt.trace.report.distributions import distributions_section
 from mauve_rt.trace.report.key_figures import key_figures
 from mauve_rt.trace.report.page import data_element, page, write_page
+from mauve_rt.trace.report.shadows import shadows_section
 from mauve_rt.trace.report.tables import (
     components_section,
     losses_section,
@@ -75,6 +76,7 @@ def write_report(
     makers: tuple[Callable[[Analysis], Section | None], ...] = (
         reconfigurations_section,
         decisions_section,
+        shadows_section,
         distributions_section,
         architecture_section,
         components_section,

@@ -1,4 +1,4 @@
-"""Shadows in a bag: read back, in frames and tables."""
+"""Shadows in a bag: read back, in frames, tables, reports and Perfetto."""
 
 import csv
 import shutil
@@ -7,15 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from perfetto_decoding import Decoded
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from synthetic_traces import MS, ROOT, deploy, record_small_bag, run
 
 import mauve_rt.trace
 from mauve_rt.trace.export.csv_files import export_csv
+from mauve_rt.trace.export.perfetto import export_perfetto
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE
 from mauve_rt.trace.reading.trace import Trace, merge_traces
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.report import write_report
 
 TYPES = get_typestore(Stores.EMPTY)
 for name in ("ShadowOutput", "Shadow"):
@@ -135,6 +138,27 @@ def test_shadows_are_a_frame_and_a_table(trace: Trace, tmp_path: Path) -> None:
         assert len(list(csv.DictReader(file))) == 5
 
 
+def test_the_report_has_a_section_of_shadows(trace: Trace, tmp_path: Path) -> None:
+    write_report(tmp_path / "report.html", trace)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    section = page.partition('<section id="shadows"')[2].partition("</section>")[0]
+    shadows, outputs = section.split("<h3>Differences of the outputs</h3>")
+    for words in ("my_robot/Pid2", "my_robot/Pid<", "ended", "a step end_shadow", "skipped: late"):
+        assert words in shadows, words
+    assert 'data-level="bad">faulted' in shadows
+    for words in ("cmd.linear.x", ">90<", ">11.25<", ">0.25<", 'data-level="bad">3<', "\N{EN DASH}"):
+        assert words in outputs, words
+
+
+def test_the_largest_difference_is_a_counter_in_perfetto(trace: Trace, tmp_path: Path) -> None:
+    export_perfetto({"executor": trace}, tmp_path / "out.pftrace")
+    decoded = Decoded(tmp_path / "out.pftrace")
+    (counter,) = [uuid for uuid, track in decoded.tracks.items() if track.name == "c cmd.linear.x"]
+    assert decoded.counted[counter] == [
+        (40 * MS, 1.25), (1040 * MS, 10), (1300 * MS, 11.25), (1400 * MS, 0.25),
+    ]  # fmt: skip
+
+
 def test_figures_of_shadows_are_no_values_of_the_robot(trace: Trace) -> None:
     assert trace.topics["/robot_1/executor/shadow"] == (SHADOW_TYPE, 5)
     assert trace.values.names == ()
@@ -144,3 +168,7 @@ def test_a_bag_without_shadows_tells_of_none(tmp_path: Path) -> None:
     trace = mauve_rt.trace.open(record_small_bag(tmp_path / "small"))
     assert trace.shadows == ()
     assert trace.frames.shadows.empty
+    write_report(tmp_path / "report.html", trace)
+    assert 'id="shadows"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    export_perfetto({"executor": trace}, tmp_path / "out.pftrace")
+    assert "shadows" not in [track.name for track in Decoded(tmp_path / "out.pftrace").tracks.values()]
