@@ -732,6 +732,15 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     ("For each output they show the lag: by how many releases the candidate's first number comes later."): (
         "Shadows.ACandidateThatLagsIsFound",
     ),
+    "A bag has the same figures, once a second and after the end of the shadow.": (
+        f"{_SHADOW}_a_bag_has_a_message_each_second_and_one_after_the_end",
+        f"{_SHADOW}_a_bag_that_ends_has_the_last_figures_of_a_shadow_that_runs",
+        _PAGE_OF_SHADOW,
+    ),
+    '`mauve report DIR` shows them in the section "Shadows".': (
+        "python/trace/test_shadows.py::test_the_report_has_a_section_of_shadows",
+        _PAGE_OF_SHADOW,
+    ),
     "A fault of the candidate ends its shadow.": (
         f"{_SHADOW}_a_candidate_that_writes_nan_or_raises_harms_nobody",
     ),

@@ -15,6 +15,7 @@ from pages import PAGES
 from rebuilt_package import RebuiltPackage
 from ros_processes import PATIENCE_S
 
+import mauve_rt.trace
 from mauve_msgs.msg import Probation, ReconfigurationEvent
 from mauve_msgs.srv import ListComponents, LoadRules, Reload
 from mauve_rt.cli.main import main
@@ -37,7 +38,7 @@ connections:
 def running(rebuilt: RebuiltPackage, start_executor: Callable[..., Any], tmp_path: Path) -> RebuiltPackage:
     path = tmp_path / "robot.yaml"
     path.write_text(ROBOT, encoding="utf-8")
-    start_executor("-p", f"architecture:={path}")
+    start_executor("-p", f"architecture:={path}", "-p", f"bags:={tmp_path}")
     return rebuilt
 
 
@@ -184,13 +185,14 @@ def test_a_rule_puts_the_old_core_back(
 
 
 def test_the_commands_of_the_shadow_page(
-    running: RebuiltPackage, graph: Any, mauve: Callable[..., str]
+    running: RebuiltPackage, graph: Any, mauve: Callable[..., str], tmp_path: Path
 ) -> None:
     running.build("NEW_CORE")
     with running.index.open("a", encoding="utf-8") as file:
         file.write("core; reload_tests/Louder; reload_tests/LoopShell; reload_tests\n")
     mauve("reload", NODE)
     diagnostics = graph.hear(DiagnosticArray, "/diagnostics")
+    mauve("record", "start", NODE, "bag")
     begin, show, promote, end = _words("docs/howto/compare_in_shadow.md", "mauve shadow")
     begin = ["50000" if word == "50" else word for word in begin]
     mauve(*[word.replace("Other", "Louder") for word in begin])
@@ -209,5 +211,12 @@ def test_the_commands_of_the_shadow_page(
     assert "ended" in mauve(*show)
     mauve(*begin)
     graph.spin_until(lambda: _loop(graph).shadows[0].compared > 20, "comparisons")
+    compared = _loop(graph).shadows[0].compared
+    mauve("record", "stop", NODE)
     mauve(*promote)
     assert _loop(graph).core == "reload_tests/Other"
+    mauve("report", str(tmp_path / "bag"))
+    assert "a step end_shadow" in (tmp_path / "bag" / "report.html").read_text(encoding="utf-8")
+    ended, running_on = mauve_rt.trace.open(tmp_path / "bag").shadows
+    assert (ended.core, ended.verdict, running_on.verdict) == ("reload_tests/Louder", "ended", "running")
+    assert running_on.compared >= compared, "the figures as the bag was closed"
