@@ -7,6 +7,11 @@ DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST = 232  # by the UDP ports of RTPS
 
 
+def domain() -> int:
+    """The ROS domain that the environment says; it has no `domain_problem`."""
+    return int(os.environ.get(DOMAIN) or 0)
+
+
 def domain_problem() -> str:
     """What is wrong with ROS_DOMAIN_ID, and the remedy; "" where nothing is."""
     given = os.environ.get(DOMAIN, "")
