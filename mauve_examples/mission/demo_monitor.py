@@ -21,6 +21,7 @@ from mauve_msgs.msg import (
     SupervisorDecision,
 )
 from mauve_msgs.srv import ListComponents
+from mauve_rt.node.shared.announcement import first_participant
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RECENT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -60,7 +61,8 @@ class MissionMonitor:
         """
         self._cable = cable
         self._robots = list(robots)
-        self._node = Node("mission_monitor")
+        with first_participant():
+            self._node = Node("mission_monitor")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._connected = False

@@ -25,6 +25,7 @@ from std_srvs.srv import SetBool
 
 from mauve_examples.mission.medium import Counts, Medium
 from mauve_msgs.msg import PeerMessage
+from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.loopback import reach, udp_sockets
 from mauve_rt.node.shared.process import BAD_INPUT, complain
 
@@ -163,7 +164,8 @@ def run_node(arguments: list[str], stop: threading.Event) -> int:
     try:
         sockets = udp_sockets()
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        node = Radio()
+        with first_participant():
+            node = Radio()
         reach(sockets).log(node.get_logger())
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
         complain(f"radio: {error}")

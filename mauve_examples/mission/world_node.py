@@ -16,6 +16,7 @@ from rclpy.utilities import try_shutdown
 
 from mauve_examples.mission.architecture import body_of
 from mauve_msgs.msg import RobotBody
+from mauve_rt.node.shared.announcement import first_participant
 
 _SPIN_S = 0.2  # how long a stop may go unnoticed
 
@@ -36,7 +37,8 @@ class WorldNode(Node):
 def run_node(arguments: list[str], stop: threading.Event) -> int:
     """Run the node until `stop` is set; returns 0."""
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    node = WorldNode()
+    with first_participant():
+        node = WorldNode()
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:

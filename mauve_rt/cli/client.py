@@ -16,7 +16,7 @@ from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 from mauve_rt.cli.completion_cache import Cache
 from mauve_rt.cli.discovery import ANNOUNCED_S, Discovery, Participant
 from mauve_rt.cli.exchange import Exchange
-from mauve_rt.cli.transport import accounts_in_the_way, announced_to_those_present, by_fast_dds, by_udp
+from mauve_rt.cli.transport import accounts_in_the_way, by_fast_dds, by_udp
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.discovery import limit_discovery, stays_on_this_machine
 from mauve_rt.node.shared.domain import domain_problem
@@ -297,14 +297,9 @@ def connected(*, first: bool = False) -> Iterator[Client]:
     with (
         _interrupts_between_spins(),
         by_udp() if first else nullcontext(),
-        closing(_discovery(is_local=is_local, first=first)) as discovery,
+        closing(Discovery(is_local=is_local)) as discovery,
     ):
         try:
             yield Client(discovery, cache)
         except UnsupportedTypeSupport as error:  # as of a package whose libraries are not found
             raise ImportError(str(error)) from error
-
-
-def _discovery(*, is_local: bool, first: bool) -> Discovery:
-    with announced_to_those_present() if first else nullcontext():
-        return Discovery(is_local=is_local)

@@ -19,6 +19,7 @@ from rclpy.node import Node
 
 from mauve_rt.cli.rtps_ports import UDP_TABLE, discovery_sockets
 from mauve_rt.cli.transport import by_fast_dds
+from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.log_folder import NO_LOG_FILES
 from mauve_rt.node.shared.loopback import udp_sockets
 
@@ -48,7 +49,8 @@ class Discovery:
         self._spoken_s = 0.0
         self._seen: object = None
         self._seen_s = time.monotonic()
-        self._speak()
+        with first_participant():
+            self._speak()
         self._can_count = is_local and by_fast_dds() and UDP_TABLE.exists()
 
     @property

@@ -15,19 +15,14 @@ class DiscoverySocket(NamedTuple):
     inode: str
 
 
-def discovery_ports(domain: int) -> range:
-    """The ports of discovery by unicast in a ROS domain, by the number of the participant."""
-    first = _FIRST_PORT + _DOMAIN_PORTS * domain
-    return range(first, first + 2 * _MAX_PARTICIPANTS, 2)
-
-
 def discovery_sockets(domain: int) -> list[DiscoverySocket]:
     """The discovery sockets of every participant on this machine in a ROS domain.
 
     Raises:
         OSError: the system has no table of UDP sockets.
     """
-    ports = discovery_ports(domain)
+    first = _FIRST_PORT + _DOMAIN_PORTS * domain
+    ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
     rows = [line.split() for line in UDP_TABLE.read_text("ascii").splitlines()[1:]]
     found = [
         DiscoverySocket(int(row[_ADDRESS].rpartition(":")[2], 16), row[_INODE])

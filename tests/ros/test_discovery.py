@@ -4,6 +4,8 @@ import contextlib
 import os
 import random
 import shutil
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -13,9 +15,11 @@ from pathlib import Path
 import pytest
 from ros_processes import PATIENCE_S, RELAY
 from udp_sockets import udp_sockets
+from waiting import until
 
 from mauve_rt.parts.ament_index import share_folder
 
+SO_TIMESTAMPNS = 35  # of Linux
 RANGE, PROFILES = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
 EXECUTOR = ("-m", "mauve_rt.node.executor.main", "--ros-args", "-p", "architecture:=FILE")
 PROGRAMS = {
@@ -138,6 +142,39 @@ def test_an_executor_is_bound_to_loopback_however_it_was_told_to_stay(
     with _running(tmp_path, words, said | {"ROS_DOMAIN_ID": str(domain)}) as (process, log):
         assert _begin(process, log, domain)[0] == {"127.0.0.1"}
         _wait_until_logged("on this machine only: UDP bound to 127.0.0.1", process, log)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("can_write", [True, False])
+def test_a_program_announces_itself_from_the_last_port_to_the_first(
+    program: str, *, can_write: bool, domain: int, tmp_path: Path
+) -> None:
+    """Or, where no file can be written, as Fast DDS does by itself."""
+    said = {"ROS_DOMAIN_ID": str(domain), "TMPDIR": str(tmp_path) if can_write else "/proc"}
+    with contextlib.ExitStack() as stack:
+        first, last = (stack.enter_context(_port_of(domain, number)) for number in (3, 28))
+        process, log = stack.enter_context(_running(tmp_path, _words(program, tmp_path), said))
+        assert (_received_ns(last) < _received_ns(first)) == can_write, log.read_text("utf-8")
+        assert process.poll() is None, log.read_text("utf-8")
+        assert "XMLPARSER" not in log.read_text("utf-8")
+        until(lambda: not list(tmp_path.glob("mauve_*.xml")), "the file's end")
+
+
+def _port_of(domain: int, participant: int) -> socket.socket:
+    """The socket at which a participant of a domain would receive discovery messages."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.bind(("127.0.0.1", 7410 + 250 * domain + 2 * participant))
+    made.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    made.settimeout(PATIENCE_S)
+    return made
+
+
+def _received_ns(port: socket.socket) -> int:
+    """When the kernel received the first announcement there."""
+    message, [(_, _, instant)], _, _ = port.recvmsg(1 << 16, 64)
+    assert message.startswith(b"RTPS")
+    seconds, nanoseconds = struct.unpack("=qq", instant)
+    return int(seconds * 10**9 + nanoseconds)
 
 
 def test_a_profile_of_the_users_own_is_kept_and_what_is_open_is_told(domain: int, tmp_path: Path) -> None:

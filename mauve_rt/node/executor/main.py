@@ -80,6 +80,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, start: RosStart, st
     from rclpy.utilities import try_shutdown  # noqa: PLC0415
 
     from mauve_rt.node.executor.node import ExecutorNode  # noqa: PLC0415
+    from mauve_rt.node.shared.announcement import first_participant  # noqa: PLC0415
     from mauve_rt.node.shared.background_console import init_logging_apart, last_lines  # noqa: PLC0415
     from mauve_rt.node.shared.late_peers import LatePeers  # noqa: PLC0415
     from mauve_rt.node.shared.network_interfaces import NetworkInterfaces, usable_addresses  # noqa: PLC0415
@@ -89,7 +90,8 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, start: RosStart, st
     try:
         init_logging_apart([*words, *start.arguments], signal_handler_options=SignalHandlerOptions.NO)
         namespace = runtime.model.namespace if runtime.configured else settings.node_namespace()
-        node = ExecutorNode(runtime, namespace=namespace, settings=settings.values)
+        with first_participant():
+            node = ExecutorNode(runtime, namespace=namespace, settings=settings.values)
         discovery = reach(sockets)
         # Components in Python would wait for the interpreter while modules load: then these come first.
         waits_for_python = any(map(runtime.has_python_parts, runtime.components()))

@@ -28,6 +28,7 @@ from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
 from mauve_rt.interfaces.outside_feeds import OutsideFeeds
+from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
 from mauve_rt.node.shared.late_peers import LatePeers
 from mauve_rt.node.shared.loopback import reach, udp_sockets
@@ -181,7 +182,8 @@ def run_node(arguments: Sequence[str], start: RosStart, stop: threading.Event) -
         settings, remarks = settings_of(arguments)
         addresses, sockets = usable_addresses(), udp_sockets()
         init_logging_apart([*arguments, *start.arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = Node(NODE_NAME, parameter_overrides=list(NO_SIMULATED_TIME))
+        with first_participant():
+            node = Node(NODE_NAME, parameter_overrides=list(NO_SIMULATED_TIME))
         declare_settings(node, PARAMETERS, settings)
         discovery = reach(sockets)
     except Exception as error:  # noqa: BLE001 - rclpy has an exception class of its own for each mistake
