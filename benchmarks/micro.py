@@ -1,4 +1,4 @@
-"""What takes nanoseconds: data, activations, trace records; and what a lock costs who is urgent."""
+"""What takes nanoseconds: data, activations, trace records, a shadow; and what a lock costs who is urgent."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -10,7 +10,10 @@ from rows import Row, alone, compared, exactly_zero, not_available
 from settings import Settings
 
 _PS_PER_NS = 1000
+_NS_PER_US = 1000
 _PACE_NS = 1000
+_RELEASES = ("plain", "shadowed", "waking", "probation")
+_SHADOW_US = 5.0  # 0.5 % of the period; most of it is the system call that wakes the shadow's thread
 _ONE_CPU = "this machine has one CPU"
 _COPY = "PI mutex lock + unlock + copy"
 
@@ -124,6 +127,39 @@ def trace_rows(settings: Settings) -> Iterator[Row]:
     yield compared("trace record, off", off, unit="ns", beside=beside, limit=2, note=note)
     on = _block_pairs(rounds, "on", "clock")
     yield compared("trace record, on", on, unit="ns", beside=beside, ratio_limit=1.6)
+
+
+def shadow_rows(settings: Settings) -> Iterator[Row]:
+    """Execute a component with a shadow, and on probation: ports, and whole releases."""
+    rounds = _rounds("bench_shadow", settings)
+    beside = "the same port without"
+    sides = {"tapped_read": "read, with a shadow's tap", "tapped_write": "write, with a shadow's tap"}
+    for name, what in (sides | {"watched_write": "write, with an output limit of a probation"}).items():
+        pairs = _block_pairs(rounds, name, name.partition("_")[2])
+        yield compared(f"port of a SharedData, 16 B, {what}", pairs, unit="ns", beside=beside)
+    what = "copy of a release with two ports of 16 B for its shadow, without the wake-up"
+    yield alone(what, _blocks(rounds, "capture"), unit="ns")
+    medians = [
+        {name: percentile(found[f"{name}_ns"], 50) / _NS_PER_US for name in _RELEASES} for found in rounds
+    ]
+    note = "two ports of 16 B; CPU time of the component's thread from one release to the next, p50; "
+    note += f"the shadow executed {sum(found['compared'] for found in rounds)} of "
+    note += f"{sum(found['releases'] for found in rounds)} releases"
+    added = [each["shadowed"] - each["plain"] for each in medians]
+    what = "CPU time that a shadow adds to each release of a 1 kHz component"
+    yield alone(what, added, unit="us", limit=_SHADOW_US, note=note)
+    whats = {
+        "shadowed": "with a shadow",
+        "waking": "that wakes a sleeping ordinary thread, without a shadow",
+        "probation": "on probation with an output limit",
+    }
+    for name, what in whats.items():
+        yield compared(
+            f"CPU time of a release of a 1 kHz component {what}",
+            [(each[name], each["plain"]) for each in medians],
+            unit="us",
+            beside="the same component without",
+        )
 
 
 def inversion_rows(settings: Settings) -> Iterator[Row]:

@@ -24,6 +24,7 @@ from micro import (
     inversion_rows,
     latest_value_rows,
     ring_buffer_rows,
+    shadow_rows,
     shared_data_rows,
     trace_rows,
 )
@@ -74,6 +75,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "latest-value": latest_value_rows,
     "activation": activation_rows,
     "trace": trace_rows,
+    "shadow": shadow_rows,
     "inversion": inversion_rows,
     "scale": scale_rows,
     "idle": idle_rows,

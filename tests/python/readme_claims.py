@@ -716,6 +716,20 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "Shadows.ACandidateOverItsBudgetCostsNobodyElse",
         "ShadowThreads.AComponentIsNotKeptWaitingByACandidateThatHangs",
     ),
+    (
+        "In each release, the live component copies its inputs and outputs for the candidate, and "
+        "wakes that thread."
+    ): (
+        "Shadows.TheCandidateReadsWhatTheLiveCoreReadsAtTheSameInstants",
+        "ShadowThreads.TheLiveThreadAllocatesNothing",
+    ),
+    (
+        "This adds about 2 us of CPU time to a release with two ports of 16 bytes, nearly all of "
+        "them for the wake-up ([measured](../concepts/performance.md))."
+    ): (
+        "bench: CPU time that a shadow adds to each release of a 1 kHz component",
+        "python/project/test_bench_micro.py::test_a_shadow_costs_what_it_adds",
+    ),
     "The budget is the execution time of the candidate for one release, on average.": (
         "Shadows.ACandidateOverItsBudgetCostsNobodyElse",
     ),

@@ -63,3 +63,16 @@ def test_the_limit_of_a_latest_values_write_comes_from_the_same_run(monkeypatch:
     _with(monkeypatch, found, {0})
     first = next(micro.latest_value_rows(QUICK))
     assert (first.target, first.verdict) == ("<= 8 ns", "missed")
+
+
+def test_a_shadow_costs_what_it_adds(monkeypatch: pytest.MonkeyPatch):
+    calls = {"read": 2, "write": 10, "tapped_read": 14, "tapped_write": 20, "watched_write": 21, "capture": 7}
+    times_us = {"plain": 8, "shadowed": 11, "waking": 12, "probation": 9}
+    found = {f"{name}_ps": [1000 * each] for name, each in calls.items()}
+    found |= {f"{name}_ns": [1000 * each] for name, each in times_us.items()}
+    _with(monkeypatch, found | {"releases": 60, "compared": 59}, {0})
+    rows = list(micro.shadow_rows(QUICK))
+    assert [row.ratio for row in rows] == [7, 2, 2.1, None, None, 11 / 8, 12 / 8, 9 / 8]
+    (added,) = [row for row in rows if row.target != "-"]
+    assert (added.measured, added.unit, added.verdict) == (3, "us", "met")
+    assert added.note.endswith("the shadow executed 590 of 600 releases")
