@@ -46,6 +46,7 @@ from reload import reload_rows
 from rows import Row, markdown, not_available
 from rules import rule_rows
 from safe_stop import safe_stop_rows
+from save import save_rows
 from scale import idle_rows, scale_rows, simulation_rows
 from service_calls import service_blackout_rows, service_rows, service_stop_rows
 from settings import FULL, QUICK, Settings
@@ -66,6 +67,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "stop-beside": stop_beside_rows,
     "swap": swap_rows,
     "reload": reload_rows,
+    "save": save_rows,
     "prefault": prefault_rows,
     "transaction": transaction_rows,
     "refused": refused_rows,
