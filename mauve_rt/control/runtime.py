@@ -1,7 +1,7 @@
 """An architecture at work: its host, its instance and its revision. Knows nothing of ROS."""
 
+import os
 import threading
-import uuid
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ class Runtime:
         self._load = load
         self._model: ArchitectureModel | None = None
         self.index = PluginIndex()
-        self.instance_id = str(uuid.uuid4())
+        self.instance_id = os.urandom(16).hex()  # the module uuid loads a library
         self.active = False
         self._changing = ""  # the change that is being prepared or made, in words
         self._unchanging = threading.Event()

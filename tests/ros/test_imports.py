@@ -15,6 +15,8 @@ import pytest
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 
+from mauve_rt import _kernel
+
 NODE = "/robot_1/executor"
 HEAVY = {
     "_hashlib",
@@ -37,6 +39,9 @@ AFTER_THE_START = {
     "mauve_rt.node.executor.parameter_services",
     "mauve_rt.node.executor.services",
 }
+# 1 MB of the standard library, without which an executor starts whose plug-ins are all in C++.
+LARGE_FOR_LITTLE = {"bz2", "lzma", "random", "shutil", "sysconfig", "tempfile", "uuid"}
+MODULES = Path(_kernel.__file__).parents[1]
 WITHOUT_RULES = {"mauve_rt.node.executor.rules_file", "mauve_rt.supervision.rules"}
 FORBIDDEN = {
     ("--help",): HEAVY | ROS,
@@ -101,6 +106,18 @@ def test_start_of_an_executor(traced: None, executor: Any, graph: Any) -> None:
     assert modules(before) & AFTER_THE_START == set()
     assert modules(after) >= AFTER_THE_START
     assert modules(before + after) & WITHOUT_RULES == set()
+
+
+def test_modules_of_each_start() -> None:
+    """Those before the plug-ins; plug-ins in Python need more."""
+    names = ("control.runtime", "node.shared.first_steps", "node.shared.log_folder")
+    program = "".join(f"import mauve_rt.{name}\n" for name in names)
+    program += "mauve_rt.node.shared.first_steps.take_first_steps('program')\n"
+    command = [sys.executable, "-P", "-X", "importtime", "-c", program]
+    environment = {**os.environ, "PYTHONPATH": str(MODULES)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert loaded(done.stderr) & LARGE_FOR_LITTLE == set()
 
 
 def test_components_in_python_wait_for_no_module_once_they_run(

@@ -8,7 +8,6 @@ of another ROS distribution on PYTHONPATH, end a start in the middle of it.
 import os
 import resource
 import sys
-import sysconfig
 from pathlib import Path
 
 from mauve_rt.node.shared.failures import more_open_files, report_uncaught
@@ -68,23 +67,31 @@ def leave_out_foreign_ros() -> None:
     scripts/setup does the same with the whole variable before it builds. An environment without a ROS of its
     own finds ROS by PYTHONPATH: there nothing is left out.
     """
+    named = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    with_ros = [entry for entry in named if _has_ros(Path(entry))]
+    if not with_ros:
+        return
+    import sysconfig  # noqa: PLC0415 - 0.2 MB, with the configuration that it reads
+
     own = Path(sysconfig.get_path("purelib"))
     if not _has_ros(own):
         return
-    named = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    foreign = {entry for entry in named if _has_other_ros(Path(entry), own)}
+    foreign = {entry for entry in with_ros if _is_other(Path(entry), own)}
     if foreign:
         os.environ["PYTHONPATH"] = os.pathsep.join(entry for entry in named if entry not in foreign)
         absolute = {os.path.abspath(entry) for entry in foreign}  # noqa: PTH100 - as the interpreter does
         sys.path[:] = [entry for entry in sys.path if os.path.abspath(entry) not in absolute]  # noqa: PTH100
 
 
-def _has_other_ros(folder: Path, own: Path) -> bool:
+def _is_other(folder: Path, own: Path) -> bool:
     try:
-        return _has_ros(folder) and not folder.samefile(own)
+        return not folder.samefile(own)
     except OSError:
         return False
 
 
 def _has_ros(folder: Path) -> bool:
-    return any((folder / name).is_dir() for name in _OF_ROS)
+    try:
+        return any((folder / name).is_dir() for name in _OF_ROS)
+    except OSError:  # it may not be read
+        return False
