@@ -724,7 +724,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ShadowThreads.TheLiveThreadAllocatesNothing",
     ),
     (
-        "This adds about 2 us of CPU time to a release with two ports of 16 bytes, nearly all of "
+        "This adds 1 to 2 us of CPU time to a release with two ports of 16 bytes, nearly all of "
         "them for the wake-up ([measured](../concepts/performance.md))."
     ): (
         "bench: CPU time that a shadow adds to each release of a 1 kHz component",
