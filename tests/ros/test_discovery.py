@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from ros_processes import PATIENCE_S, RELAY
 from udp_sockets import udp_sockets
-from waiting import until
+from waiting import wait_until
 
 from mauve_rt.parts.ament_index import share_folder
 
@@ -157,7 +157,7 @@ def test_a_program_announces_itself_from_the_last_port_to_the_first(
         assert (_received_ns(last) < _received_ns(first)) == can_write, log.read_text("utf-8")
         assert process.poll() is None, log.read_text("utf-8")
         assert "XMLPARSER" not in log.read_text("utf-8")
-        until(lambda: not list(tmp_path.glob("mauve_*.xml")), "the file's end")
+        wait_until(lambda: not list(tmp_path.glob("mauve_*.xml")))
 
 
 def _port_of(domain: int, participant: int) -> socket.socket:
