@@ -25,6 +25,7 @@ TABLES = {
     "records",
     "releases",
     "services",
+    "shadows",
     "states",
     "statistics",
 }
