@@ -118,10 +118,11 @@ class Machine:
     ) -> Self:
         """Of a mauve_msgs/msg/ComponentInfo, or what has the same fields.
 
-        `kinds`: of resources, by name; each resource of an unknown kind has a lock.
+        `kinds`: of resources, by name; each resource of an unknown kind has a lock, but for wait-free ports.
         """
-        ports = (port for port in getattr(told, "ports", ()) if port.resource)
-        times = {port.resource: int(getattr(port, "longest_hold_ns", 0)) for port in ports}
+        ports = [port for port in getattr(told, "ports", ()) if port.resource]
+        locking = (port for port in ports if not getattr(port, "wait_free", False))
+        times = {port.resource: int(getattr(port, "longest_hold_ns", 0)) for port in locking}
         return cls(
             name=told.name,
             cpus=tuple(int(cpu) for cpu in told.cpus),

@@ -10,11 +10,23 @@ namespace {
 // A lock that a call may wait for is never waited for under the interpreter's lock.
 using Unlocked = py::call_guard<py::gil_scoped_release>;
 
+/// Whether its lock is no matter depends on all ports of the service, so this is asked now.
+void describe_locking(const Architecture& architecture, std::vector<PortDescription>& ports) {
+  for (PortDescription& port : ports) {
+    const auto resource = architecture.find_resource(port.resource);
+    const ServiceBase* service = resource == nullptr ? nullptr : resource->find_service(port.service);
+    port.wait_free = service != nullptr && service->is_wait_free();
+  }
+}
+
 std::vector<ComponentDescription> describe_components(PyArchitecture& self) {
   const py::gil_scoped_release release;
   const std::lock_guard lock(self.describing);
   std::vector<ComponentDescription> all;
-  for (const auto& component : self.architecture.components()) all.push_back(describe_component(*component));
+  for (const auto& component : self.architecture.components()) {
+    all.push_back(describe_component(*component));
+    describe_locking(self.architecture, all.back().ports);
+  }
   return all;
 }
 

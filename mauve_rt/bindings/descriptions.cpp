@@ -162,7 +162,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("service", &PortDescription::service)
       .def_readonly("required", &PortDescription::required)
       .def_readonly("messages", &PortDescription::messages)
-      .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns);
+      .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns)
+      .def_readonly("wait_free", &PortDescription::wait_free);
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type)

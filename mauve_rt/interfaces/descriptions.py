@@ -271,6 +271,7 @@ def _port_info(port: PortDescription) -> Any:
         resource=port.resource,
         service=port.service,
         longest_hold_ns=port.longest_hold_ns,
+        wait_free=port.wait_free,
     )
 
 

@@ -21,6 +21,8 @@ class PortInfo:
     service: str
     longest_hold_ns: int = 0
     """For how long one user holds the resource's lock; 0: not declared, or an earlier version's bag."""
+    wait_free: bool = False
+    """It took no lock, as ports were connected then; False: or an earlier version's bag."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class ComponentInfo:
                 port.resource,
                 port.service,
                 int(getattr(port, "longest_hold_ns", 0)),
+                bool(getattr(port, "wait_free", False)),
             )
             for port in message.ports
         )

@@ -31,6 +31,14 @@ def test_the_locks_of_a_component_are_those_of_connected_resources() -> None:
     assert (found.holds, found.undeclared_locks) == ((Hold("map", 2_000_000),), ("scan",))
 
 
+def test_a_port_that_takes_no_lock_holds_none() -> None:
+    quick, slow = connected(scan=0, map=2), connected(scan=0, map=2)
+    for port in quick:
+        port.wait_free = True
+    assert (machine(ports=quick).holds, machine(ports=quick).undeclared_locks) == ((), ())
+    assert machine(ports=[*quick, *slow]) == machine(ports=slow), "its other ports do"
+
+
 def test_a_port_of_a_bag_of_an_earlier_version_declares_nothing() -> None:
     (port,) = connected(map=2)
     del port.longest_hold_ns

@@ -35,7 +35,8 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     declared = "counter: {deadline_ns: 7000000, states: {Count: {wcet_ns: 900000000}}, "
     text = text.replace("counter: {", declared, 1)
     text = text.replace("[counter.set, set.read]", "[counter.set, set.read]\n  - [guard.set, set.read]")
-    text = text.replace("set: {kind: shared_data, ", "set: {kind: shared_data, longest_hold_ns: 30000, ")
+    ring = "set: {kind: ring_buffer, capacity: 8, longest_hold_ns: 30000, "  # two readers: with a lock
+    text = text.replace("set: {kind: shared_data, ", ring)
     architecture.write_text(text, encoding="utf-8")
     bag = tmp_path / "bag"
     executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
@@ -64,7 +65,7 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     assert of_file["counter"]["states"][0]["origin"] == "declared"
     held = [{"resource": "set", "longest_ns": 30_000, "origin": "declared"}]
     assert of_file["counter"]["holds"] == of_file["guard"]["holds"] == held
-    assert of_file["counter"]["undeclared_locks"] == ["count"]
+    assert of_file["counter"]["undeclared_locks"] == [], "the only writer of count takes no lock"
 
     measured = analyzed(str(architecture), "--budget-from", str(bag), "--margin", str(MARGIN))
     assert measured["counter"]["states"] == of_file["counter"]["states"], "what is declared stays"
