@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from mauve_rt.model import ArchitectureModel, PluginIndex, PluginLoader, allowed
 from mauve_rt.model.schema import ComponentModel, DiagnosticsModel
 
 _MOMENT_S = 0.3
+_POLL_S = 0.005
 
 
 class StillBusyError(MauveError):
@@ -157,6 +159,12 @@ class Runtime:
         self.active = False
         self.host.shutdown()
         self.observe()
+
+    def await_parked(self, timeout_s: float) -> None:
+        """After deactivate(): wait for the states that still execute, for `timeout_s` at most."""
+        deadline = time.monotonic() + timeout_s
+        while self.busy() and time.monotonic() < deadline:
+            time.sleep(_POLL_S)
 
     def cleanup(self) -> None:
         """Release the architecture; configure() builds it anew, from the file as it is then.

@@ -160,4 +160,5 @@ class PyKeeping(PyCounter):
             else:
                 libc.close(libc.open(how.encode(), os.O_RDONLY))
             awaited.write_text("over", encoding="utf-8")
+            time.sleep(0.8)  # its state goes on for longer than a stop of all waits
         super().act()

@@ -155,7 +155,7 @@ def test_a_transition_makes_outputs_safe_at_once_and_follows(
     robot.graph.spin_until(lambda: "the transition follows" in robot.executor.output, "the log")
     robot.work()
     robot.graph.spin_until(change.done, "the transition")
-    assert change.result().success
+    assert change.result().success, robot.executor.output
     assert robot.graph.ask(GetState, f"{NODE}/get_state").current_state.label == state
     assert robot.executor.end(signal.SIGTERM)[0] == 0
 
