@@ -106,6 +106,7 @@ class PortDescription:
     required: Final[bool]  # told of a shell's ports, not of a component's
     messages: Final[list[MessageShape]]  # likewise
     longest_hold_ns: Final[int]  # for how long a user holds its resource's lock; 0: not declared
+    wait_free: Final[bool]  # it takes no lock, as ports are connected now; told of a component's ports
 
 @final
 class PropertyDescription:

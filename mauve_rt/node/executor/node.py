@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 NODE_NAME = "executor"
 _HEALTH_S = 1.0
-_LAST_STATES_S = 2.0  # a shutdown waits so long for states that still execute: Python's, where it has just hung
+_LAST_STATES_S = 2.0  # how long a shutdown waits for states that still execute, as where Python has just hung
 _SAFE_STOP = (
     "a signal makes outputs safe within 5 ms and the longest state that runs; a state that runs on for "
     f"{STOP_TIMEOUT_NS / 1e6:g} ms is given up"
