@@ -133,8 +133,9 @@ SHARED = (
     PAIR
     + """\
 resources:
-  number: {kind: shared_data, type: std_msgs/msg/Float64, longest_hold_ns: 1100000}
-  other: {kind: shared_data, type: std_msgs/msg/Float64}
+  number: {kind: ring_buffer, capacity: 4, overwrite: true, type: std_msgs/msg/Float64,
+           longest_hold_ns: 1100000}
+  other: {kind: ring_buffer, capacity: 4, overwrite: true, type: std_msgs/msg/Float64}
 connections:
   - [quick.set, number.read]
   - [quick.count, other.write]
@@ -173,10 +174,12 @@ def test_a_lock_of_two_cpus_is_not_provable(analyze: Analyze) -> None:
     assert f"  quick: {why.format('slow')}\n  slow: {why.format('quick')}\n" in out
 
 
-def test_a_resource_that_two_share_without_a_lock_is_not_named(analyze: Analyze) -> None:
-    text = SHARED.replace("other: {kind: shared_data", "other: {kind: latest_value")
+@pytest.mark.parametrize("kind", ["latest_value", "shared_data", "ring_buffer, capacity: 4"])
+def test_a_port_that_takes_no_lock_neither_blocks_nor_is_named(analyze: Analyze, kind: str) -> None:
+    text = SHARED.replace("ring_buffer, capacity: 4, overwrite: true", kind)
     _, out, _ = analyze(text)
-    assert "for no time" not in out
+    assert "lock" not in out
+    assert "  response at most 3.000 ms, its deadline of 10.000 ms is met\n" in out
 
 
 def test_a_lock_that_nobody_declares_takes_the_longest_measured_call(
@@ -189,7 +192,7 @@ def test_a_lock_that_nobody_declares_takes_the_longest_measured_call(
         source.add(component, Kind.SERVICE_BEGIN, begin_ns, name="number.read")
         source.add(component, Kind.SERVICE_END, begin_ns + held_ns, name="number.read")
     bag = record(source, tmp_path / "bag")
-    text = SHARED.replace(", longest_hold_ns: 1100000", "")
+    text = SHARED.replace(",\n           longest_hold_ns: 1100000", "")
     _, out, _ = analyze(text, "--budget-from", str(bag), "--margin", "2")
     assert "  holds the lock of number up to 1.800 ms, measured in bag (n = 2) x 2\n" in out
     assert "is met, blocked up to 1.800 ms\n" in out
