@@ -228,16 +228,19 @@ class Control:
         if reload.generation is None:
             prefix = "dry run: would be accepted; " if request.dry_run else ""
             return Outcome(code=Code.OK, message=prefix + found)
-        since_ns = self._runtime.host.now_ns()
+        number = 0 if reload.probation is None else reload.generation.number
+        trial = number, self._runtime.host.now_ns()
+        trials = dict(self._trials)
         try:
             steps, transaction = reload.steps()
+            # Before the commit: its verdict may come, and be looked at, before the commit returns.
+            self._trials.update(dict.fromkeys((step.target for step in steps), trial))
             committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
         except BaseException:
+            self._trials = trials
             reload.undo()
             raise
         reload.commit()
-        number = 0 if reload.probation is None else reload.generation.number
-        self._trials.update(dict.fromkeys((step.target for step in steps), (number, since_ns)))
         outcome = Outcome(
             code=Code.OK, message=reload.message(steps), loaded=reload.generation.loaded, report=()
         )

@@ -11,7 +11,8 @@ from reload_world import World, make_world_of_bad_cores
 
 from mauve_rt._kernel import ProbationRecord
 from mauve_rt.control.probations import ProbationWatch, Verdict
-from mauve_rt.control.requests import Code, Outcome, Step
+from mauve_rt.control.reloads import Reload
+from mauve_rt.control.requests import Code, Outcome, Request, Step
 from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model.probation import read_probation
 
@@ -138,6 +139,26 @@ def test_a_reload_on_probation_goes_back_as_a_whole(world: World, rebuilt: Rebui
     assert world.control.way_back(verdict) is None
     assert [info.generation for info in component_infos(world.runtime)] == [1, 1, 1]
     assert world.mean_step() == 1.0
+
+
+def test_a_verdict_that_comes_before_the_reload_ends_leads_back_too(
+    world: World, rebuilt: RebuiltPackage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requests: list[Request | None] = []
+    commit = Reload.commit
+
+    def commit_late(reload: Reload) -> None:
+        if not requests:
+            requests.append(world.control.way_back(Verdict(_decided(world))))
+        commit(reload)
+
+    monkeypatch.setattr(Reload, "commit", commit_late)
+    rebuilt.build("THROWS", "STEP=2.0", "NEW_CORE")
+    assert world.reload("loop", probation="{probation_s: 60}").success
+    (request,) = requests
+    assert request is not None
+    assert world.control.handle(request).success
+    assert world.generation() == 1
 
 
 def test_a_reload_that_passes_stays(world: World, rebuilt: RebuiltPackage) -> None:
