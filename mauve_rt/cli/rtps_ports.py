@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import NamedTuple
 
-_FIRST_PORT, _DOMAIN_PORTS, _MAX_PARTICIPANTS = 7410, 250, 120  # of discovery by unicast
+from mauve_rt.node.shared.rtps_ports import discovery_ports
+
+MAX_PARTICIPANTS = 120  # of a domain
 UDP_TABLE = Path("/proc/net/udp")
 _ADDRESS, _INODE = 1, 9  # columns
 
@@ -21,8 +23,7 @@ def discovery_sockets(domain: int) -> list[DiscoverySocket]:
     Raises:
         OSError: the system has no table of UDP sockets.
     """
-    first = _FIRST_PORT + _DOMAIN_PORTS * domain
-    ports = range(first, first + 2 * _MAX_PARTICIPANTS, 2)
+    ports = discovery_ports(domain, MAX_PARTICIPANTS)
     rows = [line.split() for line in UDP_TABLE.read_text("ascii").splitlines()[1:]]
     found = [
         DiscoverySocket(int(row[_ADDRESS].rpartition(":")[2], 16), row[_INODE])

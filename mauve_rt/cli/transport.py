@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from mauve_rt.cli.rtps_ports import MAX_PARTICIPANTS
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.loopback import (
     LoopbackError,
@@ -20,10 +21,10 @@ from mauve_rt.node.shared.loopback import (
     set_environment,
     users_profile,
 )
+from mauve_rt.node.shared.rtps_ports import discovery_ports
 
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _MEMORY = Path("/dev/shm")  # noqa: S108 - not ours: Fast DDS's
-_FIRST_PORT, _DOMAIN_PORTS, _MAX_PARTICIPANTS = 7411, 250, 120  # of data by unicast, in RTPS
 
 
 def by_fast_dds() -> bool:
@@ -52,8 +53,8 @@ def by_udp() -> Iterator[None]:
 
 def accounts_in_the_way(domain: int) -> list[str]:
     """Other accounts whose processes in a ROS domain have shared memory that this one may not use."""
-    first = _FIRST_PORT + _DOMAIN_PORTS * domain
-    locks = (_MEMORY / f"sem.fastrtps_port{first + 2 * number}_mutex" for number in range(_MAX_PARTICIPANTS))
+    ports = (port + 1 for port in discovery_ports(domain, MAX_PARTICIPANTS))  # of their data
+    locks = (_MEMORY / f"sem.fastrtps_port{port}_mutex" for port in ports)
     owners = {
         lock.stat().st_uid for lock in locks if lock.exists() and not os.access(lock, os.R_OK | os.W_OK)
     }

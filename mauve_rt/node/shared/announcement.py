@@ -14,8 +14,9 @@ from pathlib import Path
 
 from mauve_rt.node.shared.discovery import PROFILES, has_own_profile
 from mauve_rt.node.shared.domain import domain
+from mauve_rt.node.shared.rtps_ports import discovery_ports
 
-_FIRST_PORT, _DOMAIN_PORTS, _PARTICIPANTS = 7410, 250, 32  # of discovery by unicast, in RTPS; as the profiles
+_PARTICIPANTS = 32  # as the profiles have it
 _PEERS = "<locator><udpv4><address>127.0.0.1</address></udpv4></locator>"
 _PEER = "<locator><udpv4><address>127.0.0.1</address><port>{}</port></udpv4></locator>"
 
@@ -38,9 +39,8 @@ def first_participant() -> Iterator[None]:
 
 def _downwards(profile: str, domain: int) -> str:
     """The profile with the ports of the first participants of a domain as peers, the last of them first."""
-    first = _FIRST_PORT + _DOMAIN_PORTS * domain
-    ports = range(first, first + 2 * _PARTICIPANTS, 2)
-    return profile.replace(_PEERS, "".join(map(_PEER.format, reversed(ports))))
+    ports = reversed(discovery_ports(domain, _PARTICIPANTS))
+    return profile.replace(_PEERS, "".join(map(_PEER.format, ports)))
 
 
 @contextmanager
