@@ -10,7 +10,7 @@ namespace {
 // A lock that a call may wait for is never waited for under the interpreter's lock.
 using Unlocked = py::call_guard<py::gil_scoped_release>;
 
-/// Whether its lock is no matter depends on all ports of the service, so this is asked now.
+/// Whether a port takes a lock depends on all ports of its service, and changes with them.
 void describe_locking(const Architecture& architecture, std::vector<PortDescription>& ports) {
   for (PortDescription& port : ports) {
     const auto resource = architecture.find_resource(port.resource);

@@ -38,6 +38,7 @@ from mauve_rt.model.schema import ResourceModel
 
 DEFAULT_TIMEOUT_S = 1.0
 _CALLED_OFF = ("wrong_revision", "not_configured", "timeout")
+_NO_TRIAL = (0, 0)
 
 
 class Outside(Protocol):
@@ -148,7 +149,7 @@ class Control:
     def way_back(self, verdict: Verdict) -> Request | None:
         """What else goes back when an old core is back: the other parts of its generation; None: nothing."""
         record = verdict.record
-        generation, since_ns = self._trials.get(record.component, (0, 0))
+        generation, since_ns = self._trials.get(record.component, _NO_TRIAL)
         if generation == 0 or record.begin_ns < since_ns:
             return None  # of an earlier probation, or of no reload
         self._trials.pop(record.component, None)
@@ -230,14 +231,15 @@ class Control:
             return Outcome(code=Code.OK, message=prefix + found)
         number = 0 if reload.probation is None else reload.generation.number
         trial = number, self._runtime.host.now_ns()
-        trials = dict(self._trials)
+        before: dict[str, tuple[int, int]] = {}
         try:
             steps, transaction = reload.steps()
+            before = {step.target: self._trials.get(step.target, _NO_TRIAL) for step in steps}
             # Before the commit: its verdict may come, and be looked at, before the commit returns.
-            self._trials.update(dict.fromkeys((step.target for step in steps), trial))
+            self._trials.update(dict.fromkeys(before, trial))
             committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
         except BaseException:
-            self._trials = trials
+            self._trials.update(before)
             reload.undo()
             raise
         reload.commit()
