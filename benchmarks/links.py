@@ -59,7 +59,7 @@ def _row(name: str, outcomes: list[Outcome], rounds: int) -> Row:
     what = f"link: {name}"
     if not acting:
         note = f"no swap more than the cooldown lets in {well} of {rounds}" if name == "flapping" else ""
-        calm = note or f"nobody acted in {well} of {rounds}"
+        calm = note or f"no robot acted in {well} of {rounds}"
         return Row(what=what, note=calm, verdict="met" if well == rounds else "missed")
     seen = [outcome.after_s(robot, "do") for outcome in outcomes for robot in acting]
     back = [outcome.after_s(robot, "undo") for outcome in outcomes for robot in acting]
