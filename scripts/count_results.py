@@ -3,10 +3,12 @@
 
     scripts/count_results.py [--failed-stages N] FOLDER
     scripts/count_results.py --skipped FILE     print the skipped cases of a ctest run and why
+    scripts/count_results.py --excused FILE     exit status 0 when all failed cases passed their second try
     scripts/count_results.py --slowest N FOLDER print the N slowest cases: seconds, stage, name
 
 Exit status 1 when a case failed or a stage did. Stages that failed when no case did (they did not build, say)
-count as failed cases.
+count as failed cases. Cases that passed the second try (scripts/second_try.py) count as passed. The line
+before the last one counts them.
 """
 
 from __future__ import annotations
@@ -68,16 +70,29 @@ def print_slowest(folder: Path, count: int) -> None:
         sys.stdout.write(f"{seconds:7.1f} s  {stage:7} {name}\n")
 
 
+def end_of_output(case: ET.Element) -> list[str]:
+    """Return the last lines that a failed case printed, indented; of pytest the traceback."""
+    texts = [case.findtext("failure"), case.findtext("error")]
+    told = "\n".join(text for text in texts if text) or case.findtext("system-out") or ""
+    return [f"    {line[:MOST_CHARACTERS]}" for line in told.splitlines()[-MOST_LINES:]]
+
+
 def print_failed(folder: Path) -> None:
     """Print each failed case with the end of its output: the log of a long run may be cut before it."""
     for stage, case in cases_of(folder):
-        if outcome(case) != "failed":
-            continue
-        texts = [case.findtext("failure"), case.findtext("error"), case.findtext("system-out")]
-        lines = "\n".join(text for text in texts if text).splitlines()
-        sys.stdout.write(f"FAILED {stage}: {name_of(case)}\n")
-        for line in lines[-MOST_LINES:]:
-            sys.stdout.write(f"    {line[:MOST_CHARACTERS]}\n")
+        if outcome(case) == "failed":
+            sys.stdout.write("\n".join([f"FAILED {stage}: {name_of(case)}", *end_of_output(case)]) + "\n")
+
+
+def is_unstable(case: ET.Element) -> bool:
+    """Whether the case failed at first and passed its second try."""
+    return case.get("unstable") is not None
+
+
+def is_excused(path: Path) -> bool:
+    """Whether the failed cases of a stage all passed their second try; False without a failed case."""
+    cases = list(ET.parse(path).getroot().iter("testcase")) if path.is_file() else []
+    return any(is_unstable(case) for case in cases) and all(outcome(case) != "failed" for case in cases)
 
 
 def main() -> int:
@@ -87,12 +102,15 @@ def main() -> int:
     )
     parser.add_argument("--failed-stages", type=int, default=0)
     parser.add_argument("--skipped", action="store_true")
+    parser.add_argument("--excused", action="store_true")
     parser.add_argument("--slowest", type=int)
     parser.add_argument("path", type=Path)
     arguments = parser.parse_args()
     if arguments.skipped:
         print_skipped(arguments.path)
         return 0
+    if arguments.excused:
+        return 0 if is_excused(arguments.path) else 1
     if arguments.slowest is not None:
         with contextlib.suppress(BrokenPipeError):  # `| head`
             print_slowest(arguments.path, arguments.slowest)
@@ -101,6 +119,9 @@ def main() -> int:
     counts = Counter(outcome(case) for _, case in cases_of(arguments.path))
     if arguments.failed_stages and not counts["failed"]:
         counts["failed"] = arguments.failed_stages
+    unstable = sum(is_unstable(case) for _, case in cases_of(arguments.path))
+    if unstable:
+        sys.stdout.write(f"{unstable} unstable: failed at first, passed alone (test-results/unstable.txt)\n")
     sys.stdout.write(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped\n")
     return 1 if counts["failed"] else 0
 
