@@ -57,17 +57,21 @@ has_python_packages() {
   [[ -f $stamp && $(<"$stamp") == "$(python_key "$1")" ]]
 }
 
-ensure_python_packages() {
+# The sets that this run needs in .venv, one a line.
+python_sets() {
   if $only_docs; then
-    ensure_python_set docs
+    echo docs
     return
   fi
-  ensure_python_set base
-  if $with_tests || $with_benchmarks; then ensure_python_set tests; fi # benchmarks read bags as others do
-  if $with_lint; then
-    ensure_python_set lint
-    ensure_python_set docs # scripts/lint builds the documentation
-  fi
+  echo base
+  if $with_tests || $with_benchmarks; then echo tests; fi # benchmarks read bags as others do
+  if $with_lint; then printf '%s\n' lint docs; fi # scripts/lint builds the documentation
+}
+
+ensure_python_packages() {
+  local sets set
+  mapfile -t sets < <(python_sets)
+  for set in "${sets[@]}"; do ensure_python_set "$set"; done
 }
 
 ensure_python_set() {

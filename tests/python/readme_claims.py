@@ -230,7 +230,9 @@ CLAIMS: dict[str, tuple[str, ...]] = {
     (
         "`scripts/setup` says what it needs before it begins; [uninstall](uninstall.md) says how "
         "to remove all of it."
-    ): ("python/project/test_scripts.py::test_too_little_space_is_told_before_anything_is_begun",),
+    ): (
+        "python/project/test_scripts.py::test_the_plan_and_too_little_space_are_told_before_anything_is_begun",
+    ),
     (
         "To colcon and rosdep the clone is one package, `mauve_rt`, which brings `mauve_msgs` and "
         "`mauve_examples`: a package that uses any of them says `<depend>mauve_rt</depend>`, and "

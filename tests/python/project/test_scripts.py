@@ -226,13 +226,15 @@ def test_progress_says_how_far_what_and_how_long(tmp_path: Path):
     assert process.returncode == 0
 
 
-def test_too_little_space_is_told_before_anything_is_begun(tmp_path: Path):
+def test_the_plan_and_too_little_space_are_told_before_anything_is_begun(tmp_path: Path):
     small = tmp_path / "small"
     small.mkdir()
     script = f"""
         mount -t tmpfs -o size=60m small {small} && echo mounted || exit
         mkdir {small}/clone && cp -r {SCRIPTS} {ROOT}/requirements {small}/clone
         {small}/clone/scripts/setup
+        echo "310.5 s on 2026-01-01" >{small}/clone/build/.setup-took
+        {small}/clone/scripts/setup --quiet
         status=$?
         ls -A {small}/clone
         exit $status"""
@@ -248,6 +250,15 @@ def test_too_little_space_is_told_before_anything_is_begun(tmp_path: Path):
     assert done.returncode == 2
     assert re.search(r"expected \d{3,} MB free .*, found \d\d MB; make room", done.stderr)
     assert done.stdout.split()[1:] == ["build", "requirements", "scripts"]
+    plans = re.findall(r"^setup: (?!expected)(.*)$", done.stderr, re.MULTILINE)
+    first, second = plans[: len(plans) // 2], plans[len(plans) // 2 :]
+    assert "this will install Python packages into .venv (to build and run)" in first
+    assert first[-3:] == [
+        "this will compile MAUVE RT in build/",
+        "this will install it to install/",
+        "the first time in this clone",
+    ]
+    assert second == [*first[:-1], "the last time took 310.5 s on 2026-01-01"]
 
 
 def test_a_demo_builds_no_test_program():
