@@ -1,6 +1,6 @@
 """Rows of the result: what was measured, beside what, against which target, and how it went."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -31,15 +31,6 @@ class Row:
             interval = getattr(self, name)
             row[name] = None if interval is None else [interval.low, interval.high]
         return row
-
-    @classmethod
-    def from_json(cls, row: Mapping[str, Any]) -> "Row":
-        """The row of which as_json() made that; without its rounds where these were left out."""
-        told = dict(row)
-        for name in ("measured", "ratio"):
-            bounds = told[f"{name}_interval"]
-            told[f"{name}_interval"] = None if bounds is None else Interval(told[name], *bounds)
-        return cls(**told)
 
 
 def compared(

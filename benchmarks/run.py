@@ -16,7 +16,7 @@ from pathlib import Path
 import machine
 from analysis import analysis_rows
 from command import command_rows
-from document import PAGE, around_figures, write_docs
+from document import PAGE, figures_of, write_docs
 from echo import echo_rows, watch_rows
 from links import links_rows
 from micro import (
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--write-docs: the figures are those of one run of all benchmarks; leave out --only")
     if given.write_docs:
         try:
-            around_figures(PAGE.read_text(encoding="utf-8"))
+            figures_of(PAGE.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             parser.error(f"--write-docs: {error}")
     settings = FULL if given.full else QUICK
@@ -122,18 +122,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows, complete = _measure(given.only or list(BENCHMARKS), settings)
     print(markdown(rows))
     print(f"\n{described.line()}")
-    print(f"{settings.mode}, {settings.rounds} rounds; steal time {steal.percent():.2f} %")
+    steal_percent = steal.percent()
+    print(f"{settings.mode}, {settings.rounds} rounds; steal time {steal_percent:.2f} %")
     result = {
         "mode": settings.mode,
         "machine": described.as_json(),
         "machine_line": described.line(),
-        "steal_percent": steal.percent(),
+        "steal_percent": steal_percent,
         "rows": [row.as_json() for row in rows],
     }
     if given.json is not None:
         given.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if given.write_docs:
-        write_docs(result)
+        told = f"`scripts/bench --{settings.mode}`, steal time {steal_percent:.2f} %"
+        write_docs(rows, f"{described.line()}; {told}.")
     missed = [row for row in rows if row.verdict == "missed"] if given.gate else []
     for row in missed:
         sys.stderr.write(

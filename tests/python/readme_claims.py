@@ -1960,7 +1960,7 @@ CLAIMS: dict[str, tuple[str, ...]] = {
         "ros/executor/test_process.py::test_require_realtime_refuses_to_run_without",
     ),
     "`scripts/bench --write-docs` writes this table: every row of one run on one machine.": (
-        "python/project/test_bench_docs.py::test_the_page_has_the_figures_that_are_kept",
+        "python/project/test_bench_docs.py::test_no_figure_of_the_page_was_typed",
     ),
     (
         "Where a reference is shown, it was measured in turn with the figure, in the same run; the ratio is "

@@ -13,7 +13,7 @@ COMMAND = re.compile(r"(mauve|ros2|scripts/\w+|install/lib/\S+) ")
 
 
 GENERATED = re.compile(
-    r"<!-- figures: .*?<!-- end of the figures -->", re.DOTALL
+    r"<!-- figures: .*?<!-- end of the figures[^>]*-->", re.DOTALL
 )  # test_bench_docs.py holds it
 
 
