@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from markdown_it import MarkdownIt
 
 # Of MyST: they have no code in them. Other directives begin with :::, so that code in them is found.
-WITHOUT_CODE = ("{toctree}", "{glossary}")
+WITHOUT_CODE = ("{toctree}", "{glossary}", "{include}")
 MARKER = re.compile(r"<!-- not run: (\S.*) -->\n")
 
 

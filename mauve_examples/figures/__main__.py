@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="figures", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR", help="(default: docs)")
+    parser.add_argument("--out", type=Path, default=Path("figures"), metavar="DIR", help="(default: figures)")
     parser.add_argument("--bags", type=Path, metavar="DIR", help="keep the recorded bags here")
     last = max(os.sched_getaffinity(0))
     parser.add_argument(

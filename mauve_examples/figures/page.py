@@ -1,4 +1,4 @@
-"""docs/figures.md: the figures with what each shows, in the numbers of the same runs."""
+"""What a run writes for docs/figures.md: each figure and what it shows, in the numbers of the same run."""
 
 import os
 import platform
@@ -16,18 +16,12 @@ from mauve_examples.figures.measures import (
     swap_of,
     tasks_of,
 )
-from mauve_examples.figures.runs import PERIOD_MS, PREPARE_MS, WORK_MS, Run
+from mauve_examples.figures.runs import PREPARE_MS, Run
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 
 _PARAGRAPH_WIDTH = 120
 _HEAD = """\
-# Fig. 3, 5 and 6 of the paper, from traces
-
-Two tasks run on one processor, each every {period_ms} ms: {tau_1}, of the higher priority, computes for
-{first_ms} ms, {tau_2} for {second_ms} ms. The deployer is an ordinary thread on the same processor.
-`scripts/figures` ran them, recorded bags and drew what these tell, the deployer's boxes from its own
-time stamps; nothing is drawn by hand. It runs anywhere and draws what happens there. These runs are of
-{date}, {machine}, {scheduling}.
+These runs are of {date}, {machine}, {scheduling}.
 
 Boxes: {boxes}. Faint: they want it, another has it. Arrows: nominal releases. Circles:
 the task's thread is there and waits for its first instant. Dotted: the grids of instants.
@@ -111,9 +105,6 @@ def _head(runs: Runs) -> str:
     real_time = _is_real_time(runs.deployment)
     return _filled(
         _HEAD,
-        period_ms=PERIOD_MS,
-        first_ms=WORK_MS[0],
-        second_ms=WORK_MS[1],
         date=time.strftime("%Y-%m-%d", time.gmtime()),
         machine=machine(),
         scheduling="under `SCHED_FIFO`" if real_time else denied,
