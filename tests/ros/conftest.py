@@ -139,7 +139,7 @@ def architecture(tmp_path: Path, plugin_prefix: Path) -> Path:
 def start_executor(
     tmp_path: Path, domain: int, plugin_prefix: Path
 ) -> Iterator[Callable[..., ExecutorProcess]]:
-    """start_executor("-p", "architecture:=FILE", ...): ended with the test, by force if need be."""
+    """start_executor("-p", "architecture:=FILE", ...): ended with the test, which fails where one hangs."""
     started: list[ExecutorProcess] = []
 
     def start(
@@ -150,14 +150,17 @@ def start_executor(
         return started[-1]
 
     yield start
+    hung = []
     for executor in started:
         if executor.process.poll() is None:
             executor.process.terminate()
             try:
-                executor.process.wait(5)
+                executor.process.wait(PATIENCE_S)
             except subprocess.TimeoutExpired:
                 executor.process.kill()
                 executor.process.wait()
+                hung.append(executor.process.args)
+    assert not hung, "these had to be killed"
 
 
 @pytest.fixture
