@@ -64,6 +64,14 @@ now_ms() {
 # 12345 -> 12.3
 seconds_of_ms() { printf '%d.%d' $(($1 / 1000)) $(($1 % 1000 / 100)); }
 
+# Set `cpu_ms` to the CPU time of all commands that this shell has waited for.
+count_cpu_ms() {
+  local log="$MAUVE_BUILD/.times.$BASHPID"
+  times >"$log" # not in a subshell: that one has waited for none
+  cpu_ms=$(awk -F '[ms. ,]+' 'NR == 2 { print 60000 * ($1 + $4) + 1000 * ($2 + $5) + $3 + $6 }' "$log")
+  rm "$log"
+}
+
 # with_lock NAME COMMAND...: one at a time in this clone; a second caller waits and says so.
 with_lock() {
   local lock="$MAUVE_BUILD/.$1.lock" status
