@@ -69,7 +69,7 @@ NO_END = re.compile(rf"{CODE.pattern}|{MARK.pattern}")
 FIGURE_OF_CODE = re.compile(rf"(?<!\w){_NUMBER} ({_UNIT})(?!\w)")
 # Of sources: NAME_S = 5.0, kAfterNs{500'000'000}, ms_to_ns(1), 500ms, "500 ms".
 LITERAL = re.compile(rf"(?:(\w+)[\"']?(?:: ?\w+)?[\s=({{:]+)?(?<![\w.]){_NUMBER}(?: ?({_UNIT})(?!\w))?")
-UNIT_OF_NAME = re.compile(r"^(ns|us|ms|s)_to_|_(ns|us|ms|s|hz|bytes)$|(Ns|Us|Ms|S|Hz|Bytes)$", re.IGNORECASE)
+UNIT_OF_NAME = re.compile(r"^(ns|us|ms|s)_to_|_((?i:ns|us|ms|s|hz|bytes))$|(?<=[a-z])(Ns|Us|Ms|S|Hz|Bytes)$")
 
 
 @dataclass(frozen=True)

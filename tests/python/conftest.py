@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # for python_parts
-sys.path.append(str(Path(__file__).parents[2] / "scripts"))  # for check_claims
 
 from python_parts import Stage
 
