@@ -20,8 +20,8 @@ from count_results import cases_of, outcome
 
 ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"<!-- (claim|measured|no claim)(?:: *([^>]*?))? *-->")
-# The end of program.Prefix/Suite.Name/parameter or program.Suite/type.Name; all readings are found.
-GTEST = re.compile(r"(?=(?:^|[./])(\w+)(?:/\w+)?\.(\w+)(?:/.*)?$)")
+# program.Suite.Name, program.Suite.Name<type>, program.Prefix/Suite.Name/parameter: all readings are found.
+GTEST = re.compile(r"(?=(?:^|[./])(\w+)\.(\w+)(?:[/<].*)?$)")
 
 
 def pages(root: Path) -> dict[str, str]:

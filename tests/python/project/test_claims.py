@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import pytest
 from claims import PAGES_OF_CLAIMS, PROMISE, problems, sentences
@@ -133,10 +134,17 @@ def test_a_claim_whose_test_did_not_run_is_told(tmp_path: Path) -> None:
         "<testcase classname='tests.f.test_x' name='test_skipped[1]'><skipped/></testcase>"
         "</testsuite></testsuites>"
     )
-    names = ("test_ring.Ring.Whole", "test_ring.Typed/0.Whole", "test_ring.All/Own.Each/3", "gps_lost")
+    names = (
+        "test_ring.Ring.Whole",
+        "test_ring.Typed.Whole<a::B<c.d>/e>",
+        "test_ring.All/Own.Each/3  # GetParam() = 3",
+        "gps_lost",
+    )
     (results / "kernel.xml").write_text(
         "<testsuite>"
-        + "".join(f"<testcase name='{name}' classname='{name}' status='run'/>" for name in names)
+        + "".join(
+            f"<testcase name={quoteattr(name)} classname={quoteattr(name)} status='run'/>" for name in names
+        )
         + "<testcase name='listings' classname='listings' status='notrun'><skipped message=''/></testcase>"
         "</testsuite>"
     )
