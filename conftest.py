@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, settings
 import mauve_examples  # noqa: F401 - as it is installed: pytest would name tests after the clone's folder
 
 sys.path.insert(0, str(Path(__file__).parent / "tests"))  # for bag_rules
+sys.path.append(str(Path(__file__).parent / "scripts"))  # for check_claims
 
 # What an example may take depends on what else the machine does.
 settings.register_profile("mauve", deadline=None, suppress_health_check=[HealthCheck.too_slow])

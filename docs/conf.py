@@ -4,6 +4,9 @@ import logging
 import sys
 from pathlib import Path
 
+from docutils import nodes
+from sphinx.application import Sphinx
+
 project = "MAUVE RT"
 html_title = "MAUVE RT"
 
@@ -26,3 +29,15 @@ html_show_copyright = False
 html_show_sourcelink = False
 html_copy_source = False
 html_show_search_summary = False  # a browser lets a page from a file read no other page
+
+
+def _drop_comments(_app: Sphinx, page: nodes.document) -> None:
+    """Leave out comments such as the marks of claims."""
+    for node in list(page.findall(nodes.raw)):
+        if node.astext().lstrip().startswith("<!--"):
+            node.parent.remove(node)
+
+
+def setup(app: Sphinx) -> None:
+    """Sphinx calls this."""
+    app.connect("doctree-read", _drop_comments)

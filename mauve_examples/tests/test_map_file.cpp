@@ -125,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{PNG_FORMAT_RGB_COLORMAP, std::vector<png_byte>{0, 1}}));
 
 TEST(MapFile, RefusesWithOneLineThatNamesWhatIsWrong) {
-  EXPECT_NE(refusal("image: map.pgm\nresolution: -0.05\norigin: [0, 0, 0]\n").find("resolution"),
+  EXPECT_NE(refusal("image: map.pgm\nresolution: -0.05\norigin: [0, 0, 0]\n").find("0.001 to 10 metres"),
             std::string::npos);
   EXPECT_NE(refusal("image: map.pgm\nresolution: 0\norigin: [0, 0, 0]\n").find("map.yaml:2"),
             std::string::npos);

@@ -258,7 +258,7 @@ TEST(BmpMaps, AreRefusedWithOneLineThatNamesWhatIsWrong) {
   told(changed(22, 0x80000000, 4), "size");  // a height without a positive counterpart
   told(changed(18, 0x7FFFFFFF, 4), "4194304 cells");
   told(changed(18, 4000, 4), "truncated");
-  told(changed(28, 16, 2), "bits a pixel");
+  told(changed(28, 16, 2), "1, 4, 8, 24 or 32 bits a pixel");
   told(changed(28, 0, 2), "bits a pixel");
   told(changed(30, 1, 4), "compression 1");
   told(changed(10, 0xFFFFFFFF, 4), "truncated");  // where the pixels begin

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
+import check_claims
+
 ROOT = Path(__file__).parents[2]
-PAGES = {
-    str(file.relative_to(ROOT)): file.read_text(encoding="utf-8")
-    for file in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-}
+PAGES = check_claims.pages(ROOT)
 ALL = "\n\n".join(PAGES.values())

@@ -14,7 +14,7 @@ from mauve_rt import _kernel
 ROOT = Path(__file__).resolve().parents[3]
 PRODUCT = ("mauve_rt", "mauve_examples", "mauve_msgs", "cmake")
 OF_TESTS = ("tests", "mauve_examples/tests", "benchmarks")
-ON_THE_PATH_OF_TESTS = ("tests", "tests/plugins", "benchmarks")
+ON_THE_PATH_OF_TESTS = ("tests", "tests/plugins", "benchmarks", "scripts")
 OWN = {"mauve_rt", "mauve_examples", "mauve_msgs"}
 # Of modules that are no ROS packages: rosdep's key (rosdep/python.yaml) and the name in requirements/.
 MODULES = {
