@@ -43,13 +43,28 @@ macro(mauve_add_part folder)
   endif()
 endmacro()
 
-# mauve_add_programs(PATTERN <glob> LIBRARIES <targets>... [TESTS]): one executable per source, named as the file.
+# mauve_add_programs(PATTERN <glob> LIBRARIES <targets>... [PRECOMPILED <header>] [TESTS [IN_UNITS] [ALONE <names>...]]):
+# one executable per source, named as the file.
+# PRECOMPILED: what all of them include is compiled once, which saves half the time they take.
 # TESTS registers every GoogleTest case with ctest; cases are listed when ctest runs, not while building.
+# IN_UNITS: with MAUVE_UNITS, the sources of a folder are one program, tests_<folder>, except those ALONE.
 function(mauve_add_programs)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "TESTS" "PATTERN" "LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "TESTS;IN_UNITS" "PATTERN;PRECOMPILED" "LIBRARIES;ALONE")
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${arg_PATTERN}")
+  set(programs "")
   foreach(source IN LISTS sources)
     get_filename_component(name "${source}" NAME_WE)
+    if(arg_IN_UNITS AND MAUVE_UNITS AND NOT name IN_LIST arg_ALONE)
+      get_filename_component(folder "${source}" DIRECTORY)
+      get_filename_component(folder "${folder}" NAME)
+      set(name "tests_${folder}")
+    endif()
+    if(TARGET ${name})
+      target_sources(${name} PRIVATE "${source}")
+      set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 7)
+      continue()
+    endif()
+    list(APPEND programs ${name})
     add_executable(${name} "${source}")
     target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} mauve_warnings mauve_sanitizers)
     if(arg_TESTS)
@@ -59,18 +74,13 @@ function(mauve_add_programs)
       gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES TIMEOUT 600)
     endif()
   endforeach()
-endfunction()
-
-# mauve_share_precompiled(<glob> <header>): what all programs of mauve_add_programs() include is compiled once, which
-# saves half the time they take.
-function(mauve_share_precompiled pattern header)
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${pattern}")
-  list(TRANSFORM sources REPLACE ".*/(.*)\\.cpp" "\\1" OUTPUT_VARIABLE programs)
-  list(POP_FRONT programs first)
-  target_precompile_headers(${first} PRIVATE "${header}")
-  foreach(program IN LISTS programs)
-    target_precompile_headers(${program} REUSE_FROM ${first})
-  endforeach()
+  if(arg_PRECOMPILED)
+    list(POP_FRONT programs first)
+    target_precompile_headers(${first} PRIVATE "${arg_PRECOMPILED}")
+    foreach(program IN LISTS programs)
+      target_precompile_headers(${program} REUSE_FROM ${first})
+    endforeach()
+  endif()
 endfunction()
 
 # mauve_add_target_without_tests(): the target `without_tests`, what `all` builds so far but for folders named tests.

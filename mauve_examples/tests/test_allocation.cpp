@@ -17,8 +17,7 @@
 #include "mauve_examples/unicycle.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_allocation {
 
 TEST(Allocation, TheAlgorithmsDoNone) {
   if (mauve::allocation_counting() != mauve::AllocationCounting::all) {
@@ -72,5 +71,4 @@ TEST(Allocation, TheAlgorithmsDoNone) {
   EXPECT_GT(map.free_count(), 1000U);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_allocation

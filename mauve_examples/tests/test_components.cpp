@@ -15,8 +15,7 @@
 #include "mauve_examples/start_poses.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_components {
 
 using mauve::RingBuffer;
 using mauve::SharedData;
@@ -236,5 +235,4 @@ TEST(Components, ExplorationOfOtherPeersIsNotTakenOver) {
   EXPECT_FALSE(mine.adopt(elsewhere.component("exploration").core()));
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_components

@@ -12,8 +12,7 @@
 #include "mauve_examples/tile_runs.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_coordination {
 
 PeerMessage from(const char* sender, std::uint32_t sequence, std::uint32_t round = 0) {
   PeerMessage message;
@@ -424,5 +423,4 @@ TEST_F(Rounds, AnExploredGoalIsDropped) {
   EXPECT_FALSE(explorer_.goal().active());
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_coordination

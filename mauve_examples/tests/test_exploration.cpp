@@ -5,8 +5,7 @@
 #include "mission_simulation.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_exploration {
 
 using testing::MissionSimulation;
 using testing::SimulationOptions;
@@ -102,5 +101,4 @@ TEST_P(RealMaps, AreExplored) {
 }
 INSTANTIATE_TEST_SUITE_P(Files, RealMaps, ::testing::Values("depot", "tb3_sandbox"));
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_exploration

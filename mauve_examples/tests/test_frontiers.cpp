@@ -10,8 +10,7 @@
 #include "mauve_examples/start_poses.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_frontiers {
 
 FrontierOptions fine() { return {0.3, 3.0, 0.5, 0.0}; }
 
@@ -138,5 +137,4 @@ TEST(StartPoses, SayWhenThereIsNoRoom) {
   }
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_frontiers

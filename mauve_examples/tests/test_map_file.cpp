@@ -8,8 +8,7 @@
 #include "mauve_examples/map_file.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_map_file {
 
 using testing::TemporaryFolder;
 
@@ -202,5 +201,4 @@ TEST(MapFile, ReadsRealMaps) {
   EXPECT_EQ(std::count(sandbox.cells.begin(), sandbox.cells.end(), kOccupied), 870);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_map_file

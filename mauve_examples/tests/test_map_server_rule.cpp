@@ -17,8 +17,7 @@
 #include "mauve_examples/map_file.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_map_server_rule {
 
 using testing::TemporaryFolder;
 using Bytes = std::string;
@@ -353,5 +352,4 @@ TEST(DamagedImages, AreReadOrRefusedWithOneLine) {
   EXPECT_GT(refused, 80);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_map_server_rule

@@ -10,8 +10,7 @@
 #include "mauve_examples/scan_integration.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_mapping {
 
 std::vector<Cell> cells_on(const GridGeometry& grid, const Point& from, const Direction& direction,
                            double length_m) {
@@ -137,5 +136,4 @@ TEST(MergedMap, OwnObservationsOutweighPeers) {
   EXPECT_EQ(tile.cells[2 * 16 + 2], kFree);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_mapping

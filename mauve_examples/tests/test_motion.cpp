@@ -14,8 +14,7 @@
 #include "mauve_examples/unicycle.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_motion {
 
 constexpr double kPi = std::numbers::pi;
 
@@ -166,5 +165,4 @@ TEST(Pid, TheIntegralDoesNotWindUp) {
   EXPECT_LT(pid.step(-5.0, 0.1), 0.0);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_motion

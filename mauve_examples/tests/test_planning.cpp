@@ -13,8 +13,7 @@
 #include "mauve_examples/start_poses.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_planning {
 
 TEST(Clearance, EqualsBruteForce) {
   GridMap map;
@@ -214,5 +213,4 @@ TEST(Navigator, TellsARobotThatIsStuck) {
   EXPECT_FALSE(navigator.stalled({1.5, 2.0, 0.0}, 40, 10));
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_planning

@@ -5,8 +5,7 @@
 #include "mission_simulation.hpp"
 #include "test_maps.hpp"
 
-namespace mauve_examples {
-namespace {
+namespace mauve_examples::test_traffic {
 
 using testing::MissionSimulation;
 
@@ -108,5 +107,4 @@ TEST(Traffic, ARobotInSightIsNeverWrittenIntoTheMap) {
   EXPECT_EQ(own.at(map.cell_at(2.7, 2.0)), kUnknown);
 }
 
-}  // namespace
-}  // namespace mauve_examples
+}  // namespace mauve_examples::test_traffic

@@ -4,8 +4,7 @@
 
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_authors {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -28,5 +27,4 @@ TEST(Authors, KeepsTheLastOneOfEachElement) {
   EXPECT_THAT(authors.all(), IsEmpty());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_authors

@@ -2,8 +2,7 @@
 // Factories, of plug-ins and of programs, that make nothing.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_factories {
 
 template <typename Make>
 void expect_refused(Make&& make, ErrorCode code) {
@@ -73,5 +72,4 @@ TEST_F(FactoriesInFlight, AnObjectThatIsNoneIsRefused) {
   expect_running("c");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_factories

@@ -2,8 +2,7 @@
 // The numbers that trace records know components by, while components of few names come and go.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_trace_numbers {
 
 class TraceNumbers : public Transacted {
  protected:
@@ -79,5 +78,4 @@ TEST_F(TraceNumbers, ARefusedAdditionTakesNoNumber) {
   EXPECT_EQ(std::vector<std::string>({"stays", "x"}), architecture.trace_components());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_trace_numbers

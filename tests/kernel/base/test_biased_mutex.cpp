@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_biased_mutex {
 
 using Hold = BiasedMutex::Hold;
 using Seat = BiasedMutex::Seat;
@@ -120,5 +119,4 @@ TEST(BiasedMutex, KeepsAllApartWhateverTheyDo) {
   EXPECT_EQ(kTurns + others + tries + visits, count);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_biased_mutex

@@ -13,8 +13,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_hygiene {
 
 constexpr std::size_t kPage = 4096;
 
@@ -374,5 +373,4 @@ TEST_F(Deployed, ExecutionTimeIsKeptPerState) {
   EXPECT_GE(run.max_ns(), run.mean_ns());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_hygiene

@@ -9,8 +9,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_priority_inheritance {
 
 pthread_t make_thread(int priority, void* (*entry)(void*), void* argument) {
   pthread_attr_t attributes;
@@ -136,5 +135,4 @@ TEST_F(Contention, IsTracedWithItsHolder) {
   EXPECT_GT(contended[0].b, 0);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_priority_inheritance

@@ -9,8 +9,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_stack_guard {
 
 constexpr std::size_t kMiB = std::size_t{1024} * 1024;
 constexpr std::size_t kPage = 4096;
@@ -100,5 +99,4 @@ TEST_F(StackGuard, ALargeFrameDiesAtItsPlace) {
   EXPECT_EXIT(overflow(), ::testing::KilledBySignal(SIGSEGV), "");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_stack_guard

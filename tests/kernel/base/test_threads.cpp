@@ -7,8 +7,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_threads {
 
 struct Seen {
   char name[16]{};
@@ -67,5 +66,4 @@ TEST(Threads, ThatMustBeRealTimeAreRefusedWhereTheyCannotBe) {
   EXPECT_EQ(EPERM, thread.start({.name = "c", .priority = 7, .require_realtime = true}, look, &seen));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_threads

@@ -6,8 +6,7 @@
 
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_change_instant {
 
 constexpr std::int64_t kAdoptPhase = 1;
 constexpr std::int64_t kTakePhase = 2;
@@ -172,5 +171,4 @@ TEST_F(ChangeInstantOnThreads, IsKnownOfALateComponentBeforeItTakesTheChange) {
   EXPECT_GE(line_of(report, "late").release_ns, report.instant_ns);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_change_instant

@@ -5,8 +5,7 @@
 
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_parallel_changes {
 
 class ParallelChanges : public Hosted<OnThreads> {
  protected:
@@ -206,5 +205,4 @@ TEST_F(ParallelChanges, Storm) {
   EXPECT_FALSE(architecture.claims().revision);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_parallel_changes

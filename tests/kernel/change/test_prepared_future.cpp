@@ -3,8 +3,7 @@
 // component goes on with those it has. On threads and in virtual time.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_prepared_future {
 
 struct FutureShell : Shell {
   Property<std::int64_t>& size = property("size", 10);
@@ -283,5 +282,4 @@ TYPED_TEST(PreparedFuture, AnEventWaitListensWhereItsPortWillLead) {
   EXPECT_EQ(1U, fresh.find_service("read")->ports());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_prepared_future

@@ -7,8 +7,7 @@
 
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_prepared_transaction {
 
 constexpr time_ns_t kTimeout = s_to_ns(10);
 
@@ -372,5 +371,4 @@ TEST_F(PreparedBeside, Storm) {
   EXPECT_LT(0, committed.load());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_prepared_transaction

@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_replace {
 
 /// Carries the number of runs over.
 struct Successor : TestCore {
@@ -250,5 +249,4 @@ TEST_F(Rule9Replace, OnlyDeclaredCoresByName) {
   EXPECT_EQ(ErrorCode::not_reconfigurable, code("t/Core"));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_replace

@@ -3,8 +3,7 @@
 #include "free_fsm.hpp"
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_resynchronise {
 
 template <typename Host>
 class Resynchronise : public OnBothHosts<Host> {
@@ -217,5 +216,4 @@ TEST(ResynchroniseInVirtualTime, MovesEachInstantToTheFirstOfTheNewGrid) {
   EXPECT_EQ(expected, component.core_as<TestCore>().instants);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_resynchronise

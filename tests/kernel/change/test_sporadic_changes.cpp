@@ -3,8 +3,7 @@
 #include "free_fsm.hpp"
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_sporadic_changes {
 
 constexpr time_ns_t kHour = s_to_ns(3600);
 constexpr time_ns_t kShortest = ms_to_ns(20);
@@ -303,5 +302,4 @@ TEST_F(SporadicOnThreads, NoEventBesideASwapIsLost) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_sporadic_changes

@@ -3,8 +3,7 @@
 #include "change/steps/step_kind.hpp"
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_step_kind {
 
 class StepByName : public Transacted {
  protected:
@@ -75,5 +74,4 @@ TEST_F(StepByName, OfAKindOfItsOwnBringsAnActionIntoTheCommit) {
   EXPECT_EQ("a", noted);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_step_kind

@@ -2,8 +2,7 @@
 // Rule 10: every kind of step on a running architecture.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction {
 
 class Rule10Transaction : public Transacted {
  protected:
@@ -254,5 +253,4 @@ TEST(Rule10Setup, ATransactionOnAnArchitectureThatIsNotDeployed) {
   wait_until([&] { return core.runs > 1; }, "the component to run");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction

@@ -6,8 +6,7 @@
 #include "rhythm.hpp"
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction_beside {
 
 /// Stays in its state for as long as it is told to.
 struct LatchedCore : TestCore {
@@ -183,5 +182,4 @@ TEST_F(Rule10Storm, AllIsInOrderWhenItIsOver) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction_beside

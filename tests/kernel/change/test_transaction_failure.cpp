@@ -2,8 +2,7 @@
 // Rule 10: a failure at any step, of any kind, leaves the architecture as it was.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction_failure {
 
 using Entry = std::function<void(Transaction&)>;
 struct BadStep {
@@ -273,5 +272,4 @@ TEST_F(Rule10Failure, AProtectedComponentIsStartedAndStoppedOnly) {
   EXPECT_EQ(ComponentState::stopped, facts("g").state);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction_failure

@@ -2,8 +2,7 @@
 // Rules 7 and 9: shell, core and fsm replaced by a transaction.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction_parts {
 
 class Rule9Parts : public Transacted {
  protected:
@@ -155,5 +154,4 @@ TEST_F(Rule9Parts, AddedComponentsTakeTheirFallbackAlong) {
   expect_running("d");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction_parts

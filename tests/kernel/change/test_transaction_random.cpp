@@ -8,8 +8,7 @@
 #include "hosts.hpp"
 #include "random_model.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction_random {
 
 std::uint64_t asked(const char* variable, std::uint64_t otherwise) {
   const char* text = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): nobody sets any
@@ -253,5 +252,4 @@ TYPED_TEST(Rule10Random, TransactionsDoWhatTheModelSaysOrNothing) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction_random

@@ -2,8 +2,7 @@
 // A transaction gives a ring a second reader while both ends are in use: its wait-free end gets a lock, and no element is lost.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_transaction_ring {
 
 class RingTransactions : public Deployed {
  protected:
@@ -68,5 +67,4 @@ TEST_F(RingTransactions, GiveEveryElementOnceWhileAReaderComesAndGoes) {
   EXPECT_EQ(static_cast<std::ptrdiff_t>(times.size()), std::count(times.begin(), times.end(), 1));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_transaction_ring

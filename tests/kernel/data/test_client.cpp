@@ -3,7 +3,7 @@
 #include "simulated.hpp"
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_client {
 
 struct Increment {
   struct Request {
@@ -14,14 +14,13 @@ struct Increment {
   };
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_client
 
-MAUVE_TYPE(mauve::testing::Increment::Request, "test_interfaces/srv/Increment_Request", data)
-MAUVE_TYPE(mauve::testing::Increment::Response, "test_interfaces/srv/Increment_Response", data)
-MAUVE_CALL_TYPE(mauve::testing::Increment, "test_interfaces/srv/Increment")
+MAUVE_TYPE(mauve::testing::test_client::Increment::Request, "test_interfaces/srv/Increment_Request", data)
+MAUVE_TYPE(mauve::testing::test_client::Increment::Response, "test_interfaces/srv/Increment_Response", data)
+MAUVE_CALL_TYPE(mauve::testing::test_client::Increment, "test_interfaces/srv/Increment")
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_client {
 
 using Calls = Client<Increment>;
 using Port = CallPort<CallOf<Increment>>;
@@ -352,5 +351,4 @@ TEST(Transaction, AddsWhatIsCarriedOutside) {
   EXPECT_FALSE(with.next_published(resource, message, time_ns));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_client

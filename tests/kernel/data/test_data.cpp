@@ -2,7 +2,7 @@
 // Serialization, names in errors, trace rings, histograms, the notifier.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_data {
 
 struct Inner {
   std::uint8_t flag{};
@@ -16,13 +16,12 @@ struct Outer {
   bool last{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_data
 
-MAUVE_TYPE(mauve::testing::Inner, "test_msgs/msg/Inner", flag, value)
-MAUVE_TYPE(mauve::testing::Outer, "test_msgs/msg/Outer", name, number, items, bytes, last)
+MAUVE_TYPE(mauve::testing::test_data::Inner, "test_msgs/msg/Inner", flag, value)
+MAUVE_TYPE(mauve::testing::test_data::Outer, "test_msgs/msg/Outer", name, number, items, bytes, last)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_data {
 
 TEST(Bounded, TextIsTakenAsStandardStringsTakeIt) {
   BoundedVector<BoundedString<8>, 2> names;
@@ -177,5 +176,4 @@ TEST(Notifier, WakesEveryWaiterForEveryWriteThatCameAfterItsLook) {
   EXPECT_EQ(seen[1], kWrites);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_data

@@ -2,8 +2,7 @@
 // Events: the counter that ports raise, and listeners that every write tells.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_events {
 
 struct Recorder final : EventListener {
   void on_event(time_ns_t time_ns) noexcept override {
@@ -231,5 +230,4 @@ TEST_F(EventsFixture, ListenersMayEndOnceTheyAreTakenAway) {
   EXPECT_EQ(1, last.calls);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_events

@@ -2,7 +2,7 @@
 // LatestValue: readers of one writer that see whole values in order, whatever the writer does.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_latest_value {
 
 /// Large enough to be torn.
 struct Block {
@@ -34,15 +34,14 @@ struct OwningBlock {
   std::array<std::uint64_t, 64> words{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_latest_value
 
-MAUVE_TYPE(mauve::testing::OwningBlock, "test_msgs/msg/OwningBlock", words)
-MAUVE_TYPE(mauve::testing::Block, "test_msgs/msg/Block", words)
-MAUVE_TYPE(mauve::testing::Pair, "test_msgs/msg/Pair", words)
-MAUVE_TYPE(mauve::testing::Owning, "test_msgs/msg/Owning", value)
+MAUVE_TYPE(mauve::testing::test_latest_value::OwningBlock, "test_msgs/msg/OwningBlock", words)
+MAUVE_TYPE(mauve::testing::test_latest_value::Block, "test_msgs/msg/Block", words)
+MAUVE_TYPE(mauve::testing::test_latest_value::Pair, "test_msgs/msg/Pair", words)
+MAUVE_TYPE(mauve::testing::test_latest_value::Owning, "test_msgs/msg/Owning", value)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_latest_value {
 
 template <typename T>
 T filled(std::uint64_t number) {
@@ -381,5 +380,4 @@ TYPED_TEST(LatestValueStress, ZerosBesideTheWriterTearNothing) {
   watchdog.join();
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_latest_value

@@ -2,8 +2,7 @@
 // The longest time for which a user holds a resource's lock: declared for the timing analysis, told by descriptions.
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_longest_hold {
 
 struct SlowMap final : Resource {
   SlowMap() : Resource("test/SlowMap", "") { set_longest_hold_ns(ms_to_ns(2)); }
@@ -64,5 +63,4 @@ TEST(LongestHold, OfATransactionTakesPrecedenceOverTheCode) {
   EXPECT_THROW(architecture.commit(std::move(wrong)), Error);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_longest_hold

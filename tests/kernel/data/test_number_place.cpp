@@ -2,7 +2,7 @@
 // A number of a resource's newest value, by its path.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_number_place {
 
 struct Inner {
   double x{};
@@ -20,14 +20,14 @@ struct Large {
   std::array<double, 512> values{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_number_place
 
-MAUVE_TYPE(mauve::testing::Inner, "test_msgs/msg/Inner", x, on)
-MAUVE_TYPE(mauve::testing::Outer, "test_msgs/msg/Outer", first, inner, list, cost_m, varying, text)
-MAUVE_TYPE(mauve::testing::Large, "test_msgs/msg/Large", values)
+MAUVE_TYPE(mauve::testing::test_number_place::Inner, "test_msgs/msg/Inner", x, on)
+MAUVE_TYPE(mauve::testing::test_number_place::Outer, "test_msgs/msg/Outer", first, inner, list, cost_m,
+           varying, text)
+MAUVE_TYPE(mauve::testing::test_number_place::Large, "test_msgs/msg/Large", values)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_number_place {
 
 double read(Resource& resource, const std::string& path) {
   const std::optional<NumberPlace> place = resource.find_number(path);
@@ -74,5 +74,4 @@ TEST(NumberPlace, IsTheNewest) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_number_place

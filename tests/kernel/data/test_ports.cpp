@@ -2,19 +2,18 @@
 // Ports: status, age and time of what they read, their connections, and how these are exchanged.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_ports {
 
 /// Another package's idea of the same message.
 struct OtherNumber {
   double value{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_ports
 
-MAUVE_TYPE(mauve::testing::OtherNumber, "std_msgs/msg/Float64", value)
+MAUVE_TYPE(mauve::testing::test_ports::OtherNumber, "std_msgs/msg/Float64", value)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_ports {
 
 ErrorCode code_of(const std::function<void()>& call) {
   try {
@@ -269,5 +268,4 @@ TEST(PortFactories, MakePortsOfRegisteredTypes) {
   EXPECT_EQ(ErrorCode::invalid_argument, code_of([&] { registry.make_port(PortKind::event, "a/B", "p"); }));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_ports

@@ -2,8 +2,7 @@
 // RingBuffer: a read removes, each element goes to one reader, loss is counted.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_ring_buffer {
 
 struct RingFixture : ::testing::Test {
   RingFixture() {
@@ -253,5 +252,4 @@ TEST(RingBuffer, WithoutACapacityIsRefused) {
   EXPECT_THROW(registry.make_resource("ring_buffer", "std_msgs/msg/Float64", {}), Error);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_ring_buffer

@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_user_resource {
 
 using Cells = std::map<int, double>;
 using CellReader = FunctionRef<void(const Cells&)>;
@@ -164,5 +163,4 @@ TEST(UserResource, IsMadeOfParametersThatWereChecked) {
       Error);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_user_resource

@@ -6,8 +6,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_write_log {
 
 using Written = std::pair<double, time_ns_t>;
 
@@ -171,5 +170,4 @@ TEST(WriteLog, IsRefusedWhereThereAreNoValues) {
   EXPECT_FALSE(map.next_write(message, time_ns));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_write_log

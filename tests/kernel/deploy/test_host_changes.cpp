@@ -2,8 +2,7 @@
 // Who may ask for a change, and when: on every host.
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_host_changes {
 
 template <typename Way>
 class HostChanges : public Hosted<Way> {};
@@ -121,5 +120,4 @@ TYPED_TEST(HostChanges, AChangeByAComponentItselfIsRefused) {
   EXPECT_GT(refusals, 1);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_host_changes

@@ -2,8 +2,7 @@
 // What every host does alike: on threads and in virtual time, one body each.
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_host_conformance {
 
 template <typename Way>
 class HostConformance : public Hosted<Way> {};
@@ -449,5 +448,4 @@ TYPED_TEST(HostConformance, Listing3ReplacesTheCoreOfAStoppedComponent) {
   EXPECT_EQ(0, (this->host().get_time("c") - clock) % ms_to_ns(2));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_host_conformance

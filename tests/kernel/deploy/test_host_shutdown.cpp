@@ -2,8 +2,7 @@
 // A host of threads that ends while others prepare changes: it waits for nobody, and nobody uses what it released.
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_host_shutdown {
 
 /// A core whose configure hook lasts until the test lets it go.
 struct SlowCore : TestCore {
@@ -201,5 +200,4 @@ TEST_F(HostShutdown, FromAHookItEndsTheHostAndTheChange) {
   EXPECT_FALSE(deployer.is_deployed());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_host_shutdown

@@ -15,8 +15,7 @@ extern "C" const char* __tsan_default_options();
 // NOLINTNEXTLINE(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp)
 extern "C" const char* __tsan_default_options() { return "report_thread_leaks=0"; }
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_process_end {
 
 using ::testing::ExitedWithCode;
 
@@ -156,5 +155,4 @@ TEST_F(ProcessEnd, LeavesASignalIgnoredThatTheParentProcessIgnores) {
   EXPECT_EXIT(live(), ExitedWithCode(0), "");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_process_end

@@ -2,8 +2,7 @@
 // Rule 5: one epoch for all, also for those who come later.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule5_deployment {
 
 using ::testing::ElementsAre;
 using Rule5Epoch = Simulated;
@@ -89,5 +88,4 @@ TEST_F(Rule5Threads, AThreadAddedLaterJoinsTheEpoch) {
     EXPECT_EQ(0, (release.a - deployer.epoch_ns() - us_to_ns(300)) % ms_to_ns(3));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule5_deployment

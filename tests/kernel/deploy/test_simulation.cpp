@@ -4,8 +4,7 @@
 
 #include "simulated.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_simulation {
 
 using ::testing::ElementsAre;
 using Rule13Simulation = Simulated;
@@ -204,5 +203,4 @@ TEST(Rule13SimulationSeeds, EqualSeedsGiveEqualTracesBitForBit) {
               std::memcmp(first.data(), other.data(), first.size() * sizeof(TraceRecord)) != 0);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_simulation

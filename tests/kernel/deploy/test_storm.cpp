@@ -8,8 +8,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_storm {
 
 constexpr int kClients = 8;
 constexpr time_ns_t kPatience = ms_to_ns(40);  // with commits: some never find their components together
@@ -266,5 +265,4 @@ TEST_F(Storm, LeavesAnArchitectureThatDoesAsItIsTold) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_storm

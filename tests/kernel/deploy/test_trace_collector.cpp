@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_trace_collector {
 
 using TraceCollectorTest = Deployed;
 
@@ -54,5 +53,4 @@ TEST_F(TraceCollectorTest, ItEndsAtAnyTime) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_trace_collector

@@ -2,8 +2,7 @@
 // Common shells, relay and multiplexers, each run as a component.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_elements {
 
 using types::Float64;
 
@@ -235,5 +234,4 @@ TEST_F(Elements, ARelayEmptiesARingOneByOne) {
   EXPECT_EQ(3U, written());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_elements

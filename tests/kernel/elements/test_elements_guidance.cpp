@@ -5,8 +5,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_elements_guidance {
 
 using types::Float64;
 
@@ -211,5 +210,4 @@ TEST_F(GuidanceTrace, ClockBasedFsmGoesOnAtOnceAndHasAPeriodForEachCycle) {
             distances_of(activations));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_elements_guidance

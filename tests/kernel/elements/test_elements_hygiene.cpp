@@ -2,8 +2,7 @@
 // The basic elements allocate on no component thread: counted, in all they do.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_elements_hygiene {
 
 using types::Float64;
 
@@ -48,5 +47,4 @@ TEST_F(ElementsHygiene, NoAllocationOnAComponentThread) {
     EXPECT_EQ(0U, component->task().counters().allocations()) << component->name();
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_elements_hygiene

@@ -2,8 +2,7 @@
 // PeriodicFsm: one action in each period, one period in each transition.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_elements_psm {
 
 class FreePsm;
 using Define = std::function<void(FreePsm&)>;
@@ -91,5 +90,4 @@ TEST(PeriodicFsmDefinition, HasOnePeriodGivenBeforeTheStates) {
             }));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_elements_psm

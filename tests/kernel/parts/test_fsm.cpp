@@ -2,8 +2,7 @@
 // Rules 1 and 3: loops, periods.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_fsm {
 
 TEST(Rule3Period, GuidanceHasOneUnit) {
   constexpr time_ns_t kUnit = ms_to_ns(100);
@@ -147,5 +146,4 @@ TEST(Rule3Period, UnderAHundredMicrosecondsMustBeDeclared) {
   EXPECT_NO_THROW(declared.configure());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_fsm

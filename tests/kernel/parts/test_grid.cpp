@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_grid {
 
 TEST(Grid, FirstNotBefore) {
   const Grid grid{.reference_ns = 1000, .period_ns = 300};
@@ -268,5 +267,4 @@ TEST_F(Rule6StopStart, RefusalsSayWhy) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_grid

@@ -4,7 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_handover {
 
 struct Pose {
   double x{};
@@ -16,13 +16,12 @@ struct TurnedPose {
   double x{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_handover
 
-MAUVE_TYPE(mauve::testing::Pose, "handover_tests/Pose", x, y)
-MAUVE_TYPE(mauve::testing::TurnedPose, "handover_tests/Pose", x, y)
+MAUVE_TYPE(mauve::testing::test_handover::Pose, "handover_tests/Pose", x, y)
+MAUVE_TYPE(mauve::testing::test_handover::TurnedPose, "handover_tests/Pose", x, y)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_handover {
 
 struct Old : Core<TestShell> {
   double integral_{0.5};
@@ -148,5 +147,4 @@ TEST_F(HandoverOfComponents, IsInTheReportOfTheChange) {
   EXPECT_TRUE(report.left.empty());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_handover

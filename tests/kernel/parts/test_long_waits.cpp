@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_long_waits {
 
 using ::testing::HasSubstr;
 
@@ -87,5 +86,4 @@ TEST_F(ShortPatience, ForTheReleaseThatFollowsIsNone) {
                      .is_complete);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_long_waits

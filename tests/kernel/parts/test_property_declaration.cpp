@@ -4,8 +4,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_property_declaration {
 
 template <typename Initial>
 Error refusal(Initial initial, const PropertyOptions& options) {
@@ -45,5 +44,4 @@ TEST(PropertyDeclaration, AnyOtherIsTaken) {
   EXPECT_EQ(ErrorCode::internal, refusal("text", {.minimum = 1.0}).code());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_property_declaration

@@ -4,18 +4,17 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_required_ports {
 
 struct Bulky {
   std::array<std::uint8_t, 3'000'000> bytes{};
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_required_ports
 
-MAUVE_TYPE(mauve::testing::Bulky, "test_msgs/msg/Bulky", bytes)
+MAUVE_TYPE(mauve::testing::test_required_ports::Bulky, "test_msgs/msg/Bulky", bytes)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_required_ports {
 
 using Ask = int(int);
 
@@ -235,5 +234,4 @@ TEST(LargeMessages, OneOfThreeMegabytesPassesWhereTheStackIsLargeEnough) {
   deployer.shutdown();
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_required_ports

@@ -3,8 +3,7 @@
 #include "simulated.hpp"
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_structural_property {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -201,5 +200,4 @@ TEST_F(StructuralSimulation, AFallbackIsConfiguredWithItToo) {
   EXPECT_EQ(9U, fallback->room.size());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_structural_property

@@ -3,8 +3,7 @@
 #include "free_fsm.hpp"
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_component_life {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -471,5 +470,4 @@ TEST(Timeouts, MayLastForEver) {
   deployer.set_property("c", "gain", 2.0, {.commit_ns = kForever, .phase_ns = kForever});
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_component_life

@@ -2,8 +2,7 @@
 // Times of states that who uses an fsm declares, in the place of the fsm's own.
 #include "hosts.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_declared_states {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -204,5 +203,4 @@ TEST(Deadline, IsCheckedAndKept) {
   EXPECT_THAT(refused(-1), HasSubstr("deadline_ns"));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_declared_states

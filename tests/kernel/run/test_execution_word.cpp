@@ -6,8 +6,7 @@
 
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_execution_word {
 
 TEST(ExecutionWord, TimesOutOnlyTheExecutionThatWasLookedAt) {
   ExecutionWord word;
@@ -148,5 +147,4 @@ TEST(ExecutionWord, AThreadLeavesOrTimesOutWhateverThePhases) {
   EXPECT_EQ(timed_out, found_out) << "every time-out is found by the thread, and nothing else";
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_execution_word

@@ -2,8 +2,7 @@
 // Rule 11: faults park one component and leave the others alone. Rule 8: no lock past a state's end.
 #include "fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_fault {
 
 class Rule11Faults : public Deployed {
  protected:
@@ -135,5 +134,4 @@ TEST_F(Rule11Faults, AStateOverItsDeclaredTimeIsCaughtByTheWatchdog) {
   EXPECT_EQ(0.0, value.value) << "what it wrote after it timed out does not count";
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_fault

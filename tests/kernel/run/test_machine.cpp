@@ -2,8 +2,7 @@
 // The machine alone, stepped by hand: no thread, no task, a clock that stands where the test puts it.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_machine {
 
 using ::testing::ElementsAre;
 
@@ -192,5 +191,4 @@ TEST_F(MachineByHand, TracesWhatItDoesInOrder) {
               ElementsAre(TraceKind::release, TraceKind::state_begin, TraceKind::state_end, TraceKind::wait));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_machine

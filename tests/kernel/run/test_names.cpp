@@ -2,8 +2,7 @@
 // What may be the name of something.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_names {
 
 TEST(Names, FollowOneRuleEverywhere) {
   const std::vector<std::string> bad{"",     "a b", "x/y.z", std::string(300, 'a'), "a\nb", "1a", "_a",
@@ -51,5 +50,4 @@ TEST(Names, FollowOneRuleEverywhere) {
   architecture.add_component<TestShell, TestCore, TestFsm>("Arm_2_");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_names

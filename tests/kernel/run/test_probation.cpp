@@ -5,8 +5,7 @@
 
 #include "probation_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_probation {
 
 using ::testing::HasSubstr;
 
@@ -681,5 +680,4 @@ TEST_F(ProbationThreads, ManyChangesAtOnceLeaveOneCore) {
   EXPECT_FALSE(last->is_cleaned);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_probation

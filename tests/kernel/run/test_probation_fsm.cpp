@@ -5,8 +5,7 @@
 
 #include "probation_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_probation_fsm {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -660,5 +659,4 @@ TEST_F(FsmProbationThreads, ManyChangesAndReadersAtOnceLeaveOneFsm) {
   EXPECT_EQ(is_new ? "Check" : "Run", state_names(component).front());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_probation_fsm

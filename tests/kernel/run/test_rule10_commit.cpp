@@ -8,8 +8,7 @@
 
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule10_commit {
 
 using ::testing::HasSubstr;
 
@@ -832,5 +831,4 @@ TEST_F(Rule10Commit, StopsStartsAndCommitsAtRandomPhasesAllEnd) {
   EXPECT_FALSE(refused) << refused->what();
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule10_commit

@@ -5,8 +5,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule11_fallback {
 
 using ::testing::ElementsAre;
 
@@ -305,5 +304,4 @@ TEST_F(Rule11FallbackThreads, ACommitInFlightIsRefusedByTheFault) {
   wait_runs(component, 3);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule11_fallback

@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule11_force {
 
 using ::testing::HasSubstr;
 
@@ -330,5 +329,4 @@ TEST_F(Rule11Force, AStateEndsOrIsGivenUpAndNeverBoth) {
   std::printf("%d of %d rounds by force\n", forced, kRounds);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule11_force

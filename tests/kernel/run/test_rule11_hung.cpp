@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule11_hung {
 
 constexpr time_ns_t kHungAfter = ms_to_ns(30);
 
@@ -162,5 +161,4 @@ TEST_F(Rule11HungSimulated, AWaitIsAsOldAsItIsPastItsInstant) {
   EXPECT_EQ("Pause", late.task().state_age().state);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule11_hung

@@ -2,8 +2,7 @@
 // Rule 11: a FAULTED component is repaired in place, by threads and in virtual time alike.
 #include "simulated.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule11_repair {
 
 struct Broken : TestCore {
   void act() override {
@@ -145,5 +144,4 @@ TYPED_TEST(Rule11Repaired, ARunningOneIsNotConfiguredAnew) {
   EXPECT_THROW(this->commit(std::move(transaction)), Error);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule11_repair

@@ -3,8 +3,7 @@
 #include "free_fsm.hpp"
 #include "simulated.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule11_watchdog {
 
 constexpr time_ns_t kBound = ms_to_ns(20);
 
@@ -314,5 +313,4 @@ TEST_F(Rule11SimulatedBound, IsComparedAtTheEndInVirtualTimeToo) {
   EXPECT_EQ(1, core(late).runs);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule11_watchdog

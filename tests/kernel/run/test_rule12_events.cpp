@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule12_events {
 
 using ::testing::ElementsAre;
 
@@ -311,5 +310,4 @@ TEST_F(Rule12Threads, NorIsAComponentsNorOneOfAStop) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule12_events

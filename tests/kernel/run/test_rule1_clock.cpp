@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule1_clock {
 
 using ::testing::ElementsAre;
 using Rule1Clock = Simulated;
@@ -133,5 +132,4 @@ TEST_F(Rule2Instants, DoNotDriftOverTenThousandPeriodsWhateverExecutionTakes) {
   EXPECT_EQ(0U, component.task().statistics().overruns);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule1_clock

@@ -6,8 +6,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule3_period {
 
 using ::testing::ElementsAre;
 using Rule3Grid = Simulated;
@@ -150,5 +149,4 @@ TEST_F(Rule3Declared, UnderAHundredMicrosecondsItHasToBe) {
   EXPECT_EQ(ErrorCode::internal, configure(us_to_ns(50), us_to_ns(25)));
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule3_period

@@ -2,8 +2,7 @@
 // Rule 4: overruns, to the nanosecond. Every wait is 10 ms.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule4_overrun {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -125,5 +124,4 @@ TEST_F(Rule4Overrun, FaultFaults) {
   EXPECT_EQ(simulation.epoch_ns() + ms_to_ns(21), component.task().fault().when_ns);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule4_overrun

@@ -4,8 +4,7 @@
 
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule6_stop_start {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -219,5 +218,4 @@ TEST_F(Rule6Threads, AStopThatTimedOutIsTakenUpByTheNext) {
   wait_runs(component, 2);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule6_stop_start

@@ -6,8 +6,7 @@
 #include "free_fsm.hpp"
 #include "transaction_fixtures.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule7_hold {
 
 using ::testing::ElementsAre;
 using Rule7Simulated = Simulated;
@@ -155,5 +154,4 @@ TEST_F(Rule7Threads, WhoWaitsForALongExecutionOfAnotherMissesNoRelease) {
   EXPECT_GE(witness.releases(), 100);
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule7_hold

@@ -2,8 +2,7 @@
 // Rule 7: a refused change leaves no trace in outputs: in threads, and in virtual time.
 #include "simulated.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule7_outputs {
 
 struct ZeroedShell : TestShell {
   WritePort<Number>& zeroed = write_port<Number>("zeroed", {.on_commit = OutputPolicy::set_zero}).optional();
@@ -75,5 +74,4 @@ TEST_P(Rule7Outputs, AreWrittenByAReplacementThatIsMadeAndByNothingElse) {
   EXPECT_EQ(0.0, output());
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule7_outputs

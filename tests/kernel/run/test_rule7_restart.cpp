@@ -6,8 +6,7 @@
 
 #include "simulated.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule7_restart {
 
 /// A chain of waits, with an activation before each.
 struct ChainFsm : Fsm<TestShell, TestCore> {
@@ -267,5 +266,4 @@ TEST_F(Rule7RestartOnThreads, NoReleaseIsMissedOnAnEqualGrid) {
   }
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule7_restart

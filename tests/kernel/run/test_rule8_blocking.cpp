@@ -2,8 +2,7 @@
 // Rule 8: no lock past a state's end, and no wait that a stop or a hold has to wait for.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_rule8_blocking {
 
 using ::testing::HasSubstr;
 using Rule8Locks = Simulated;
@@ -110,5 +109,4 @@ TEST_P(Rule8Waits, AreInterruptedByTheEnd) {
 INSTANTIATE_TEST_SUITE_P(Of, Rule8Waits, ::testing::Values(false, true),
                          [](const auto& wait) { return wait.param ? "AnEvent" : "TheClock"; });
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_rule8_blocking

@@ -7,18 +7,17 @@
 
 #include "hosts.hpp"
 
-namespace mauve::testing {
+namespace mauve::testing::test_shadow {
 
 struct Text {
   std::string data;
 };
 
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_shadow
 
-MAUVE_TYPE(mauve::testing::Text, "std_msgs/msg/String", data)
+MAUVE_TYPE(mauve::testing::test_shadow::Text, "std_msgs/msg/String", data)
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_shadow {
 
 using ::testing::HasSubstr;
 using Verdict = ShadowVerdict;
@@ -664,5 +663,4 @@ TEST_F(ShadowThreads, AComponentIsNotKeptWaitingByACandidateThatHangs) {
   host.until([&] { return candidate->is_cleaned.load(); }, "the clean-up");
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_shadow

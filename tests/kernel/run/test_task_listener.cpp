@@ -2,8 +2,7 @@
 // Who listens to a component is told of what befalls it, at the instants of virtual time.
 #include "free_fsm.hpp"
 
-namespace mauve::testing {
-namespace {
+namespace mauve::testing::test_task_listener {
 
 using ::testing::ElementsAre;
 using ::testing::Pair;
@@ -78,5 +77,4 @@ TEST_F(TaskListenerTest, OneListensAndIsToldNothingAfterwards) {
   task.listening().unlisten();
 }
 
-}  // namespace
-}  // namespace mauve::testing
+}  // namespace mauve::testing::test_task_listener
