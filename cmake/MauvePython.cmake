@@ -21,7 +21,20 @@ endif()
 # After Python3: otherwise pybind11 looks for an interpreter of its own.
 find_package(pybind11 2.11 REQUIRED)
 
-# mauve_add_python_module(<name> PACKAGE <package> SOURCES ... LIBRARIES ...): a pybind11 module inside a package.
+# Stubs need a module that this interpreter can load, and packages of which Ubuntu 24.04 has none.
+set(MAUVE_STUBS OFF)
+if(NOT MAUVE_DEMO_ONLY AND NOT MAUVE_SANITIZE AND NOT CMAKE_CROSSCOMPILING)
+  execute_process(
+    COMMAND "${Python3_EXECUTABLE}" -c "import pybind11_stubgen" OUTPUT_QUIET ERROR_QUIET RESULT_VARIABLE _result)
+  if(_result EQUAL 0)
+    set(MAUVE_STUBS ON)
+  else()
+    message(STATUS "No type stubs of the compiled modules: ${Python3_EXECUTABLE} has no pybind11-stubgen")
+  endif()
+endif()
+
+# mauve_add_python_module(<name> PACKAGE <package> SOURCES ... LIBRARIES ...): a pybind11 module inside a package, and
+# its stub.
 function(mauve_add_python_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;LIBRARIES")
   set(target ${arg_PACKAGE}_${name})
@@ -31,13 +44,22 @@ function(mauve_add_python_module name)
     INSTALL_RPATH "$ORIGIN/../../..")  # site-packages/<package> -> lib
   target_link_libraries(${target} PRIVATE ${arg_LIBRARIES} mauve_warnings mauve_sanitizers)
   install(TARGETS ${target} LIBRARY DESTINATION "${PYTHON_INSTALL_DIR}/${arg_PACKAGE}")
+  if(MAUVE_STUBS)
+    set(writer "${PROJECT_SOURCE_DIR}/scripts/write_stub.py")
+    set(stub "${CMAKE_CURRENT_BINARY_DIR}/${name}.pyi")
+    add_custom_command(OUTPUT "${stub}"
+      COMMAND "${Python3_EXECUTABLE}" "${writer}" "$<TARGET_FILE:${target}>" ${arg_PACKAGE}.${name} "${stub}"
+      DEPENDS ${target} "${writer}" VERBATIM COMMENT "Writing ${arg_PACKAGE}/${name}.pyi")
+    add_custom_target(${target}_stub ALL DEPENDS "${stub}")
+    install(FILES "${stub}" DESTINATION "${PYTHON_INSTALL_DIR}/${arg_PACKAGE}")
+  endif()
 endfunction()
 
 # mauve_install_python_package(<package>): its Python sources, type information and data files.
 function(mauve_install_python_package package)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/${package}/" DESTINATION "${PYTHON_INSTALL_DIR}/${package}"
     FILES_MATCHING
-    PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js"
+    PATTERN "*.py" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js"
     PATTERN "*.xml"
     PATTERN "__pycache__" EXCLUDE
     PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE PATTERN "trace/keeper" EXCLUDE

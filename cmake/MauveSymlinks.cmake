@@ -17,7 +17,7 @@ function(mauve_link_installed folder destination)
       set(source \"${folder}\")
       set(copy \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${destination}\")
       file(GLOB_RECURSE names LIST_DIRECTORIES FALSE RELATIVE \"\${copy}\" \"\${copy}/*\")
-      list(FILTER names EXCLUDE REGEX \"\\\\.(so|pyc)$\") # the clone may have those of another build
+      list(FILTER names EXCLUDE REGEX \"\\\\.(so|pyi|pyc)$\") # the clone may have those of another build
       foreach(name IN LISTS names)
         if(EXISTS \"\${source}/\${name}\")
           file(CREATE_LINK \"\${source}/\${name}\" \"\${copy}/\${name}\" SYMBOLIC)

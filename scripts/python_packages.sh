@@ -34,7 +34,7 @@ requirement_files() {
   case $1 in
     tests) names+=(test) ;;
     lint) names+=(test lint) ;;
-    docs) names=(docs) ;; # pages are built without MAUVE RT
+    docs) names=(docs) ;; # of MAUVE RT, pages need the stubs only
   esac
   for name in "${names[@]}"; do echo "$MAUVE_ROOT/requirements/$name.txt"; done
 }

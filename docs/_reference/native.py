@@ -1,8 +1,8 @@
-"""A stub of the native library and of our messages: the documentation needs no build of MAUVE RT.
+"""A stand-in for the native library and our messages: the documentation needs no ROS, no native library.
 
-The stub has the classes and functions of mauve_rt/_kernel.pyi. The tables of the kernel (settings, kinds of
-resources and of conditions) come from kernel_tables.json, and tests/python/project/test_reference.py compares
-that file with the kernel.
+It has the classes and functions of mauve_rt/_kernel.pyi, which the build writes. The tables of the kernel
+(settings, kinds of resources and of conditions) come from kernel_tables.json, and
+tests/python/project/test_reference.py compares that file with the kernel.
 """
 
 import ast

@@ -61,17 +61,19 @@ TransactionReport commit_transaction(PyArchitecture& self, const PyTransaction& 
 
 void bind_architecture(py::module_& module) {
   bind_component(module);
-  py::class_<PyArchitecture>(module, "Architecture")
+  py::class_<PyArchitecture>(
+      module, "Architecture",
+      "Components and resources, connected. Parts are classes written in Python or registered names.")
       .def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
       .def(
           "add_component",
-          [](const py::object& object, const std::string& name, const py::object& shell,
-             const py::object& core, const py::object& fsm, const std::vector<std::string>& alternatives,
-             const py::object& fallback, bool reconfigurable, const py::kwargs& settings) {
+          [](const py::object& object, const std::string& name, const AnyShell& shell, const AnyCore& core,
+             const AnyFsm& fsm, const std::vector<std::string>& alternatives,
+             const std::optional<AnyCore>& fallback, bool reconfigurable, const py::kwargs& settings) {
             auto& self = object.cast<PyArchitecture&>();
             const PluginRegistry& registry = self.registry;
             std::unique_ptr<CoreBase> fallback_core;
-            if (!fallback.is_none()) fallback_core = make_core(fallback, registry);
+            if (fallback) fallback_core = make_core(*fallback, registry);
             const ComponentParts rest{.settings = task_settings(name, settings),
                                       .alternatives = alternatives,
                                       .reconfigurable = reconfigurable};
@@ -85,8 +87,8 @@ void bind_architecture(py::module_& module) {
             return PyComponent(object, name);
           },
           py::arg("name"), py::arg("shell"), py::arg("core"), py::arg("fsm"), py::kw_only(),
-          py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = py::none(),
-          py::arg("reconfigurable") = true)
+          py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = std::nullopt,
+          py::arg("reconfigurable") = true, "`fallback`: the core that takes over after a fault.")
       .def(
           "component",
           [](const py::object& object, const std::string& name) {
@@ -96,7 +98,7 @@ void bind_architecture(py::module_& module) {
           py::arg("name"))
       .def(
           "add_resource",
-          [](PyArchitecture& self, const std::string& name, const py::object& resource,
+          [](PyArchitecture& self, const std::string& name, const AnyResource& resource,
              time_ns_t longest_hold_ns) {
             Transaction transaction;
             transaction.add_resource(name, make_resource(resource, self.registry), TopicBinding::none,
@@ -114,32 +116,44 @@ void bind_architecture(py::module_& module) {
             commit_one(self, std::move(transaction));
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "",
-          py::arg("longest_hold_ns") = 0)
+          py::arg("longest_hold_ns") = 0,
+          R"(Adds a resource of a kind; PluginRegistry.resource_kind tells its parameters.
+
+`longest_hold_ns`: the longest execution for which one user holds its lock, for the timing analysis:
+nothing enforces it. 0: what the resource's own code declares.)")
       .def(
           "connect",
           [](PyArchitecture& self, const std::string& component, const std::string& port,
              const std::string& resource,
              const std::string& service) { self.architecture.connect(component, port, resource, service); },
           py::arg("component"), py::arg("port"), py::arg("resource"), py::arg("service"), Unlocked())
-      .def("commit", &commit_transaction, py::arg("transaction"))
+      .def("commit", &commit_transaction, py::arg("transaction"),
+           "Carries out a transaction, by the host if there is one; as Host.commit.")
       .def(
           "set_property",
           [](PyArchitecture& self, const std::string& component, const std::string& name,
              const PropertyValue& value) {
             self.architecture.component(component).set_property(name, value);
           },
-          py::arg("component"), py::arg("name"), py::arg("value"), Unlocked())
+          py::arg("component"), py::arg("name"), py::arg("value"), Unlocked(),
+          "At once before the start, else in the component's next wait.")
       .def_property_readonly(
           "pointer",
-          [](PyArchitecture& self) { return reinterpret_cast<std::uintptr_t>(&self.architecture); })
+          [](PyArchitecture& self) { return reinterpret_cast<std::uintptr_t>(&self.architecture); },
+          "Its address, for other native modules.")
       .def(
           "publish",
           [](PyArchitecture& self, const std::string& resource) { self.architecture.publish(resource); },
-          py::arg("resource"), Unlocked())
+          py::arg("resource"), Unlocked(), R"(Marks a resource as bound to an outgoing topic.
+
+Host.wait_published yields what is written to it.)")
       .def(
           "subscribe",
           [](PyArchitecture& self, const std::string& resource) { self.architecture.subscribe(resource); },
-          py::arg("resource"), Unlocked())
+          py::arg("resource"), Unlocked(),
+          R"(Counts an incoming topic, which uses Host.write_resource, as a writer of a resource.
+
+Refused for a latest_value that has one.)")
       .def(
           "configure", [](PyArchitecture& self) { self.architecture.configure(); }, Unlocked())
       .def(
@@ -152,23 +166,32 @@ void bind_architecture(py::module_& module) {
           },
           Unlocked())
       .def(
-          "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked())
-      .def("authors",
-           [](PyArchitecture& self) {
-             std::vector<std::tuple<std::string, std::string, std::string>> found;
-             for (const Authored& one : self.architecture.authors())
-               found.emplace_back(one.target, one.element, one.author);
-             return found;
-           })
+          "describe", [](PyArchitecture& self) { return self.architecture.describe(); }, Unlocked(),
+          "Components, implementations, wiring, properties, states, grids and resources, as of one moment.")
+      .def(
+          "authors",
+          [](PyArchitecture& self) {
+            std::vector<std::tuple<std::string, std::string, std::string>> found;
+            for (const Authored& one : self.architecture.authors())
+              found.emplace_back(one.target, one.element, one.author);
+            return found;
+          },
+          R"((target, element, author) of what was changed since the file or program made it.
+
+element: core, fsm, shell, state, "property NAME", "port NAME"; empty: the target itself.)")
       .def(
           "note_author",
           [](PyArchitecture& self, const std::string& target, const std::string& element,
              const std::string& author) { self.architecture.note_author(target, element, author); },
-          py::arg("target"), py::arg("element"), py::arg("author"))
-      .def("revision", [](PyArchitecture& self) { return self.architecture.revision(); })
+          py::arg("target"), py::arg("element"), py::arg("author"),
+          "Of a change that was made without a transaction.")
+      .def(
+          "revision", [](PyArchitecture& self) { return self.architecture.revision(); },
+          "Grows with every committed change and every start, stop and fault; never 0.")
       .def("is_configured", [](PyArchitecture& self) { return self.architecture.is_configured(); })
-      .def("threads_left_behind",
-           [](PyArchitecture& self) { return self.architecture.threads_left_behind(); })
+      .def(
+          "threads_left_behind", [](PyArchitecture& self) { return self.architecture.threads_left_behind(); },
+          "Threads of removed components that still run a timed-out execution.")
       .def("components", &describe_components)
       .def(
           "previewed_states",
@@ -176,8 +199,13 @@ void bind_architecture(py::module_& module) {
             const py::gil_scoped_release unlocked;  // the fsm may be written in Python
             return self.architecture.component(component).previewed_states();
           },
-          py::arg("component"))
-      .def("take_recent_maxima", &take_all_recent_maxima)
+          py::arg("component"),
+          R"(The states that the component's fsm will have, before anything is configured.
+
+Raises:
+    MauveError: it cannot be so.)")
+      .def("take_recent_maxima", &take_all_recent_maxima,
+           "Of every component, and counted anew from here on: for one caller only.")
       .def("resources", &describe_resources);
 }
 

@@ -20,7 +20,7 @@ py::object shell_of(const PyComponent& self) {
   return python != nullptr ? python->object() : py::none();
 }
 
-StepReport swap_core(const PyComponent& self, const py::object& core, time_ns_t commit_timeout_ns,
+StepReport swap_core(const PyComponent& self, const AnyCore& core, time_ns_t commit_timeout_ns,
                      time_ns_t phase_timeout_ns) {
   std::unique_ptr<CoreBase> fresh = make_core(core, self.architecture().registry);
   return unlocked(self, [&](Component& component) {
@@ -32,14 +32,20 @@ StepReport swap_core(const PyComponent& self, const py::object& core, time_ns_t 
 }  // namespace
 
 void bind_component(py::module_& module) {
-  py::class_<PyComponent>(module, "Component")
+  py::class_<PyComponent>(
+      module, "Component",
+      "One component of an architecture, by name: it keeps the architecture. For ordinary threads.")
       .def_property_readonly("name", &PyComponent::name)
-      .def_property_readonly("shell", &shell_of)
-      .def_property_readonly("core",
-                             [](const PyComponent& self) { return PythonCore::object_of(self.get().core()); })
+      .def_property_readonly("shell", &shell_of, "Its shell's object; None when that is written in C++.")
       .def_property_readonly(
-          "state", [](const PyComponent& self) { return std::string(to_string(self.get().task().state())); })
-      .def("get_time", [](const PyComponent& self) { return self.get().task().get_time(); })
+          "core", [](const PyComponent& self) { return PythonCore::object_of(self.get().core()); },
+          "Its core's object; None when that is written in C++. Not while somebody replaces the core.")
+      .def_property_readonly(
+          "state", [](const PyComponent& self) { return std::string(to_string(self.get().task().state())); },
+          "As ComponentDescription.state.")
+      .def(
+          "get_time", [](const PyComponent& self) { return self.get().task().get_time(); },
+          "The nominal instant of the last entry of the initial state.")
       .def("describe",
            [](const PyComponent& self) {
              return unlocked(self, [&self](Component& component) {
@@ -65,14 +71,16 @@ void bind_component(py::module_& module) {
           [](const PyComponent& self, const std::string& name, const PropertyValue& value) {
             unlocked(self, [&](Component& component) { component.set_property(name, value); });
           },
-          py::arg("name"), py::arg("value"))
-      .def("cleanup_core",
-           [](const PyComponent& self) {
-             unlocked(self, [](Component& component) { component.cleanup_core(); });
-           })
+          py::arg("name"), py::arg("value"), "At once before the start, else in the component's next wait.")
+      .def(
+          "cleanup_core",
+          [](const PyComponent& self) {
+            unlocked(self, [](Component& component) { component.cleanup_core(); });
+          },
+          "Listing 3 of the paper: of a stopped component, cleanup_core, replace_core, configure_core.")
       .def(
           "replace_core",
-          [](const PyComponent& self, const py::object& core) {
+          [](const PyComponent& self, const AnyCore& core) {
             std::unique_ptr<CoreBase> fresh = make_core(core, self.architecture().registry);
             unlocked(self, [&](Component& component) { component.replace_core(std::move(fresh)); });
           },
@@ -82,7 +90,8 @@ void bind_component(py::module_& module) {
              unlocked(self, [](Component& component) { component.configure_core(); });
            })
       .def("swap_core", &swap_core, py::arg("core"), py::kw_only(), py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("phase_timeout_ns") = s_to_ns(1));
+           py::arg("phase_timeout_ns") = s_to_ns(1),
+           "Replaces the core in flight: prepare, commit inside a wait, retire the old one.");
 }
 
 }  // namespace mauve::bindings

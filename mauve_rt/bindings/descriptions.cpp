@@ -140,39 +140,46 @@ RecentMaxima take_recent_maxima(const Component& component) {
 }
 
 void bind_descriptions(py::module_& module) {
-  py::class_<FieldShape>(module, "FieldShape")
+  py::class_<FieldShape>(module, "FieldShape", "A field of a message as its C++ struct has it.")
       .def_readonly("name", &FieldShape::name)
-      .def_readonly("type", &FieldShape::type)
-      .def_readonly("text_capacity", &FieldShape::text_capacity)
+      .def_readonly("type", &FieldShape::type,
+                    "Of an element, as in .msg files: 'float64', 'string', 'geometry_msgs/msg/Point'.")
+      .def_readonly("text_capacity", &FieldShape::text_capacity, "Of a string; 0: any length.")
       .def_property_readonly("is_array", [](const FieldShape& self) { return self.arity != FieldArity::one; })
-      .def_property_readonly("is_fixed",
-                             [](const FieldShape& self) { return self.arity == FieldArity::fixed; })
+      .def_property_readonly(
+          "is_fixed", [](const FieldShape& self) { return self.arity == FieldArity::fixed; },
+          "An array of exactly `size`, not of at most.")
       .def_readonly("size", &FieldShape::size)
-      .def_readonly("offset", &FieldShape::offset)
-      .def_readonly("fields", &FieldShape::fields);
-  py::class_<MessageShape>(module, "MessageShape")
+      .def_readonly("offset", &FieldShape::offset, "In bytes, within its struct.")
+      .def_readonly("fields", &FieldShape::fields, "Of a message within the message.");
+  py::class_<MessageShape>(module, "MessageShape", "A message as its C++ struct has it.")
       .def_readonly("type", &MessageShape::type)
-      .def_readonly("bytes", &MessageShape::bytes)
+      .def_readonly("bytes", &MessageShape::bytes, "Of the struct.")
       .def_readonly("fields", &MessageShape::fields);
   py::class_<PortDescription>(module, "PortDescription")
       .def_readonly("name", &PortDescription::name)
-      .def_readonly("kind", &PortDescription::kind)
-      .def_readonly("type", &PortDescription::type)
-      .def_readonly("resource", &PortDescription::resource)
+      .def_readonly("kind", &PortDescription::kind, "'read', 'write', 'call', 'event'.")
+      .def_readonly("type", &PortDescription::type,
+                    "'geometry_msgs/msg/Point'; of a call port the name that its service declares.")
+      .def_readonly("resource", &PortDescription::resource, "'' when not connected.")
       .def_readonly("service", &PortDescription::service)
-      .def_readonly("required", &PortDescription::required)
-      .def_readonly("messages", &PortDescription::messages)
-      .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns)
-      .def_readonly("wait_free", &PortDescription::wait_free);
+      .def_readonly("required", &PortDescription::required, "Told of a shell's ports, not of a component's.")
+      .def_readonly("messages", &PortDescription::messages,
+                    "Of its type. Told of a shell's ports, not of a component's.")
+      .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns,
+                    "For how long a user holds its resource's lock; 0: not declared.")
+      .def_readonly("wait_free", &PortDescription::wait_free,
+                    "It takes no lock, as ports are connected now; told of a component's ports.");
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
-      .def_readonly("type", &PropertyDescription::type)
-      .def_property_readonly("value", [](const PropertyDescription& self) { return to_python(self.value); })
+      .def_readonly("type", &PropertyDescription::type, "'bool', 'int', 'float', 'str'.")
+      .def_readonly("value", &PropertyDescription::value, "Default, or the present value for a component.")
       .def_readonly("unit", &PropertyDescription::unit)
       .def_readonly("description", &PropertyDescription::description)
       .def_readonly("minimum", &PropertyDescription::minimum)
       .def_readonly("maximum", &PropertyDescription::maximum)
-      .def_readonly("structural", &PropertyDescription::structural)
+      .def_readonly("structural", &PropertyDescription::structural,
+                    "Parts that read it only when they are configured: shell, core, fsm.")
       .def(
           "check",
           [](const PropertyDescription& self, const PropertyValue& value) {
@@ -180,87 +187,115 @@ void bind_descriptions(py::module_& module) {
                 .unit = self.unit, .minimum = self.minimum, .maximum = self.maximum};
             static_cast<void>(checked(self.name, self.value, options, value));
           },
-          py::arg("value"));
+          py::arg("value"),
+          "Raises MauveError (type_mismatch, out_of_range) for a value that it does not take.");
   py::class_<ShellDescription>(module, "ShellDescription")
       .def_readonly("name", &ShellDescription::name)
       .def_readonly("ports", &ShellDescription::ports)
       .def_readonly("properties", &ShellDescription::properties)
-      .def_readonly("bytes", &ShellDescription::bytes);
+      .def_readonly("bytes", &ShellDescription::bytes, "Of its class; 0: not written in C++.");
   py::class_<ServiceDescription>(module, "ServiceDescription")
       .def_readonly("name", &ServiceDescription::name)
-      .def_readonly("kind", &ServiceDescription::kind)
+      .def_readonly("kind", &ServiceDescription::kind,
+                    "As PortDescription.kind: the kind of port that connects to it.")
       .def_readonly("type", &ServiceDescription::type)
-      .def_readonly("takes_messages", &ServiceDescription::takes_messages)
-      .def_readonly("messages", &ServiceDescription::messages)
-      .def_readonly("is_wait_free", &ServiceDescription::is_wait_free);
+      .def_readonly("takes_messages", &ServiceDescription::takes_messages,
+                    "A call that can be a ROS service.")
+      .def_readonly("messages", &ServiceDescription::messages,
+                    "A call's request and response; none where C++ has no struct.")
+      .def_readonly("is_wait_free", &ServiceDescription::is_wait_free,
+                    "Whether a port takes no lock, as ports are connected now.");
   py::class_<ResourceDescription>(module, "ResourceDescription")
       .def_readonly("name", &ResourceDescription::name)
-      .def_readonly("kind", &ResourceDescription::kind)
+      .def_readonly("kind", &ResourceDescription::kind, "A given kind, or the plug-in's name.")
       .def_readonly("type", &ResourceDescription::type)
       .def_readonly("services", &ResourceDescription::services)
-      .def_readonly("longest_hold_ns", &ResourceDescription::longest_hold_ns);
+      .def_readonly("longest_hold_ns", &ResourceDescription::longest_hold_ns,
+                    "For how long a user holds its lock; 0: not declared.");
   using E = ExecutionTimeDescription;
-  py::class_<E>(module, "ExecutionTimeDescription")
+  py::class_<E>(module, "ExecutionTimeDescription",
+                "How long an execution state took since its machine was configured.")
       .def_readonly("state", &E::state)
       .def_readonly("count", &E::count)
       .def_readonly("mean_ns", &E::mean_ns)
       .def_readonly("max_ns", &E::max_ns);
   using S = DescribedState;
-  py::class_<S>(module, "DescribedState")
+  py::class_<S>(module, "DescribedState", "A state of an fsm; fields as mauve_msgs/msg/StateInfo.")
       .def_readonly("name", &S::name)
       .def_readonly("is_initial", &S::is_initial)
       .def_readonly("is_wait", &S::is_wait)
       .def_readonly("is_event_wait", &S::is_event_wait)
-      .def_readonly("duration_ns", &S::duration_ns)
-      .def_readonly("min_interarrival_ns", &S::min_interarrival_ns)
-      .def_readonly("max_execution_ns", &S::max_execution_ns)
-      .def_readonly("simulated_execution_ns", &S::simulated_execution_ns)
-      .def_readonly("successors", &S::successors)
-      .def_readonly("wcet_ns", &S::wcet_ns);
+      .def_readonly("duration_ns", &S::duration_ns,
+                    "Of a wait; of an event wait its timeout; FOREVER: it has none.")
+      .def_readonly("min_interarrival_ns", &S::min_interarrival_ns, "Of an event wait.")
+      .def_readonly("max_execution_ns", &S::max_execution_ns, "Of an execution state: its bound; 0: none.")
+      .def_readonly("simulated_execution_ns", &S::simulated_execution_ns, "What it takes in virtual time.")
+      .def_readonly("successors", &S::successors,
+                    "In the order in which guards are asked; last the one without a guard.")
+      .def_readonly("wcet_ns", &S::wcet_ns, "Of an execution state: its worst case; 0: not declared.");
   using C = ComponentDescription;
-  py::class_<C>(module, "ComponentDescription")
+  py::class_<C>(module, "ComponentDescription", "A snapshot; fields as mauve_msgs/msg/ComponentInfo.")
       .def_readonly("name", &C::name)
       .def_readonly("shell", &C::shell)
       .def_readonly("core", &C::core)
       .def_readonly("fsm", &C::fsm)
-      .def_readonly("state", &C::state)
-      .def_readonly("current_state", &C::current_state)
+      .def_readonly("state", &C::state, "'UNCONFIGURED', 'STOPPED', 'RUNNING', 'STOPPING', 'FAULTED'.")
+      .def_readonly("current_state", &C::current_state, "FSM state being executed or waited in.")
       .def_readonly("clock_ns", &C::clock_ns)
       .def_readonly("period_ns", &C::period_ns)
       .def_readonly("offset_ns", &C::offset_ns)
-      .def_readonly("policy", &C::policy)
+      .def_readonly("policy", &C::policy, "'SCHED_FIFO' | 'SCHED_OTHER' | '' before deployment.")
       .def_readonly("priority", &C::priority)
       .def_readonly("cpus", &C::cpus)
       .def_readonly("alternatives", &C::alternatives)
       .def_readonly("reconfigurable", &C::reconfigurable)
       .def_readonly("ports", &C::ports)
       .def_readonly("properties", &C::properties)
-      .def_readonly("fault", &C::fault)
-      .def_readonly("fallback", &C::fallback)
-      .def_readonly("fell_back", &C::fell_back)
+      .def_readonly("fault", &C::fault, "Also of a core that the fallback has replaced.")
+      .def_readonly("fallback", &C::fallback,
+                    "The core that takes over after a fault; '' when none was declared.")
+      .def_readonly("fell_back", &C::fell_back, "It took over.")
       .def_readonly("releases", &C::releases)
       .def_readonly("overruns", &C::overruns)
       .def_readonly("skipped", &C::skipped)
       .def_readonly("wakeup_p50_ns", &C::wakeup_p50_ns)
       .def_readonly("wakeup_p99_ns", &C::wakeup_p99_ns)
       .def_readonly("wakeup_max_ns", &C::wakeup_max_ns)
-      .def_readonly("allocations", &C::allocations)
-      .def_readonly("page_faults", &C::page_faults)
-      .def_readonly("execution_times", &C::execution_times)
-      .def_readonly("deadline_ns", &C::deadline_ns)
-      .def_readonly("overrun", &C::overrun)
-      .def_readonly("states", &C::states)
-      .def_property_readonly("state_age_ns", [](const C& self) { return self.state_age.age_ns; })
-      .def_property_readonly("state_bound_ns", [](const C& self) { return self.state_age.bound_ns; })
-      .def_property_readonly("hung_after_ns", [](const C& self) { return self.state_age.hung_after_ns; })
-      .def_property_readonly("waiting", [](const C& self) { return self.state_age.is_wait; })
+      .def_readonly("allocations", &C::allocations,
+                    "C++ operators new of its thread since its last start; see allocation_counting().")
+      .def_readonly("page_faults", &C::page_faults, "Of its thread since its last start, minor and major.")
+      .def_readonly("execution_times", &C::execution_times, "One for each execution state.")
+      .def_readonly("deadline_ns", &C::deadline_ns, "Declared; 0: the next instant.")
+      .def_readonly("overrun", &C::overrun, "'skip', 'catch_up', 'fault'.")
+      .def_readonly("states", &C::states, "Of the fsm.")
+      .def_property_readonly(
+          "state_age_ns", [](const C& self) { return self.state_age.age_ns; },
+          "How long it has been executing current_state; of a wait: how long past its pending instant; 0: "
+          "parked.")
+      .def_property_readonly(
+          "state_bound_ns", [](const C& self) { return self.state_age.bound_ns; },
+          "Declared max_execution of current_state; 0: none, or a wait.")
+      .def_property_readonly(
+          "hung_after_ns", [](const C& self) { return self.state_age.hung_after_ns; },
+          "An older state is told as hung.")
+      .def_property_readonly(
+          "waiting", [](const C& self) { return self.state_age.is_wait; }, "current_state is a wait.")
       .def_property_readonly("hung", [](const C& self) { return self.state_age.is_hung(); });
-  py::class_<RecentMaxima>(module, "RecentMaxima")
+  py::class_<RecentMaxima>(
+      module, "RecentMaxima",
+      "The largest figures of a component since they were taken last; 0 where nothing happened.")
       .def_readonly("component", &RecentMaxima::component)
       .def_readonly("wakeup_ns", &RecentMaxima::wakeup_ns)
-      .def_readonly("response_ns", &RecentMaxima::response_ns)
-      .def_readonly("execution_ns", &RecentMaxima::execution_ns);
-  module.def("allocation_counting", [] { return std::string(to_string(allocation_counting())); });
+      .def_readonly("response_ns", &RecentMaxima::response_ns,
+                    "From the nominal instant of a release to the entry of the next wait.")
+      .def_readonly("execution_ns", &RecentMaxima::execution_ns, "By execution state.");
+  module.def(
+      "allocation_counting", [] { return std::string(to_string(allocation_counting())); },
+      R"(Which C++ allocations the counters see: 'none', 'some' or 'all'.
+
+'none' under a sanitizer. 'some': not those inside the C++ standard library (streams), when the process
+had loaded it before; start it with LD_PRELOAD=libmauve_rt.so and it is 'all'. malloc, called directly by
+C code or by the interpreter, is never counted.)");
 }
 
 }  // namespace mauve::bindings

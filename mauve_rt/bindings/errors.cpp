@@ -7,7 +7,11 @@ namespace mauve::bindings {
 py::handle mauve_error_type() {
   static const py::handle type = PyErr_NewExceptionWithDoc(
       "mauve_rt._kernel.MauveError",
-      "An error of the kernel: code, component, element, expected, found, remedy.", nullptr, nullptr);
+      R"(An error of the kernel. str() is one line: what, where, expected, found, remedy.
+
+`code` is a key of ERROR_REPLIES, `statement` says what alone. `step` is the number of the step of a transaction, from
+1; 0: none.)",
+      nullptr, nullptr);
   return type;
 }
 
@@ -31,9 +35,19 @@ py::handle python_type_of(const std::exception& error) {
   return PyExc_RuntimeError;
 }
 
+void annotate(py::handle type) {
+  py::dict attributes;
+  for (const char* text :
+       {"code", "statement", "component", "element", "expected", "found", "remedy", "step_name"})
+    attributes[text] = "str";
+  attributes["step"] = "int";
+  type.attr("__annotations__") = attributes;
+}
+
 }  // namespace
 
 void bind_errors(py::module_& module) {
+  annotate(mauve_error_type());
   module.attr("MauveError") = mauve_error_type();
   py::dict replies;
   for (const ErrorWords& words : kErrors) replies[std::string(words.name).c_str()] = std::string(words.reply);

@@ -55,7 +55,7 @@ CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
 }
 
 /// By its registered name, which the component must declare; or by its class, which is the program's own.
-StepReport replace_core(PyHost& self, const std::string& component, const py::object& core,
+StepReport replace_core(PyHost& self, const std::string& component, const AnyCore& core,
                         time_ns_t commit_timeout_ns, time_ns_t phase_timeout_ns) {
   const CommitTimeouts limits = timeouts(commit_timeout_ns, phase_timeout_ns);
   if (py::isinstance<py::str>(core)) {
@@ -113,8 +113,10 @@ void shorten_switch_interval() {
     sys.attr("setswitchinterval")(kSwitchIntervalS);
 }
 
+}  // namespace
+
 void bind_reports(py::module_& module) {
-  py::class_<StepReport>(module, "StepReport")
+  py::class_<StepReport>(module, "StepReport", "Fields as mauve_msgs/msg/StepReport.")
       .def_readonly("step", &StepReport::step)
       .def_readonly("component", &StepReport::component)
       .def_readonly("from_core", &StepReport::from_core)
@@ -123,30 +125,31 @@ void bind_reports(py::module_& module) {
       .def_readonly("blackout_ns", &StepReport::blackout_ns)
       .def_readonly("missed_releases", &StepReport::missed_releases)
       .def_readonly("phase_nominal_ns", &StepReport::phase_nominal_ns)
-      .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns)
-      .def_readonly("remark", &StepReport::remark)
-      .def_readonly("shift_ns", &StepReport::shift_ns)
-      .def_readonly("released_ns", &StepReport::released_ns)
-      .def_readonly("instant_ns", &StepReport::instant_ns)
-      .def_readonly("release_ns", &StepReport::release_ns)
-      .def_readonly("taken", &StepReport::taken)
-      .def_readonly("left", &StepReport::left);
+      .def_readonly("phase_actual_ns", &StepReport::phase_actual_ns,
+                    "NOT_MEASURED until the first release after the commit.")
+      .def_readonly("remark", &StepReport::remark, "Why releases were missed; empty when none was.")
+      .def_readonly("shift_ns", &StepReport::shift_ns, "By which a new epoch made its instants later.")
+      .def_readonly("released_ns", &StepReport::released_ns, "The instant of the release that followed.")
+      .def_readonly("instant_ns", &StepReport::instant_ns,
+                    "T: the component executes with the change from this instant on.")
+      .def_readonly("release_ns", &StepReport::release_ns, "Nominal instant of the release that followed.")
+      .def_readonly("taken", &StepReport::taken, "State fields that the new core took over.")
+      .def_readonly("left", &StepReport::left, "State fields that it did not, with the reason.");
   py::class_<RealtimeStatus>(module, "RealtimeStatus")
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);
   py::class_<TraceDrain>(module, "TraceDrain")
-      .def_property_readonly("records",
-                             [](const TraceDrain& self) {
-                               return to_bytes(self.records.data(),
-                                               self.records.size() * sizeof(TraceRecord));
-                             })
-      .def_readonly("written", &TraceDrain::written)
+      .def_property_readonly(
+          "records",
+          [](const TraceDrain& self) {
+            return to_bytes(self.records.data(), self.records.size() * sizeof(TraceRecord));
+          },
+          "n * 48, layout of mauve_msgs/msg/TraceRecord, little-endian, no padding.")
+      .def_readonly("written", &TraceDrain::written, "Per component.")
       .def_readonly("dropped", &TraceDrain::dropped)
       .def_readonly("monotonic_ns", &TraceDrain::monotonic_ns)
       .def_readonly("realtime_ns", &TraceDrain::realtime_ns);
 }
-
-}  // namespace
 
 std::vector<PyHost::PublishedSample> PyHost::wait_published(time_ns_t timeout_ns) {
   const time_ns_t until = host().is_simulated() ? 0 : monotonic_now_ns() + timeout_ns;
@@ -175,11 +178,13 @@ void PyHost::wake() noexcept {
   architecture_.changes().bump();
 }
 
-bool PyHost::write_resource(const std::string& name, std::string_view data) {
-  return architecture_.resource(name).write_sample(std::as_bytes(std::span(data)), host().now_ns());
+bool PyHost::write_resource(const std::string& name, const py::bytes& data) {
+  const std::string_view message = data;
+  const py::gil_scoped_release release;
+  return architecture_.resource(name).write_sample(std::as_bytes(std::span(message)), host().now_ns());
 }
 
-py::tuple PyHost::read_resource(const std::string& name) {
+ReadMessage PyHost::read_resource(const std::string& name) {
   std::vector<std::byte> message;
   time_ns_t time_ns = 0;
   std::uint64_t sequence = 0;
@@ -203,27 +208,53 @@ TraceDrain PyHost::drain_trace() {
 }
 
 void bind_host(py::module_& module) {
-  bind_reports(module);
-  py::class_<PyCommitted>(module, "Committed")
-      .def("report", &PyCommitted::report, py::arg("phase_timeout_ns") = 0, Unlocked());
-  py::class_<PyHost>(module, "Host")
+  py::class_<PyCommitted>(
+      module, "Committed",
+      "A transaction that is in force. Others may change what it did while its report is asked for.")
+      .def("report", &PyCommitted::report, py::arg("phase_timeout_ns") = 0, Unlocked(),
+           "What it cost, so far; waits up to so long for the releases that follow. May be called again.");
+  py::class_<PyHost>(
+      module, "Host",
+      R"(What runs an architecture: a Deployer, on threads, or a SimulatedHost, in virtual time.
+
+An architecture has one host at a time. Every call releases the interpreter's lock. In virtual time
+nothing happens while the caller waits: waits return at once, and preparing takes no time.)")
       .def(
-          "prepare_process", [](PyHost& self) { self.host().prepare_process(); }, Unlocked())
-      .def("deploy",
-           [](PyHost& self) {
-             shorten_switch_interval();
-             const py::gil_scoped_release release;
-             self.host().deploy();
-           })
+          "prepare_process", [](PyHost& self) { self.host().prepare_process(); }, Unlocked(),
+          R"(On threads: locks memory, holds /dev/cpu_dma_latency at 0, notes what was denied.
+
+Called by deploy() if not before.)")
       .def(
-          "shutdown", [](PyHost& self) { self.host().shutdown(); }, Unlocked())
+          "deploy",
+          [](PyHost& self) {
+            shorten_switch_interval();
+            const py::gil_scoped_release release;
+            self.host().deploy();
+          },
+          R"(Publishes the epoch and starts every component; a simulation deploys all its hosts at once.
+
+On threads: creates these, meets them at the barrier first. Shortens the interpreter's switch interval
+to 0.1 ms where it is longer, for components in Python.)")
+      .def(
+          "shutdown", [](PyHost& self) { self.host().shutdown(); }, Unlocked(),
+          R"(Stops in reverse order (outputs written), joins the threads; waits for nobody's preparation.
+
+The architecture can be deployed again.)")
       .def(
           "stop",
           [](PyHost& self, const std::string& component, time_ns_t timeout_ns, bool force) {
             return self.host().stop(component, {.timeout_ns = timeout_ns, .force = force});
           },
           py::arg("component"), py::arg("timeout_ns") = s_to_ns(1), py::kw_only(), py::arg("force") = false,
-          Unlocked())
+          Unlocked(), R"(Stops a component at the end of its state; a wait ends at once.
+
+By force: a component that still executes a state, or a guard, at the time-out is given up. It is
+FAULTED, its outputs are written as on a stop, and its thread is left behind until the state ends.
+True when that was done. A core that loops in Python is given up like any other. An extension that
+never releases the interpreter's lock stops all Python of the process, this call included.
+
+Raises:
+    MauveError: not_running; timeout, and the stop stays pending: it takes effect when the state ends.)")
       .def(
           "start",
           [](PyHost& self, const std::string& component, std::optional<time_ns_t> clock_ns) {
@@ -236,24 +267,49 @@ void bind_host(py::module_& module) {
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("force") = false)
+           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("force") = false,
+           R"(Carries out a transaction, deployed or not.
+
+It takes effect at one logical instant T: each component takes its change on its own thread, in its
+wait, before its first release at or after T. No component waits for another one. A component that
+never comes to a wait stops the change from being made: timeout, and nothing is changed. A component
+that is late at T takes its change at the end of its overrun. Until then it runs its old parts.
+
+By force: a component that is removed, stopped or given new parts, and whose state does not end within
+the commit's time-out, is stopped by force, as stop() says. It stays FAULTED whatever becomes of the
+transaction. The commit is tried once more, without the thread of one that is removed or stopped; for
+new parts it is refused (faulted): remove the component and add it anew, in one transaction.
+
+Raises MauveError with the number of the failed step (`step`); nothing was changed then.)")
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("force") = false, py::keep_alive<0, 1>())
+           py::arg("force") = false, py::keep_alive<0, 1>(),
+           "As commit(), but waits for no release that follows: ask what it returns.")
       .def(
-          "settle_probations", [](PyHost& self) { self.host().settle_probations(); }, Unlocked())
+          "settle_probations", [](PyHost& self) { self.host().settle_probations(); }, Unlocked(),
+          "Decides the probations whose time is over, and retires what they have put out.")
       .def(
-          "probations", [](PyHost& self) { return self.host().probations(); }, Unlocked())
+          "probations", [](PyHost& self) { return self.host().probations(); }, Unlocked(),
+          "Of each component the last verdict, then the core on probation now.")
       .def(
-          "shadows", [](PyHost& self) { return self.host().shadows(); }, Unlocked())
+          "shadows", [](PyHost& self) { return self.host().shadows(); }, Unlocked(),
+          "Of each component the shadow that runs, or the last one that has ended.")
       .def(
           "revert_probation",
           [](PyHost& self, const std::string& component, const std::string& reason, time_ns_t timeout_ns) {
             return self.host().revert_probation(component, reason, timeout_ns);
           },
-          py::arg("component"), py::arg("reason"), py::arg("timeout_ns") = s_to_ns(1), Unlocked())
+          py::arg("component"), py::arg("reason"), py::arg("timeout_ns") = s_to_ns(1), Unlocked(),
+          R"(Puts the old core back; False: no core is on probation, or it was decided before.
+
+Raises MauveError (timeout): the request stays pending.)")
       .def("replace_core", &replace_core, py::arg("component"), py::arg("core"), py::kw_only(),
-           py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1))
+           py::arg("commit_timeout_ns") = s_to_ns(1), py::arg("phase_timeout_ns") = s_to_ns(1),
+           R"(Prepare, commit, retire.
+
+A name must be one that the component declares; a class is the program's own choice.
+
+Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.)")
       .def(
           "set_property",
           [](PyHost& self, const std::string& component, const std::string& name, const PropertyValue& value,
@@ -263,14 +319,20 @@ void bind_host(py::module_& module) {
           py::arg("component"), py::arg("name"), py::arg("value"), py::kw_only(),
           py::arg("commit_timeout_ns") = s_to_ns(1), Unlocked())
       .def(
-          "describe", [](PyHost& self) { return self.host().describe(); }, Unlocked())
+          "describe", [](PyHost& self) { return self.host().describe(); }, Unlocked(),
+          "As Architecture.describe.")
       .def("is_deployed", [](PyHost& self) { return self.host().is_deployed(); })
-      .def("now_ns", [](PyHost& self) { return self.host().now_ns(); })
+      .def(
+          "now_ns", [](PyHost& self) { return self.host().now_ns(); }, "Now, as the components see it.")
       .def("realtime_status", [](PyHost& self) { return self.host().realtime_status(); })
-      .def_property_readonly("epoch_ns", [](PyHost& self) { return self.host().epoch_ns(); })
-      .def("collect_trace", &PyHost::collect_trace, py::arg("period_ns"), Unlocked())
+      .def_property_readonly(
+          "epoch_ns", [](PyHost& self) { return self.host().epoch_ns(); },
+          "The instant that all grids are counted from; 0 before deployment.")
+      .def("collect_trace", &PyHost::collect_trace, py::arg("period_ns"), Unlocked(),
+           "Let a native thread empty the rings so often, for drain_trace(); 0: no longer.")
       .def("drain_trace", &PyHost::drain_trace, Unlocked())
-      .def("trace_components", &PyHost::trace_components)
+      .def("trace_components", &PyHost::trace_components,
+           "Names by the numbers that records carry; those of removed components stay.")
       .def("trace_names", [](PyHost&) { return Host::trace_names(); })
       .def(
           "wait_published",
@@ -284,15 +346,22 @@ void bind_host(py::module_& module) {
             for (const auto& [resource, message, time_ns] : samples) {
               list.append(py::make_tuple(resource, to_bytes(message.data(), message.size()), time_ns));
             }
-            return list;
+            return Typed<"list[tuple[str, bytes, int]]">(std::move(list));
           },
-          py::arg("timeout_ns"))
-      .def("write_resource", &PyHost::write_resource, py::arg("resource"), py::arg("data"), Unlocked())
-      .def("read_resource", &PyHost::read_resource, py::arg("resource"))
-      .def("wait_change", &PyHost::wait_change, py::arg("timeout_ns"), Unlocked())
-      .def("wake", &PyHost::wake, Unlocked());
+          py::arg("timeout_ns"), R"(What was written to published resources since the last call.
+
+(resource, serialized message with its CDR header, writer's time), one thread at a time.)")
+      .def("write_resource", &PyHost::write_resource, py::arg("resource"), py::arg("data"),
+           "Writes a serialized message to a given resource, raises an event; False when a ring is full.")
+      .def("read_resource", &PyHost::read_resource, py::arg("resource"), R"(Looks at a shared_data resource.
+
+(serialized message, sequence number - 0: never written, writer's time))")
+      .def("wait_change", &PyHost::wait_change, py::arg("timeout_ns"), Unlocked(),
+           "Waits until any component changes its state or core (a fault included); False at the timeout.")
+      .def("wake", &PyHost::wake, Unlocked(),
+           "Ends every wait_published and wait_change at once (for shutting down).");
   py::module_::import("atexit").attr("register")(py::cpp_function(&PyDeployer::shut_down_all));
-  py::class_<PyDeployer, PyHost>(module, "Deployer")
+  py::class_<PyDeployer, PyHost>(module, "Deployer", "The host of threads: one for each component.")
       .def(py::init<PyArchitecture&, bool, bool>(), py::arg("architecture"), py::kw_only(),
            py::arg("require_realtime") = false, py::arg("trace") = true, py::keep_alive<1, 2>());
 }

@@ -28,8 +28,8 @@ class PyHost {
   std::vector<PublishedSample> wait_published(time_ns_t timeout_ns);
   bool wait_change(time_ns_t timeout_ns);
   void wake() noexcept;
-  bool write_resource(const std::string& name, std::string_view data);
-  py::tuple read_resource(const std::string& name);
+  bool write_resource(const std::string& name, const py::bytes& data);
+  ReadMessage read_resource(const std::string& name);
   std::vector<std::string> trace_components() const { return host().trace_components(); }
   /// In virtual time whoever drives it drains in time, without a thread.
   void collect_trace(time_ns_t period_ns);

@@ -1,21 +1,32 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// mauve_rt._kernel; its interface with docs is _kernel.pyi.
+// mauve_rt._kernel. A signature names the classes of Python that were registered before it: hence the order.
 #include "translate.hpp"
 
 PYBIND11_MODULE(_kernel, module) {
   using namespace mauve::bindings;
-  module.doc() = "The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC.";
+  module.doc() = R"(The native kernel, translated one to one. Times are int64 nanoseconds of CLOCK_MONOTONIC.
+
+Attributes:
+    END_SIGNALS: Signals that end a process in order: see wait_end_signal().
+    ERROR_REPLIES: By the code of a MauveError: the constant of mauve_msgs/msg/ReplyCode that answers a request which
+        such an error refuses.
+    NOT_MEASURED: In the place of a time that there is not, or not yet.
+    STATE_TIMES: What add_component(states=...) takes for each execution state, in words.
+    STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.
+    TASK_SETTINGS: What add_component() takes by keyword, besides `states`.
+)";
   bind_errors(module);
   bind_descriptions(module);
   bind_python_shell(module);
   bind_python_fsm(module);
   bind_registry(module);
   bind_settings(module);
-  bind_architecture(module);
-  bind_value_log(module);
+  bind_reports(module);
   bind_probation(module);
   bind_shadow(module);
   bind_transaction(module);
+  bind_architecture(module);
+  bind_value_log(module);
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);

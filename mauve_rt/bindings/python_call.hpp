@@ -73,7 +73,7 @@ class ShellView {
  public:
   explicit ShellView(std::shared_ptr<ShellLink> link) : link_(std::move(link)) {}
 
-  py::tuple read(const std::string& name) const;
+  ReadMessage read(const std::string& name) const;
   bool write(const std::string& name, const py::bytes& data) const;
   py::object call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const;
   void raise_event(const std::string& name) const;
@@ -87,7 +87,7 @@ class ShellView {
   time_ns_t clock() const;
   time_ns_t period() const;
   /// The shell's Python object, or None when it is written in C++.
-  py::object python() const;
+  Typed<"mauve_rt.parts.shells.Shell | None"> python() const;
   std::string implementation() const { return shell().implementation(); }
 
  private:

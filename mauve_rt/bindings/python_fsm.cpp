@@ -108,7 +108,8 @@ std::unique_ptr<FsmBase> make_python_fsm(const PartFactory& factory) {
 }
 
 void bind_python_fsm(py::module_& module) {
-  py::class_<PythonFsm>(module, "FsmBuilder")
+  py::class_<PythonFsm>(module, "FsmBuilder",
+                        "Takes the declarations of a state machine written in Python; states by their names.")
       .def("execution", &PythonFsm::add_execution, py::arg("name"), py::arg("method"),
            py::arg("max_execution_ns"), py::arg("simulated_execution_ns"), py::arg("wcet_ns"))
       .def("wait", &PythonFsm::add_wait, py::arg("name"), py::arg("duration_ns"))

@@ -38,11 +38,11 @@ class ShellBuilder {
  public:
   ShellBuilder(PythonShell& shell, const PluginRegistry& registry) : shell_(shell), registry_(registry) {}
 
-  void read_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero,
+  void read_port(const std::string& name, const std::string& type, const std::optional<py::bytes>& zero,
                  bool optional) {
     data_port(PortKind::read, name, type, {}, zero, optional);
   }
-  void write_port(const std::string& name, const std::string& type, const std::optional<std::string>& zero,
+  void write_port(const std::string& name, const std::string& type, const std::optional<py::bytes>& zero,
                   const std::string& on_commit, const std::string& on_stop, bool optional) {
     data_port(
         PortKind::write, name, type,
@@ -74,7 +74,7 @@ class ShellBuilder {
   }
   /// C++ has the type where a plug-in registered it; a message that none registered travels serialized.
   void data_port(PortKind kind, const std::string& name, const std::string& type, OutputOptions output,
-                 const std::optional<std::string>& zero, bool optional) {
+                 const std::optional<py::bytes>& zero, bool optional) {
     const std::vector<std::string> registered = registry_.names("type");
     if (zero.has_value() && !std::binary_search(registered.begin(), registered.end(), type)) {
       shell_.add_port(make_serialized_port(kind, name, type, output, as_bytes_view(*zero)));
@@ -129,7 +129,7 @@ PortBase& ShellView::require_port(const std::string& name, PortKind kind) const 
   return *port;
 }
 
-py::tuple ShellView::read(const std::string& name) const {
+ReadMessage ShellView::read(const std::string& name) const {
   PortBase& port = require_port(name, PortKind::read);
   std::vector<std::byte> message;
   DataStatus status = DataStatus::none;
@@ -177,7 +177,7 @@ time_ns_t ShellView::period() const {
   return link_->context != nullptr ? link_->context->period_ns.load(std::memory_order_relaxed) : 0;
 }
 
-py::object ShellView::python() const {
+Typed<"mauve_rt.parts.shells.Shell | None"> ShellView::python() const {
   const auto* python = dynamic_cast<const PythonShell*>(&shell());
   return python != nullptr ? python->object() : py::none();
 }
@@ -187,19 +187,26 @@ std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const Plugi
 }
 
 void bind_python_shell(py::module_& module) {
-  py::class_<ShellView>(module, "ShellView")
-      .def("read", &ShellView::read, py::arg("port"))
-      .def("write", &ShellView::write, py::arg("port"), py::arg("data"))
-      .def("call", &ShellView::call, py::arg("port"))
+  py::class_<ShellView>(
+      module, "ShellView",
+      R"(What a part written in Python reaches of its component's shell; messages in serialized form.
+
+Raises MauveError (not_configured) once the component is gone.)")
+      .def("read", &ShellView::read, py::arg("port"),
+           "(message, 0 none - 1 old - 2 new, writer's time in ns).")
+      .def("write", &ShellView::write, py::arg("port"), py::arg("data"), "False when there was no room.")
+      .def("call", &ShellView::call, py::arg("port"), "Calls a service in Python.")
       .def("raise_event", &ShellView::raise_event, py::arg("port"))
-      .def("property", &ShellView::property, py::arg("name"))
+      .def("property", &ShellView::property, py::arg("name"), "The value in force.")
       .def("ports", &ShellView::ports)
       .def("properties", &ShellView::properties)
-      .def("clock", &ShellView::clock)
-      .def("period", &ShellView::period)
-      .def("python", &ShellView::python)
+      .def("clock", &ShellView::clock, "The component's logical clock, ns of CLOCK_MONOTONIC.")
+      .def("period", &ShellView::period, "The component's period g in ns.")
+      .def("python", &ShellView::python, "The shell's own object, when it is written in Python.")
       .def("implementation", &ShellView::implementation);
-  py::class_<ShellBuilder>(module, "ShellBuilder")
+  py::class_<ShellBuilder>(
+      module, "ShellBuilder",
+      "Takes the declarations of a shell written in Python. `zero`: the message's default, serialized.")
       .def("read_port", &ShellBuilder::read_port, py::arg("name"), py::arg("type"), py::arg("zero"),
            py::arg("optional") = false)
       .def("write_port", &ShellBuilder::write_port, py::arg("name"), py::arg("type"), py::arg("zero"),

@@ -88,7 +88,7 @@ Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& 
 }
 
 void bind_resource_kinds(py::module_& module) {
-  py::class_<ResourceParameter>(module, "ResourceParameter")
+  py::class_<ResourceParameter>(module, "ResourceParameter", "What one resource of a kind can be told.")
       .def(py::init([](const std::string& name, const PropertyValue& initial, const std::string& unit,
                        const std::string& description, std::optional<double> minimum,
                        std::optional<double> maximum, bool required) {
@@ -105,81 +105,108 @@ void bind_resource_kinds(py::module_& module) {
            py::arg("required") = false)
       .def_readonly("name", &ResourceParameter::name)
       .def_property_readonly(
-          "type", [](const ResourceParameter& self) { return std::string(property_type_name(self.initial)); })
-      .def_property_readonly("initial", [](const ResourceParameter& self) { return to_python(self.initial); })
+          "type", [](const ResourceParameter& self) { return std::string(property_type_name(self.initial)); },
+          "As PropertyDescription.type.")
+      .def_readonly("initial", &ResourceParameter::initial, "Unless told otherwise.")
       .def_readonly("description", &ResourceParameter::description)
       .def_readonly("unit", &ResourceParameter::unit)
       .def_readonly("minimum", &ResourceParameter::minimum)
       .def_readonly("maximum", &ResourceParameter::maximum)
       .def_readonly("required", &ResourceParameter::is_required)
-      .def_readonly("counts_values", &ResourceParameter::is_value_count)
-      .def_readonly("limits_readers", &ResourceParameter::is_reader_limit)
-      .def_property_readonly("file_key", [](const ResourceParameter& self) {
-        return self.file_key.empty() ? self.name : self.file_key;
-      });
-  py::class_<ResourceKind>(module, "ResourceKind")
+      .def_readonly("counts_values", &ResourceParameter::is_value_count, "So many values more take memory.")
+      .def_readonly("limits_readers", &ResourceParameter::is_reader_limit,
+                    "So many ports may connect to the service `read`.")
+      .def_property_readonly(
+          "file_key",
+          [](const ResourceParameter& self) { return self.file_key.empty() ? self.name : self.file_key; },
+          "Its key in architecture files: `capacity`, or `service.timeout_ms`.");
+  py::class_<ResourceKind>(module, "ResourceKind", "What a kind of resource tells of itself.")
       .def_readonly("name", &ResourceKind::name)
       .def_readonly("parameters", &ResourceKind::parameters)
-      .def_property_readonly("type_kind",
-                             [](const ResourceKind& self) {
-                               if (self.type == TypeNeed::none) return "";
-                               return self.type == TypeNeed::data ? "type" : "call_type";
-                             })
-      .def_readonly("messages", &ResourceKind::messages)
-      .def_readonly("values", &ResourceKind::values)
+      .def_property_readonly(
+          "type_kind",
+          [](const ResourceKind& self) {
+            if (self.type == TypeNeed::none) return "";
+            return self.type == TypeNeed::data ? "type" : "call_type";
+          },
+          "Of what its type is: 'type' or 'call_type' of a registry; '': it has none.")
+      .def_readonly("messages", &ResourceKind::messages,
+                    "As which its topic may say it, the last where no type is given.")
+      .def_readonly("values", &ResourceKind::values,
+                    "So many take memory, besides those that parameters count.")
       .def_readonly("has_one_writer", &ResourceKind::has_one_writer);
-  module.def("given_resource_kinds", &PluginRegistry::given_resource_kinds);
+  module.def("given_resource_kinds", &PluginRegistry::given_resource_kinds,
+             "The kinds that the kernel gives, in their order.");
 }
 
 void bind_registry(py::module_& module) {
   bind_resource_kinds(module);
-  py::class_<PartFactory>(module, "PartFactory")
-      .def(py::init([](const std::string& kind, const std::string& name, py::object make) {
-             return PartFactory{kind, name, std::make_shared<PythonObject>(std::move(make))};
+  py::class_<PartFactory>(module, "PartFactory", "How to make a part written in Python.")
+      .def(py::init([](const Typed<"typing.Literal['shell', 'core', 'fsm', 'resource']">& kind,
+                       const std::string& name, Typed<"typing.Callable[..., object]"> make) {
+             return PartFactory{kind.cast<std::string>(), name,
+                                std::make_shared<PythonObject>(std::move(make))};
            }),
            py::arg("kind"), py::arg("name"), py::arg("make"))
       .def_readonly("kind", &PartFactory::kind)
       .def_readonly("name", &PartFactory::name);
-  py::class_<DataResource>(module, "DataResource")
-      .def(py::init([](const std::string& kind, const std::string& type, const py::dict& parameters,
-                       const std::optional<std::string>& zero) {
+  py::class_<DataResource>(
+      module, "DataResource",
+      "A resource of a data type. `zero`: the message's default, serialized; None when it is no message.")
+      .def(py::init([](const std::string& kind, const std::string& type,
+                       const Typed<"dict[str, bool | int | float | str]">& parameters,
+                       const std::optional<py::bytes>& zero) {
              DataResource made{
-                 .kind = kind, .type = type, .parameters = parameters_of(parameters), .zero = {}};
+                 .kind = kind, .type = type, .parameters = parameters_of(py::dict(parameters)), .zero = {}};
              if (zero) {
-               const auto bytes = std::as_bytes(std::span(*zero));
+               const auto bytes = std::as_bytes(std::span(std::string_view(*zero)));
                made.zero.emplace(bytes.begin(), bytes.end());
              }
              return made;
            }),
            py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"));
-  py::class_<PluginGeneration, std::shared_ptr<PluginGeneration>>(module, "PluginGeneration")
+  py::class_<PluginGeneration, std::shared_ptr<PluginGeneration>>(
+      module, "PluginGeneration",
+      "Entries of a registry that are not in force: after begin_generation() those of before.")
       .def(py::init<>());
   py::class_<PluginRegistry>(module, "PluginRegistry")
       .def(py::init<>())
-      .def("load_library", &PluginRegistry::load_library, py::arg("path"))
-      .def("begin_generation", &PluginRegistry::begin_generation, py::arg("number"), py::arg("replaced"))
+      .def("load_library", &PluginRegistry::load_library, py::arg("path"),
+           R"(Opens a plug-in library (RTLD_NOW | RTLD_LOCAL, never closed).
+
+A second call for one path does nothing.)")
+      .def("begin_generation", &PluginRegistry::begin_generation, py::arg("number"), py::arg("replaced"),
+           "Lets what is added take the place of entries of the same name, until end_generation().")
       .def("end_generation", &PluginRegistry::end_generation)
-      .def("drop", &PluginRegistry::drop, py::arg("kind"), py::arg("name"))
-      .def("exchange", &PluginRegistry::exchange, py::arg("other"))
-      .def("generation_of", &PluginRegistry::generation_of, py::arg("kind"), py::arg("name"))
-      .def("type_shapes", &PluginRegistry::type_shapes)
+      .def("drop", &PluginRegistry::drop, py::arg("kind"), py::arg("name"),
+           "Within a generation: takes out what the new code has no more.")
+      .def("exchange", &PluginRegistry::exchange, py::arg("other"),
+           "Puts the kept entries in force and keeps those that go out.")
+      .def("generation_of", &PluginRegistry::generation_of, py::arg("kind"), py::arg("name"),
+           "1 as first loaded; 0: there is no such entry.")
+      .def("type_shapes", &PluginRegistry::type_shapes, "The structs of the registered data types.")
       .def(
           "add_python_core",
-          [](PluginRegistry& self, const std::string& name, const std::string& shell, py::object factory) {
+          [](PluginRegistry& self, const std::string& name, const std::string& shell,
+             Typed<"typing.Callable[[ShellView], object]"> factory) {
             const PartFactory part{"core", name, std::make_shared<PythonObject>(std::move(factory))};
             self.add_core(name, shell, [part] { return make_python_core(part); });
           },
-          py::arg("name"), py::arg("shell"), py::arg("factory"))
+          py::arg("name"), py::arg("shell"), py::arg("factory"), R"(factory(shell_view) -> core object.
+
+Its actions run on the component's thread under the interpreter's lock.)")
       .def(
           "shell",
-          [](PluginRegistry& self, const std::string& name, const py::object& shell) {
+          [](PluginRegistry& self, const std::string& name,
+             const Typed<"type[mauve_rt.parts.shells.Shell]">& shell) {
             const PartFactory part = factory_of(shell, "shell", name);
             self.add_shell(name, [part, &self] { return make_python_shell(part, self); });
           },
-          py::arg("name"), py::arg("shell_class"))
+          py::arg("name"), py::arg("shell_class"), "Registers a class under a name, package/Class.")
       .def(
           "core",
-          [](PluginRegistry& self, const std::string& name, const py::object& core,
+          [](PluginRegistry& self, const std::string& name,
+             const Typed<"type[mauve_rt.parts.cores.Core[typing.Any]]">& core,
              const std::string& shell_name) {
             const PartFactory part = factory_of(core, "core", name);
             self.add_core(name, shell_name, [part] { return make_python_core(part); });
@@ -187,7 +214,8 @@ void bind_registry(py::module_& module) {
           py::arg("name"), py::arg("core_class"), py::arg("shell_name"))
       .def(
           "fsm",
-          [](PluginRegistry& self, const std::string& name, const py::object& fsm,
+          [](PluginRegistry& self, const std::string& name,
+             const Typed<"type[mauve_rt.parts.fsms.Fsm[typing.Any, typing.Any]]">& fsm,
              const std::string& shell_name) {
             const PartFactory part = factory_of(fsm, "fsm", name);
             self.add_fsm(name, shell_name, [part] { return make_python_fsm(part); });
@@ -195,16 +223,21 @@ void bind_registry(py::module_& module) {
           py::arg("name"), py::arg("fsm_class"), py::arg("shell_name"))
       .def(
           "resource",
-          [](PluginRegistry& self, const std::string& name, const py::object& resource) {
+          [](PluginRegistry& self, const std::string& name,
+             const Typed<"type[mauve_rt.parts.resources.Resource]">& resource) {
             const PartFactory part = factory_of(resource, "resource", name);
             self.add_resource(
                 {.name = name, .parameters = declared_parameters(resource)},
                 [part](const ResourceParameters& given) { return make_python_resource(part, given); });
           },
-          py::arg("name"), py::arg("resource_class"))
-      .def("names", &PluginRegistry::names, py::arg("kind"))
-      .def("resource_kind", &PluginRegistry::resource_kind, py::arg("name"), py::return_value_policy::copy)
-      .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"))
+          py::arg("name"), py::arg("resource_class"),
+          "`name` is its kind in architecture files, its parameters are the keys.")
+      .def("names", &PluginRegistry::names, py::arg("kind"),
+           "kind: 'shell', 'core', 'fsm', 'resource', 'type'.")
+      .def("resource_kind", &PluginRegistry::resource_kind, py::arg("name"), py::return_value_policy::copy,
+           "Given, or registered.")
+      .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"),
+           "What a value of a registered data type takes, in bytes; 0 when it is none.")
       .def(
           "describe_shell",
           [](const PluginRegistry& self, const std::string& name) {
@@ -223,7 +256,7 @@ void bind_registry(py::module_& module) {
           py::arg("kind"), py::arg("type"))
       .def(
           "describe_resource",
-          [](const PluginRegistry& self, const py::object& resource) {
+          [](const PluginRegistry& self, const AnyResource& resource) {
             const py::object part = instance_part(resource);
             if (!py::isinstance<DataResource>(part)) return describe_resource(*make_resource(resource, self));
             auto data = part.cast<DataResource>();
@@ -231,7 +264,8 @@ void bind_registry(py::module_& module) {
             return describe_resource(*make_data_resource(data, self));
           },
           py::arg("resource"))
-      .def("core_shell", &PluginRegistry::core_shell, py::arg("name"))
+      .def("core_shell", &PluginRegistry::core_shell, py::arg("name"),
+           "Name of the shell a core was written for.")
       .def("fsm_shell", &PluginRegistry::fsm_shell, py::arg("name"));
 }
 

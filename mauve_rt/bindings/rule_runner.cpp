@@ -62,28 +62,36 @@ rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps und
 }
 
 void bind_actions(py::module_& module) {
-  py::class_<rules::ActionStep>(module, "ActionStep")
+  py::class_<rules::ActionStep>(
+      module, "ActionStep",
+      "One step of what a rule does: its kind, and the names and the plain value that it takes.")
       .def(py::init([](std::string kind, std::string target, std::string name,
                        std::optional<PropertyValue> value) {
              return rules::ActionStep{std::move(kind), std::move(target), std::move(name), std::move(value)};
            }),
            py::arg("kind"), py::arg("target") = "", py::arg("name") = "", py::arg("value") = std::nullopt);
-  py::class_<rules::RuleActions>(module, "RuleActions")
+  py::class_<rules::RuleActions>(
+      module, "RuleActions",
+      "What a rule does and undoes; no `undo`: nothing. reserve: stop or safe_outputs.")
       .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("undo") = rules::ActionSteps{},
            py::arg("reserve") = "stop");
 }
 
 void bind_told(py::module_& module) {
-  py::class_<rules::Told>(module, "ToldDecision")
+  py::class_<rules::Told>(module, "ToldDecision",
+                          "A decision, and of `done` and `failed` what came of the action.")
       .def_readonly("decision", &rules::Told::decision)
       .def_property_readonly("report", [](const rules::Told& self) { return self.action.report; })
-      .def_property_readonly("failure", [](const rules::Told& self) { return self.action.failure; });
-  py::class_<rules::RuleFacts>(module, "RuleFacts")
+      .def_property_readonly(
+          "failure", [](const rules::Told& self) { return self.action.failure; },
+          "Why it is not in force, in words.");
+  py::class_<rules::RuleFacts>(module, "RuleFacts", "How one rule of a RuleRunner fares.")
       .def_readonly("name", &rules::RuleFacts::name)
       .def_readonly("status", &rules::RuleFacts::status)
-      .def_readonly("ready", &rules::RuleFacts::ready)
-      .def_readonly("problem", &rules::RuleFacts::problem)
-      .def_readonly("memory_bytes", &rules::RuleFacts::memory_bytes);
+      .def_readonly("ready", &rules::RuleFacts::ready, "Whether what it would do or undo next could begin.")
+      .def_readonly("problem", &rules::RuleFacts::problem,
+                    "Why that cannot be made ready, or what the rule hears not be heard.")
+      .def_readonly("memory_bytes", &rules::RuleFacts::memory_bytes, "What is kept prepared.");
 }
 
 }  // namespace
@@ -91,26 +99,41 @@ void bind_told(py::module_& module) {
 void bind_rule_runner(py::module_& module) {
   bind_actions(module);
   bind_told(module);
-  py::class_<PyRuleRunner>(module, "RuleRunner")
+  py::class_<PyRuleRunner>(
+      module, "RuleRunner",
+      R"(Rules at work beside the components of a host, on native threads: they need no Python to act.
+
+Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.)")
       .def(py::init<PyHost&, std::vector<rules::Rule>, const std::vector<rules::RuleActions>&,
                     std::map<std::string, std::string>>(),
            py::arg("host"), py::arg("rules"), py::arg("actions"),
-           py::arg("topics") = std::map<std::string, std::string>{}, py::keep_alive<1, 2>())
+           py::arg("topics") = std::map<std::string, std::string>{}, py::keep_alive<1, 2>(),
+           "`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it.")
       .def(
-          "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked())
+          "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked(),
+          "Begin to watch; the host is deployed.")
       .def(
-          "stop", [](PyRuleRunner& self) { self.runner().stop(); }, Unlocked())
+          "stop", [](PyRuleRunner& self) { self.runner().stop(); }, Unlocked(),
+          "Nothing is done any more; what is in effect stays so. May be called again.")
       .def(
           "wait_told",
           [](PyRuleRunner& self, time_ns_t timeout_ns) { return self.runner().wait_told(timeout_ns); },
-          py::arg("timeout_ns"), Unlocked())
+          py::arg("timeout_ns"), Unlocked(),
+          "Decisions not taken yet; waits for one at most so long, or until wake().")
       .def(
-          "wake", [](PyRuleRunner& self) { self.runner().wake(); }, Unlocked())
+          "wake", [](PyRuleRunner& self) { self.runner().wake(); }, Unlocked(),
+          "End that wait, now and from now on.")
       .def(
           "facts", [](PyRuleRunner& self) { return self.runner().facts(); }, Unlocked())
-      .def("beat", [](PyRuleRunner& self) { self.runner().beat(); })
-      .def("lost", [](PyRuleRunner& self) { return self.runner().lost(); })
-      .def("advance", [](PyRuleRunner& self) { return self.runner().advance(); }, Unlocked());
+      .def(
+          "beat", [](PyRuleRunner& self) { self.runner().beat(); },
+          "Say that the executor's Python side works, for conditions `node_silent`.")
+      .def(
+          "lost", [](PyRuleRunner& self) { return self.runner().lost(); },
+          "Decisions that were left out, because those before them were not taken in time.")
+      .def(
+          "advance", [](PyRuleRunner& self) { return self.runner().advance(); }, Unlocked(),
+          "In virtual time: do all that is due now; when to call again at the latest.");
   // Called before the hosts' own: what is registered last is called first.
   py::module_::import("atexit").attr("register")(py::cpp_function(&PyRuleRunner::stop_all));
 }

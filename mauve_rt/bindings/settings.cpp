@@ -17,6 +17,17 @@ SettingValue from_python(const TaskSetting& setting, const SettingValue& example
   }
 }
 
+/// Times of an execution state, in the place of the fsm's own.
+struct StateTime {
+  std::string_view name;
+  std::string_view meaning;
+  std::optional<time_ns_t> DeclaredState::* member;
+};
+constexpr auto kStateTimes = std::to_array<StateTime>(
+    {{"max_execution_ns", "the bound that the watchdog enforces", &DeclaredState::max_execution_ns},
+     {"simulated_execution_ns", "what it takes in virtual time", &DeclaredState::simulated_execution_ns},
+     {"wcet_ns", "worst case for the timing analysis; not enforced", &DeclaredState::wcet_ns}});
+
 /// {"Run": {"max_execution_ns": 1000, "simulated_execution_ns": 0, "wcet_ns": 900}}; each may be left out, or be None.
 std::vector<DeclaredState> declared_states(py::handle value) {
   std::vector<DeclaredState> states;
@@ -24,12 +35,10 @@ std::vector<DeclaredState> declared_states(py::handle value) {
     DeclaredState state{.name = name, .max_execution_ns = {}, .simulated_execution_ns = {}, .wcet_ns = {}};
     for (const auto& [key, time] : times) {
       const auto word = key.cast<std::string>();
-      auto* const kept = word == "max_execution_ns"         ? &state.max_execution_ns
-                         : word == "simulated_execution_ns" ? &state.simulated_execution_ns
-                         : word == "wcet_ns"                ? &state.wcet_ns
-                                                            : nullptr;
-      if (kept == nullptr) throw py::type_error("states: a state has no time '" + word + "'");
-      *kept = time.cast<std::optional<time_ns_t>>();
+      const auto* const known = std::find_if(kStateTimes.begin(), kStateTimes.end(),
+                                             [&word](const StateTime& each) { return each.name == word; });
+      if (known == kStateTimes.end()) throw py::type_error("states: a state has no time '" + word + "'");
+      state.*known->member = time.cast<std::optional<time_ns_t>>();
     }
     states.push_back(std::move(state));
   }
@@ -60,20 +69,26 @@ TaskSettings task_settings(const std::string& component, const py::kwargs& given
 }
 
 void bind_settings(py::module_& module) {
-  py::class_<TaskSetting>(module, "TaskSetting")
+  py::class_<TaskSetting>(
+      module, "TaskSetting",
+      "What one of TaskSettings may be. A default outside of the limits is the kernel's own choice.")
       .def_property_readonly("default",
                              [](const TaskSetting& setting) { return setting.get(TaskSettings{}); })
-      .def_readonly("least", &TaskSetting::least)
+      .def_readonly("least", &TaskSetting::least, "Of the number, or of each of the numbers.")
       .def_readonly("most", &TaskSetting::most)
-      .def_property_readonly("choices",
-                             [](const TaskSetting& setting) {
-                               return std::vector<std::string>(setting.choices.begin(),
-                                                               setting.choices.end());
-                             })
+      .def_property_readonly(
+          "choices",
+          [](const TaskSetting& setting) {
+            return std::vector<std::string>(setting.choices.begin(), setting.choices.end());
+          },
+          "Of a word.")
       .def_property_readonly("hint", [](const TaskSetting& setting) { return std::string(setting.hint); });
   py::dict all;
   for (const TaskSetting& setting : kTaskSettings) all[std::string(setting.name).c_str()] = setting;
   module.attr("TASK_SETTINGS") = all;
+  py::dict times;
+  for (const StateTime& time : kStateTimes) times[std::string(time.name).c_str()] = std::string(time.meaning);
+  module.attr("STATE_TIMES") = times;
 }
 
 }  // namespace mauve::bindings

@@ -18,15 +18,18 @@ void bind_shadow(py::module_& module) {
       .def_readonly("both", &OutputDifference::both)
       .def_readonly("live_only", &OutputDifference::live_only)
       .def_readonly("shadow_only", &OutputDifference::shadow_only)
-      .def_readonly("is_truncated", &OutputDifference::is_truncated)
+      .def_readonly("is_truncated", &OutputDifference::is_truncated,
+                    "The value has more numbers than are compared.")
       .def_readonly("numbers", &OutputDifference::numbers)
-      .def_readonly("lag", &OutputDifference::lag);
-  py::class_<ShadowRecord>(module, "ShadowRecord")
+      .def_readonly("lag", &OutputDifference::lag,
+                    "Releases by which the candidate's first number is later.");
+  py::class_<ShadowRecord>(module, "ShadowRecord", "One shadow; fields as mauve_msgs/msg/Shadow.")
       .def_readonly("component", &ShadowRecord::component)
       .def_readonly("core", &ShadowRecord::core)
       .def_readonly("live_core", &ShadowRecord::live_core)
-      .def_property_readonly("verdict",
-                             [](const ShadowRecord& self) { return std::string(to_string(self.verdict)); })
+      .def_property_readonly(
+          "verdict", [](const ShadowRecord& self) { return std::string(to_string(self.verdict)); },
+          "Running, ended, faulted or promoted.")
       .def_readonly("reason", &ShadowRecord::reason)
       .def_readonly("begin_ns", &ShadowRecord::begin_ns)
       .def_readonly("end_ns", &ShadowRecord::end_ns)

@@ -7,9 +7,8 @@ namespace {
 
 using Self = PyTransaction&;
 
-PyTransaction& add_component(Self self, const std::string& name, const py::object& shell,
-                             const py::object& core, const py::object& fsm,
-                             const std::map<std::string, PropertyValue>& properties,
+PyTransaction& add_component(Self self, const std::string& name, const AnyShell& shell, const AnyCore& core,
+                             const AnyFsm& fsm, const std::map<std::string, PropertyValue>& properties,
                              const std::vector<std::string>& alternatives, const std::string& fallback,
                              bool reconfigurable, const py::kwargs& settings) {
   const ComponentParts rest{.settings = task_settings(name, settings),
@@ -47,7 +46,7 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
   transaction
       .def(
           "replace_core",
-          [](Self self, const std::string& component, const py::object& core,
+          [](Self self, const std::string& component, const AnyCore& core,
              const std::optional<ProbationOptions>& probation) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
               if (is_name(core) && probation) {
@@ -61,7 +60,8 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
               }
             });
           },
-          py::arg("component"), py::arg("core"), py::arg("probation") = std::nullopt)
+          py::arg("component"), py::arg("core"), py::arg("probation") = std::nullopt,
+          "With `probation`, an fsm that the same transaction replaces is on probation with the core.")
       .def(
           "shadow",
           [](Self self, const std::string& component, const std::string& core, time_ns_t budget_ns) -> Self {
@@ -69,10 +69,11 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
               steps.shadow(component, core, {.budget_ns = budget_ns});
             });
           },
-          py::arg("component"), py::arg("core"), py::arg("budget_ns"))
+          py::arg("component"), py::arg("core"), py::arg("budget_ns"),
+          "A candidate executes in parallel with the core; its budget is for one release, on average.")
       .def(
           "replace_fsm",
-          [](Self self, const std::string& component, const py::object& fsm) -> Self {
+          [](Self self, const std::string& component, const AnyFsm& fsm) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
               if (is_name(fsm)) {
                 steps.replace_fsm(component, fsm.cast<std::string>());
@@ -81,10 +82,13 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
               }
             });
           },
-          py::arg("component"), py::arg("fsm"))
+          py::arg("component"), py::arg("fsm"),
+          R"(The new one goes on in the wait of the same name, where the pending instant lies on its grid.
+
+Else it starts in its initial state, on its own period, on the deployment's epoch.)")
       .def(
           "replace_shell",
-          [](Self self, const std::string& component, const py::object& shell) -> Self {
+          [](Self self, const std::string& component, const AnyShell& shell) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
               if (is_name(shell)) {
                 steps.replace_shell(component, shell.cast<std::string>());
@@ -93,7 +97,8 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
               }
             });
           },
-          py::arg("component"), py::arg("shell"));
+          py::arg("component"), py::arg("shell"),
+          "Ports keep their connections by name, properties their values.");
 }
 
 /// A call of Transaction that takes plain values, collected.
@@ -116,7 +121,7 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
       .def("remove_component", collected(&Transaction::remove_component), py::arg("name"))
       .def(
           "add_resource",
-          [](Self self, const std::string& name, const py::object& resource, const std::string& topic,
+          [](Self self, const std::string& name, const AnyResource& resource, const std::string& topic,
              time_ns_t longest_hold_ns) -> Self {
             const TopicBinding binding = topic_binding(topic);
             return self.add([=](Steps steps, Registry registry) {
@@ -136,13 +141,23 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
             });
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "",
-          py::arg("longest_hold_ns") = 0)
-      .def("remove_resource", collected(&Transaction::remove_resource), py::arg("name"))
+          py::arg("longest_hold_ns") = 0,
+          "As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''.")
+      .def("remove_resource", collected(&Transaction::remove_resource), py::arg("name"),
+           "Refused while a port is connected to it.")
       .def("start", collected(&Transaction::start), py::arg("component"), py::arg("clock_ns") = std::nullopt)
       .def("stop", collected(&Transaction::stop), py::arg("component"))
-      .def("configure", collected(&Transaction::configure), py::arg("component"))
-      .def("resynchronise", collected(&Transaction::resynchronise))
-      .def("by", collected(&Transaction::by), py::arg("author"));
+      .def("configure", collected(&Transaction::configure), py::arg("component"),
+           R"(Cleans up and configures anew one that is not running; it is STOPPED then, a fault is forgotten.
+
+Its hooks run before the commit; where they refuse, it is UNCONFIGURED.)")
+      .def("resynchronise", collected(&Transaction::resynchronise),
+           R"(A new common epoch, 20 ms after the commit.
+
+Every component goes on in its place, all its instants later by the same, less than a period. The
+report has a line for each, with its `shift_ns`.)")
+      .def("by", collected(&Transaction::by), py::arg("author"),
+           "Who makes the change, for Architecture.authors(); empty: the program itself.");
 }
 
 }  // namespace
@@ -164,12 +179,16 @@ Transaction PyTransaction::build(const PluginRegistry& registry) const {
 void bind_transaction(py::module_& module) {
   py::class_<TransactionReport>(module, "TransactionReport")
       .def_readonly("steps", &TransactionReport::steps)
-      .def_readonly("revision", &TransactionReport::revision)
+      .def_readonly("revision", &TransactionReport::revision, "Of the architecture, after.")
       .def_readonly("prepare_ns", &TransactionReport::prepare_ns)
-      .def_readonly("blackout_ns", &TransactionReport::blackout_ns)
-      .def_readonly("is_complete", &TransactionReport::is_complete)
-      .def_readonly("instant_ns", &TransactionReport::instant_ns);
-  py::class_<ArchitectureDescription>(module, "ArchitectureDescription")
+      .def_readonly("blackout_ns", &TransactionReport::blackout_ns, "The longest of any component's.")
+      .def_readonly("is_complete", &TransactionReport::is_complete,
+                    "False: a release that follows has not come yet.")
+      .def_readonly("instant_ns", &TransactionReport::instant_ns,
+                    "T; NOT_MEASURED when the transaction changed no running component.");
+  py::class_<ArchitectureDescription>(
+      module, "ArchitectureDescription",
+      "Equal to another exactly when nothing was changed; str() has one line a fact.")
       .def(
           "__eq__",
           [](const ArchitectureDescription& self, const py::object& other) {
@@ -178,14 +197,19 @@ void bind_transaction(py::module_& module) {
           },
           py::arg("value"))
       .def("__str__", [](const ArchitectureDescription& self) { return to_string(self); });
-  py::class_<PyTransaction> transaction(module, "Transaction");
+  py::class_<PyTransaction> transaction(
+      module, "Transaction",
+      R"(A list of steps that take effect as one, or not at all; nothing happens before Host.commit.
+
+Parts are classes or registered names. Each step returns the transaction.)");
   transaction.def(py::init<>())
       .def("add", &add_step, py::arg("kind"), py::arg("target") = "", py::arg("name") = "",
-           py::arg("value") = std::nullopt)
+           py::arg("value") = std::nullopt,
+           "A step by the name of its kind, with no object in it; the calls below are the same, typed.")
       .def("add_component", &add_component, py::arg("name"), py::arg("shell"), py::arg("core"),
            py::arg("fsm"), py::kw_only(), py::arg("properties") = std::map<std::string, PropertyValue>{},
            py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = "",
-           py::arg("reconfigurable") = true);
+           py::arg("reconfigurable") = true, "It arrives STOPPED; a start step starts it.");
   bind_replacements(transaction);
   bind_wiring(transaction);
 }

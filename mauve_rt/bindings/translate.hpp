@@ -12,6 +12,7 @@
 #include "mauve_rt/mauve_rt.hpp"
 
 #include "text.hpp"
+#include "types.hpp"
 
 namespace mauve::bindings {
 
@@ -27,7 +28,9 @@ void bind_registry(py::module_& module);
 void bind_settings(py::module_& module);
 /// Registers Architecture and Component.
 void bind_architecture(py::module_& module);
-/// Registers Host and Deployer, their reports and the trace's drain.
+/// Registers StepReport, RealtimeStatus and TraceDrain.
+void bind_reports(py::module_& module);
+/// Registers Host and Deployer.
 void bind_host(py::module_& module);
 void bind_value_log(py::module_& module);
 /// Registers Transaction and its reports.

@@ -81,7 +81,7 @@ class ValueLog {
   bool ended_{false};
 };
 
-py::list take(ValueLog& self) {
+Typed<"list[tuple[bytes, int]]"> take(ValueLog& self) {
   ValueLog::Writes writes;
   {
     const py::gil_scoped_release release;
@@ -98,13 +98,21 @@ py::list take(ValueLog& self) {
 
 void bind_value_log(py::module_& module) {
   using Unlocked = py::call_guard<py::gil_scoped_release>;
-  py::class_<ValueLog>(module, "ValueLog")
+  py::class_<ValueLog>(
+      module, "ValueLog",
+      "Every write to the resource of a name, also when another one takes that name. For one thread.")
       .def(py::init<PyArchitecture&, std::string, std::size_t>(), py::arg("architecture"),
            py::arg("resource"), py::kw_only(), py::arg("bytes") = std::size_t{1} << 20U,
-           py::keep_alive<1, 2>(), Unlocked())
-      .def("take", &take)
-      .def("end", &ValueLog::end, Unlocked())
-      .def_property_readonly("lost", &ValueLog::lost);
+           py::keep_alive<1, 2>(), Unlocked(),
+           R"(Keep writes from now on, as many as have room in about so many bytes: 16 to 8,192.
+
+Raises:
+    MauveError: there is no such resource, or it has no values.)")
+      .def("take", &take,
+           "(serialized message, writer's time in ns) of each write since the last call, in order.")
+      .def("end", &ValueLog::end, Unlocked(),
+           "Keep no more; what was not taken is gone. May be called again.")
+      .def_property_readonly("lost", &ValueLog::lost, "Writes that found no room.");
 }
 
 }  // namespace mauve::bindings

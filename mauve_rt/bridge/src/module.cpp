@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// mauve_rt._bridge; its interface with docs is _bridge.pyi.
+// mauve_rt._bridge.
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -10,6 +10,7 @@
 #include "node_watch.hpp"
 #include "parameters.hpp"
 #include "stop_guard.hpp"
+#include "types.hpp"
 
 namespace py = pybind11;
 
@@ -17,6 +18,7 @@ namespace {
 
 using namespace mauve;
 using namespace mauve::bridge;
+using mauve::bindings::Typed;
 
 rmw_time_t duration(time_ns_t time_ns) {
   return {.sec = static_cast<std::uint64_t>(time_ns / s_to_ns(1)),
@@ -53,7 +55,7 @@ FlatField flat_field(const py::tuple& told) {
   return field;
 }
 
-FlatNumbers flat_numbers(const py::iterable& fields) {
+FlatNumbers flat_numbers(const Typed<"typing.Sequence[tuple[str, str, str, int, typing.Any]]">& fields) {
   std::vector<FlatField> all;
   for (const py::handle field : fields) all.push_back(flat_field(field.cast<py::tuple>()));
   return FlatNumbers(std::move(all));
@@ -70,7 +72,7 @@ py::bytes python_bytes(const std::vector<std::byte>& data) {
   return {reinterpret_cast<const char*>(data.data()), data.size()};
 }
 
-py::list take_log(Bridge& self) {
+Typed<"list[tuple[int, int, bytes]]"> take_log(Bridge& self) {
   py::list all;
   for (const LoggedMessage& message : self.log().take()) {
     all.append(py::make_tuple(message.topic, message.time_ns, python_bytes(message.data)));
@@ -78,26 +80,27 @@ py::list take_log(Bridge& self) {
   return all;
 }
 
-py::list take_answered(StopGuard& self) {
+Typed<"list[tuple[bytes, bytes]]"> take_answered(StopGuard& self) {
   py::list all;
   for (const auto& each : self.take_answered())
     all.append(py::make_tuple(python_bytes(each.request), python_bytes(each.response)));
   return all;
 }
 
-py::list take_transitions(StopGuard& self) {
+Typed<"list[tuple[int, bytes]]"> take_transitions(StopGuard& self) {
   py::list all;
   for (const auto& each : self.take_transitions())
     all.append(py::make_tuple(each.number, python_bytes(each.request)));
   return all;
 }
 
-void answer_transition(StopGuard& self, std::uint64_t number, std::string_view response) {
+void answer_transition(StopGuard& self, std::uint64_t number, const py::bytes& data) {
+  const std::string_view response = data;
   const auto* const begin = reinterpret_cast<const std::byte*>(response.data());
   self.answer(number, {begin, begin + response.size()});
 }
 
-py::list python_parameters(const std::vector<std::string>& words) {
+Typed<"list[tuple[str, dict[str, typing.Any]]]"> python_parameters(const std::vector<std::string>& words) {
   py::list all;
   for (const NodeParameters& each : parameters_of(words)) {
     py::dict values;
@@ -110,18 +113,37 @@ py::list python_parameters(const std::vector<std::string>& words) {
 }  // namespace
 
 PYBIND11_MODULE(_bridge, module) {
-  module.doc() = "Resources on ROS topics and services, natively, on a node of rclpy's.";
+  module.doc() =
+      "Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge.";
   // What the threads wait for may want the interpreter's lock: never wait for them under it.
   using Unlocked = py::call_guard<py::gil_scoped_release>;
-  module.def("start_console", &Console::start);
-  module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked());
-  module.def("parameters_of", &python_parameters, py::arg("words"));
-  py::class_<NodeWatch>(module, "NodeWatch")
-      .def(py::init<std::string, time_ns_t>(), py::arg("logger"), py::kw_only(), py::arg("silent_after_ns"))
-      .def("beat", &NodeWatch::beat)
-      .def("stop", &NodeWatch::stop, Unlocked())
-      .def_static("notify", &NodeWatch::notify, py::arg("state"));
-  py::class_<StopGuard>(module, "StopGuard")
+  module.def("start_console", &Console::start,
+             R"(From here on a thread of its own writes the process's log lines to the console.
+
+Once, after rclpy.init(), which was told `--disable-stdout-logs`.)");
+  module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked(),
+             "Wait until all lines are written; False: the console is not read.");
+  module.def(
+      "parameters_of", &python_parameters, py::arg("words"),
+      R"(What `--ros-args` says to nodes, in rcl's order: their name or pattern, and values by parameter.
+
+Raises:
+    MauveError: rcl refuses the words, or a parameter file.)");
+  py::class_<NodeWatch>(
+      module, "NodeWatch",
+      "Reports, without Python, that Python is silent: an ERROR in the log, no WATCHDOG=1 for systemd.")
+      .def(py::init<std::string, time_ns_t>(), py::arg("logger"), py::kw_only(), py::arg("silent_after_ns"),
+           "Watch from now on.")
+      .def("beat", &NodeWatch::beat, "Say that Python works.")
+      .def("stop", &NodeWatch::stop, Unlocked(), "End the watch; may be called again.")
+      .def_static(
+          "notify", &NodeWatch::notify, py::arg("state"),
+          "Report a state, such as READY=1, to the service manager that NOTIFY_SOCKET names, if it does.");
+  py::class_<StopGuard>(
+      module, "StopGuard",
+      R"(Takes requests to stop, deactivate or shut down that the node leaves unread for 200 ms.
+
+A stop is carried out and answered; for a transition outputs are made safe, and the node answers it.)")
       .def(py::init([](std::uintptr_t node, std::uintptr_t stop, std::uintptr_t change_state,
                        std::uintptr_t news, const std::string& logger, const std::string& instance_id,
                        const std::map<std::string, std::uint16_t>& codes) {
@@ -135,48 +157,81 @@ PYBIND11_MODULE(_bridge, module) {
                              .codes = codes});
            }),
            py::arg("node"), py::kw_only(), py::arg("stop"), py::arg("change_state"), py::arg("news"),
-           py::arg("logger"), py::arg("instance_id"), py::arg("codes"))
+           py::arg("logger"), py::arg("instance_id"), py::arg("codes"),
+           R"(Guard from now on. Addresses of the node, the two services and a guard condition outlive it.
+
+`news` is triggered when there is something to take; `codes` are the constants of ReplyCode.)")
       .def(
           "set_architecture",
           [](StopGuard& self, std::uintptr_t architecture) {
             self.set_architecture(std::bit_cast<Architecture*>(architecture));
           },
-          py::arg("architecture"), Unlocked())
-      .def("take_answered", &take_answered)
-      .def("take_transitions", &take_transitions)
-      .def("answer", &answer_transition, py::arg("number"), py::arg("response"))
-      .def("stop", &StopGuard::stop, Unlocked());
-  py::class_<rmw_qos_profile_t>(module, "Qos")
+          py::arg("architecture"), Unlocked(),
+          "Stop components of this one, by its address, from now on; 0: of none.")
+      .def("take_answered", &take_answered,
+           "(request, response) of each stop that was answered here since the last call, as CDR.")
+      .def("take_transitions", &take_transitions,
+           "(number, request) of each transition that is to be made and answered, as CDR.")
+      .def("answer", &answer_transition, py::arg("number"), py::arg("response"),
+           "Send the response, CDR, to a transition of take_transitions().")
+      .def("stop", &StopGuard::stop, Unlocked(), "End the guard; may be called again.");
+  py::class_<rmw_qos_profile_t>(
+      module, "Qos",
+      "Quality of service; policies as rclpy's enumerations number them, durations in ns, 0: none.")
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,
            py::arg("liveliness") = 0, py::arg("lease_ns") = 0);
-  py::class_<TopicTroubles>(module, "TopicTroubles")
+  py::class_<TopicTroubles>(
+      module, "TopicTroubles",
+      "What the middleware tells of a topic besides its messages. Counts since it was opened.")
       .def_readonly("deadlines_missed", &TopicTroubles::deadlines_missed)
-      .def_readonly("liveliness_lost", &TopicTroubles::liveliness_lost)
+      .def_readonly("liveliness_lost", &TopicTroubles::liveliness_lost,
+                    "By us as a publisher, or by a publisher that we heard of.")
       .def_readonly("incompatible_qos", &TopicTroubles::incompatible_qos)
-      .def_readonly("policy", &TopicTroubles::policy);
-  py::class_<CallCounts>(module, "CallCounts")
+      .def_readonly("policy", &TopicTroubles::policy,
+                    "The last quality of service that did not fit, as rclpy's QoSPolicyKind.");
+  py::class_<CallCounts>(module, "CallCounts", "How calls ended so far.")
       .def_readonly("answered", &CallCounts::answered)
       .def_readonly("no_server", &CallCounts::no_server)
       .def_readonly("timed_out", &CallCounts::timed_out)
-      .def_readonly("other", &CallCounts::other)
-      .def_readonly("longest_ns", &CallCounts::longest_ns);
-  py::class_<CallReport>(module, "CallReport")
+      .def_readonly("other", &CallCounts::other,
+                    "Busy, malformed, or given up for a stop; of an offered call: refused by the resource.")
+      .def_readonly("longest_ns", &CallCounts::longest_ns, "The longest of those answered.");
+  py::class_<CallReport>(
+      module, "CallReport",
+      "A ROS service that a resource calls or offers: its name, expanded and remapped, and counts.")
       .def_readonly("resource", &CallReport::resource)
       .def_readonly("service", &CallReport::service)
       .def_readonly("is_offered", &CallReport::is_offered)
       .def_readonly("counts", &CallReport::counts);
-  py::class_<TopicReport>(module, "TopicReport")
+  py::class_<TopicReport>(module, "TopicReport",
+                          "A bound topic: its name, expanded and remapped, and counts of messages.")
       .def_readonly("resource", &TopicReport::resource)
       .def_readonly("topic", &TopicReport::topic)
-      .def_property_readonly("passed", [](const TopicReport& self) { return self.counts.passed; })
-      .def_property_readonly("refused", [](const TopicReport& self) { return self.counts.refused; })
-      .def_readonly("refusal", &TopicReport::refusal)
+      .def_property_readonly(
+          "passed", [](const TopicReport& self) { return self.counts.passed; },
+          "Sent, or received and written.")
+      .def_property_readonly(
+          "refused", [](const TopicReport& self) { return self.counts.refused; },
+          "By the middleware or by the resource: full, malformed, or larger than it declares.")
+      .def_readonly("refusal", &TopicReport::refusal,
+                    "Why the resource refused a message lately; empty: none.")
       .def_property_readonly("troubles", [](const TopicReport& self) { return self.troubles; });
-  py::class_<FlatNumbers>(module, "FlatNumbers")
-      .def(py::init(&flat_numbers), py::arg("fields"))
-      .def_property_readonly("names", &FlatNumbers::names);
-  py::class_<Bridge>(module, "Bridge")
+  py::class_<FlatNumbers>(
+      module, "FlatNumbers",
+      "Reads the numbers of messages of one type; a sequence has one number, its length; a text has none.")
+      .def(py::init(&flat_numbers), py::arg("fields"),
+           R"(Fields: (name, type as in .msg files, "" or "fixed" or "sequence", size, fields of a message).
+
+Raises:
+    MauveError: there is no number, or more than 1,000, or a field cannot be read.)")
+      .def_property_readonly("names", &FlatNumbers::names,
+                             "What the numbers are, in their order: position.x, ranges[3], path.length.");
+  py::class_<Bridge>(
+      module, "Bridge",
+      R"(The topics and services of an architecture, by threads of its own: one sends, the others receive.
+
+What is opened can be found on the network; it serves its resource from attach() on.)")
       .def(py::init([](std::uintptr_t node, std::uintptr_t architecture, int priority,
                        const std::vector<int>& cpus) {
              return std::make_unique<Bridge>(*std::bit_cast<rcl_node_t*>(node),
@@ -184,40 +239,66 @@ PYBIND11_MODULE(_bridge, module) {
                                              ThreadPlace{.priority = priority, .cpus = cpus});
            }),
            py::arg("node"), py::arg("architecture"), py::kw_only(), py::arg("priority") = 1,
-           py::arg("cpus") = std::vector<int>())
+           py::arg("cpus") = std::vector<int>(),
+           R"(Take addresses: `node.handle.pointer`, `architecture.pointer`; both outlive the bridge.
+
+Priority (SCHED_FIFO) and CPUs (none: any) are the sending thread's.)")
       .def("publish", &open_topic<&Bridge::publish>, py::arg("resource"), py::arg("topic"), py::arg("type"),
-           py::arg("qos"), Unlocked())
+           py::arg("qos"), Unlocked(),
+           R"(Open a topic for a resource; returns the number of what was opened, also in the log.
+
+Raises:
+    MauveError: the type is not installed, or the middleware refuses; nothing is open then.)")
       .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
-           py::arg("type"), py::arg("qos"), Unlocked())
+           py::arg("type"), py::arg("qos"), Unlocked(), "As publish(), the other way.")
       .def("mirror", &open_mirror, py::arg("resource"), py::arg("topic"), py::arg("type"), py::arg("qos"),
            py::kw_only(), py::arg("period_ns"), py::arg("numbers") = std::nullopt,
-           py::arg("number") = std::nullopt, Unlocked())
+           py::arg("number") = std::nullopt, Unlocked(),
+           R"(Open a topic on which the polled value is published, at most once in `period_ns`; as publish().
+
+With `numbers`: all of them as mauve_msgs/msg/Values, their names on another topic, with
+`/names` behind it; with `number`, too: that one as std_msgs/msg/Float64.)")
       .def(
           "call",
           [](Bridge& self, const std::string& resource, const std::string& service, const std::string& type) {
             return self.call({.resource = resource, .name = service, .type = type});
           },
-          py::arg("resource"), py::arg("service"), py::arg("type"), Unlocked())
+          py::arg("resource"), py::arg("service"), py::arg("type"), Unlocked(),
+          "Open a ROS service that answers a client's calls; as publish().")
       .def(
           "offer",
           [](Bridge& self, const std::string& resource, const std::string& service, const std::string& type,
              const std::string& offered) {
             return self.offer({.resource = resource, .name = service, .type = type}, offered);
           },
-          py::arg("resource"), py::arg("service"), py::arg("type"), py::arg("offered"), Unlocked())
-      .def("attach", &Bridge::attach, py::arg("numbers"), Unlocked())
+          py::arg("resource"), py::arg("service"), py::arg("type"), py::arg("offered"), Unlocked(),
+          "Open a ROS service that a resource's call `offered` answers; as publish().")
+      .def("attach", &Bridge::attach, py::arg("numbers"), Unlocked(),
+           R"(Let these serve the resources of their names in the architecture.
+
+Raises:
+    MauveError: there is no such resource, or it is none to serve.)")
       .def("close", py::overload_cast<const std::vector<std::size_t>&>(&Bridge::close), py::arg("numbers"),
-           Unlocked())
-      .def("listen_for_silence", &Bridge::listen_for_silence, py::arg("resources"), Unlocked())
-      .def("start", &Bridge::start)
-      .def("stop", &Bridge::stop, Unlocked())
-      .def("close", py::overload_cast<>(&Bridge::close), Unlocked())
+           Unlocked(), "End these; what was written before is sent.")
+      .def("listen_for_silence", &Bridge::listen_for_silence, py::arg("resources"), Unlocked(),
+           R"(Report arrivals for these resources by a best-effort subscription too, and that there are none.
+
+Raises:
+    MauveError: the middleware refuses.)")
+      .def("start", &Bridge::start, "Let messages flow, both ways.")
+      .def("stop", &Bridge::stop, Unlocked(),
+           "End the flow when what was written before is sent. May be called again.")
+      .def("close", py::overload_cast<>(&Bridge::close), Unlocked(), "stop(), and end all.")
       .def(
           "topics", [](Bridge& self) { return self.report().topics; }, Unlocked())
       .def(
           "calls", [](Bridge& self) { return self.report().calls; }, Unlocked())
       .def(
-          "log", [](Bridge& self, bool on) { self.log().enable(on); }, py::arg("on"))
-      .def("take_log", &take_log)
-      .def_property_readonly("log_dropped", [](Bridge& self) { return self.log().dropped(); });
+          "log", [](Bridge& self, bool on) { self.log().enable(on); }, py::arg("on"),
+          "Keep messages for take_log() from now on, or do not.")
+      .def("take_log", &take_log,
+           "(topic's number, CLOCK_MONOTONIC ns, CDR) of each message since the last call.")
+      .def_property_readonly(
+          "log_dropped", [](Bridge& self) { return self.log().dropped(); },
+          "Messages that found no room in the log.");
 }

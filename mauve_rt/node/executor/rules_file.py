@@ -45,7 +45,7 @@ class LoadedRules:
 
     def runner(self, host: Host, topics: Mapping[str, str]) -> RuleRunner:
         """What runs them, not started yet."""
-        return RuleRunner(host, rule_specs(self.rules, with_reserve=True), self.actions, topics)
+        return RuleRunner(host, rule_specs(self.rules, with_reserve=True), self.actions, dict(topics))
 
     def messages(self, runtime: Runtime, *, who: str, name: Callable[[str], str]) -> DecisionMessages:
         """What makes messages of their decisions."""
