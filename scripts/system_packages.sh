@@ -22,6 +22,10 @@ missing_system_packages() {
     echo python3-dev
   fi
   if $with_tests && ! command -v ccache >/dev/null; then echo ccache; fi # tests build most of it several times
+  # Boost has the ring buffer that ours is compared with. Who may not install it has the other rows.
+  if $with_benchmarks && [[ ! -e /usr/include/boost/lockfree/spsc_queue.hpp ]] && { ((!EUID)) || sudo -n true 2>/dev/null; }; then
+    echo libboost-dev
+  fi
   if $with_lint && ! command -v shellcheck >/dev/null; then echo shellcheck; fi
 }
 

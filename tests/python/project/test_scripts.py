@@ -36,7 +36,7 @@ def bash(script: str, **environment: str) -> list[str]:
     return [
         "bash",
         "-c",
-        f"set -euo pipefail; {parts} with_lint=false with_tests=false jazzy=; {settings} {script}",
+        f"set -euo pipefail; {parts} with_lint=false with_tests=false with_benchmarks=false jazzy=; {settings} {script}",
     ]
 
 
@@ -122,6 +122,16 @@ def test_ccache_comes_with_the_tests(with_tests: str, tmp_path: Path):
     command = bash(f"PATH={path}; missing_system_packages || true", with_tests=with_tests)
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert ("ccache" in said.split()) is (with_tests == "true")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root installs it without a question")
+@pytest.mark.skipif(Path("/usr/include/boost").exists(), reason="Boost is installed")
+@pytest.mark.parametrize("with_benchmarks", ["true", "false"])
+def test_boost_comes_with_the_benchmarks(with_benchmarks: str, tmp_path: Path):
+    path = folder_of_programs(tmp_path / "path", "python3", "bash", "dirname")
+    command = bash(f"PATH={path}; missing_system_packages || true", with_benchmarks=with_benchmarks)
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert ("libboost-dev" in said.split()) is (with_benchmarks == "true")
 
 
 @pytest.fixture
