@@ -2,24 +2,19 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from rebuilt_package import RebuiltPackage, compile_plugin, install_package, precompile, search_first
+from compiled_plugins import PLUGINS, compile_plugin
+from rebuilt_package import RebuiltPackage, install_package, search_first
 
 from mauve_rt import _kernel
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.model.generations import CodeGenerations
 from mauve_rt.model.loaded_code import LoadedCode
 from mauve_rt.model.plugins import PluginLoader
-
-PLUGINS = Path(__file__).parent / "plugins"
-INSTALLED = (
-    Path(_kernel.__file__).resolve().parents[4]
-)  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
 
 
 def _install_plugins(prefix: Path, package: str) -> None:
@@ -31,36 +26,19 @@ def _install_plugins(prefix: Path, package: str) -> None:
         (index / kind).mkdir(parents=True, exist_ok=True)
     (index / "packages" / package).touch()
     shutil.copy(PLUGINS / f"{package}.txt", index / "mauve_rt_plugins" / package)
-    library = prefix / "lib" / f"lib{package}.so"
-    subprocess.run(
-        [
-            *("g++", "-std=c++20", "-O1", "-shared", "-fPIC", PLUGINS / f"{package}.cpp", "-o", library),
-            *(f"-I{INSTALLED}/include", f"-L{INSTALLED}/lib", "-lmauve_rt", f"-Wl,-rpath,{INSTALLED}/lib"),
-        ],
-        check=True,
-    )
+    compile_plugin(PLUGINS / f"{package}.cpp", prefix / "lib" / f"lib{package}.so")
 
 
 @pytest.fixture(scope="session")
-def rebuilt_headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The precompiled headers of packages that tests build again."""
-    return precompile(tmp_path_factory.mktemp("headers"))
-
-
-@pytest.fixture(scope="session")
-def first_build(tmp_path_factory: pytest.TempPathFactory, rebuilt_headers: Path) -> Path:
-    """The library of reload_tests as it is loaded first."""
-    library = tmp_path_factory.mktemp("reload_tests") / "libreload_tests.so"
-    compile_plugin(rebuilt_headers, PLUGINS / "reload_tests.cpp", library)
-    return library
+def builds(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What tests have compiled of the package that they build again."""
+    return tmp_path_factory.mktemp("builds")
 
 
 @pytest.fixture
-def rebuilt(
-    tmp_path: Path, rebuilt_headers: Path, first_build: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[RebuiltPackage]:
+def rebuilt(tmp_path: Path, builds: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RebuiltPackage]:
     """The package reload_tests, which a test builds again; searched first."""
-    package = install_package(tmp_path, rebuilt_headers, first_build)
+    package = install_package(tmp_path, builds)
     package.build_other()
     for name, value in search_first(package).items():
         monkeypatch.setenv(name, value)

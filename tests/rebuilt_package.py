@@ -1,15 +1,19 @@
-"""A package of plug-ins that tests build again while a process has it loaded: plugins/reload_tests.cpp."""
+"""A package of plug-ins that tests build again while a process has it loaded: plugins/reload_tests*.cpp."""
 
 import os
 import shutil
-import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mauve_rt import _kernel
+from compiled_plugins import PLUGINS, compile_source, link
 
-PLUGINS = Path(__file__).parent / "plugins"
-INSTALLED = Path(_kernel.__file__).resolve().parents[4]
+# By source, the macros that it looks at: a variant compiles anew what these change.
+MACROS = {
+    "reload_tests_values": ("STEP", "GAIN", "CRASH", "HANG", "MISSING"),
+    "reload_tests_types": ("OTHER_LAYOUT", "MAUVE_RT_VERSION"),
+    "reload_tests": ("OTHER_", "WITHOUT_", "THROWS", "NEW_CORE", "MAUVE_RT_VERSION"),
+}
 PYTHON_CORE = """\
 from std_msgs.msg import Float64
 
@@ -36,7 +40,7 @@ class RebuiltPackage:
 
     prefix: Path
     modules: Path
-    headers: Path  # the precompiled ones: they make a build of 10 s one of 2 s
+    builds: Path  # for all tests of the session: objects and libraries by their macros
 
     @property
     def library(self) -> Path:
@@ -48,10 +52,7 @@ class RebuiltPackage:
 
     def build(self, *macros: str) -> None:
         """The library as a build with these macros leaves it: a new file under its name."""
-        built = self.headers / f"{'_'.join(macros).replace('/', '_')}.so"  # for all tests of the session
-        if not built.exists():
-            flags = [flag for macro in macros for flag in ("-D", macro)]
-            compile_plugin(self.headers, PLUGINS / "reload_tests.cpp", built, *flags)
+        built = build_variant(self.builds, *macros)
         new = self.library.with_suffix(".new")
         shutil.copyfile(built, new)
         new.replace(self.library)
@@ -75,39 +76,30 @@ class RebuiltPackage:
         new.replace(self.modules / f"{module}.py")
 
 
-def compile_plugin(headers: Path, source: Path, library: Path, *flags: str) -> None:
-    """One library, with the precompiled header."""
-    command = [
-        *("g++", "-std=c++20", "-O1", "-shared", "-fPIC", *flags, "-isystem", headers, source, "-o", library),
-        *(f"-I{INSTALLED}/include", f"-L{INSTALLED}/lib", "-lmauve_rt", f"-Wl,-rpath,{INSTALLED}/lib"),
-        "-Wl,-soname,libreload_tests.so",
-    ]
-    subprocess.run(command, check=True)
+def build_variant(builds: Path, *macros: str) -> Path:
+    """The library with these macros; compiled where no test of the session has done so."""
+    library = builds / f"{_file_name('reload_tests', macros)}.so"
+    if library.exists():
+        return library
+    objects = []
+    for source, known in MACROS.items():
+        if source == "reload_tests_types" and "OTHER_LIBRARY" in macros:
+            continue
+        given = [macro for macro in macros if macro.startswith(known)]
+        objects.append(builds / f"{_file_name(source, given)}.o")
+        if not objects[-1].exists():
+            compile_source(PLUGINS / f"{source}.cpp", objects[-1], *(f"-D{macro}" for macro in given))
+    link(objects, library, "-Wl,-soname,libreload_tests.so")
+    return library
 
 
-def precompile(folder: Path) -> Path:
-    """Precompile the headers of the installed kernel; where compile_plugin() finds them."""
-    (folder / "mauve_rt").mkdir(parents=True)
-    header = f"{INSTALLED}/include/mauve_rt/mauve_rt.hpp"
-    output = folder / "mauve_rt" / "mauve_rt.hpp.gch"
-    command = [
-        "g++",
-        "-std=c++20",
-        "-O1",
-        "-fPIC",
-        f"-I{INSTALLED}/include",
-        "-w",
-        "-x",
-        "c++-header",
-        header,
-    ]
-    subprocess.run([*command, "-o", output], check=True)
-    return folder
+def _file_name(source: str, macros: Sequence[str]) -> str:
+    return "_".join([source, *macros]).replace("/", "_")
 
 
-def install_package(folder: Path, headers: Path, first_build: Path) -> RebuiltPackage:
+def install_package(folder: Path, builds: Path) -> RebuiltPackage:
     """The package as first built, in a prefix below the folder."""
-    package = RebuiltPackage(folder / "prefix", folder / "modules", headers)
+    package = RebuiltPackage(folder / "prefix", folder / "modules", builds)
     (package.prefix / "lib").mkdir(parents=True)
     package.modules.mkdir()
     package.index.parent.mkdir(parents=True)
@@ -115,7 +107,7 @@ def install_package(folder: Path, headers: Path, first_build: Path) -> RebuiltPa
     packages.mkdir()
     (packages / "reload_tests").touch()
     shutil.copy(PLUGINS / "reload_tests.txt", package.index)
-    shutil.copy(first_build, package.library)
+    package.build()
     package.write_core(1.0)
     return package
 

@@ -1,66 +1,21 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A package of plug-ins that the tests of reloads build in several variants, each by macros of its own.
-#include <cstdlib>
+#include "reload_tests.hpp"
+
 #include <limits>
 #include <stdexcept>
-
-#include "mauve_rt/mauve_rt.hpp"
-
-#ifndef STEP
-#define STEP 1.0
-#endif
-#ifndef GAIN
-#define GAIN 1.0
-#endif
 
 namespace reload_tests {
 
 /// One for the process by the C++ standard: old and new code of one library must not share it.
-inline double step = STEP;
-
-struct Sum {
-  double data{};
-};
-
-struct Number {
-#ifdef OTHER_LAYOUT
-  float data{};
-#else
-  double data{};
-#endif
-};
-
-#ifdef CRASH
-const int crash = [] {
-  std::abort();
-  return 0;
-}();
-#endif
-#ifdef HANG
-const int hang = [] {
-  for (volatile bool goes_on = true; goes_on;) {
-  }
-  return 0;
-}();
-#endif
-#ifdef MISSING
-int missing();
-const int used = missing();
-#endif
-
-}  // namespace reload_tests
-
-MAUVE_TYPE(reload_tests::Sum, "std_msgs/msg/Float64", data)
-MAUVE_TYPE(reload_tests::Number, "reload_tests/Number", data)
-
-namespace reload_tests {
+inline double step = first_step();
 
 struct LoopShell : mauve::Shell {
 #ifdef OTHER_SHELL
   mauve::Property<double>& limit = property("limit", 10.0);
   mauve::ReadPort<Sum>& bias = read_port<Sum>("bias").optional();
 #endif
-  mauve::Property<double>& gain = property("gain", GAIN);
+  mauve::Property<double>& gain = property("gain", first_gain());
 #ifdef WITHOUT_PORT
   mauve::WritePort<Sum>& level = write_port<Sum>("level");
 #else
@@ -166,8 +121,7 @@ MAUVE_PLUGINS(registry) {
 }
 #else
 MAUVE_PLUGINS(registry) {
-  registry.type<reload_tests::Sum>();
-  registry.type<reload_tests::Number>();
+  reload_tests::register_types(registry);
   registry.shell<reload_tests::LoopShell>("reload_tests/LoopShell");
 #ifndef WITHOUT_CORE
   registry.core<reload_tests::Loop>("reload_tests/Loop", "reload_tests/LoopShell");

@@ -1,6 +1,5 @@
 """Real executor processes, and a node of the test's own to talk with them."""
 
-import random
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from domains import draw_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -115,7 +115,7 @@ class Graph:
 @pytest.fixture(scope="module")
 def domain() -> int:
     """A ROS domain of this module's own; the stage `system`, which runs in parallel, has 51 to 100."""
-    return random.SystemRandom().randint(1, 50)
+    return draw_domain()
 
 
 @pytest.fixture

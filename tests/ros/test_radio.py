@@ -1,7 +1,6 @@
 """The radio between the robots: real topics, in the test's process."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from domains import draw_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -33,7 +33,7 @@ class World:
 
     def __init__(self, **settings: float) -> None:
         self.context = Context()
-        rclpy.init(context=self.context, domain_id=random.randint(1, 50))  # noqa: S311
+        rclpy.init(context=self.context, domain_id=draw_domain())
         self.executor = SingleThreadedExecutor(context=self.context)
         overrides = [Parameter("robots", value=ROBOTS), Parameter("drop_share", value=0.0)]
         overrides += [Parameter(name, value=value) for name, value in settings.items()]
@@ -138,7 +138,7 @@ def test_about_the_share_is_lost():
 @pytest.mark.parametrize("overrides", [[], [Parameter("robots", value=["robot_1", "robot_1"])]])
 def test_bad_robots_are_refused(overrides: list[Any]):
     context = Context()
-    rclpy.init(context=context, domain_id=random.randint(1, 50))  # noqa: S311
+    rclpy.init(context=context, domain_id=draw_domain())
     try:
         with pytest.raises(ValueError, match="every robot once"):
             Radio(context=context, parameter_overrides=overrides)
@@ -152,7 +152,7 @@ def test_a_second_ctrl_c_changes_nothing():
         [sys.executable, "-m", "mauve_examples.mission.radio", "--ros-args", "-p", "robots:=[a, b]"],
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311
+        env=os.environ | {"ROS_DOMAIN_ID": str(draw_domain())},
     )
     wait_for_signals(radio.pid)
     for _ in range(2):

@@ -1,7 +1,6 @@
 """Starts in unusual surroundings: each program starts and reports it, or refuses in one line."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -11,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from domains import draw_domain
 from ros_processes import PATIENCE_S, wait_for_signals
 
 from mauve_rt import _kernel
@@ -235,7 +235,7 @@ def test_the_demo_runs_in_all_of_them_at_once(tmp_path: Path) -> None:
     other = another_ros(tmp_path / "ros").environment
     closed_input = ("sh", "-c", 'unset HOME; exec "$@" <&-', "sh")
     wrapper = (*FEW_FILES, *closed_input)
-    domain = random.SystemRandom().randint(1, 50)
+    domain = draw_domain()
     given = {
         "ROS_STATIC_PEERS": NO_NAME,
         "ROS_LOG_DIR": "",

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from compiled_plugins import compile_plugin
 from page_blocks import blocks
 from pages import PAGES
-from rebuilt_package import RebuiltPackage, compile_plugin
+from rebuilt_package import RebuiltPackage
 from reload_world import World, make_world
 
 from mauve_rt.api import Core
@@ -166,7 +167,7 @@ def test_cores_of_other_libraries_have_to_be_built_with_a_changed_shell(
     assert swapped.success, swapped.message
 
 
-def test_the_state_fields_of_the_page(rebuilt: RebuiltPackage, tmp_path: Path) -> None:
+def test_the_state_fields_of_the_page(tmp_path: Path) -> None:
     cpp, python = (
         next(block.text for block in blocks(PAGES["docs/howto/reload_code.md"]) if words in block.text)
         for words in ("MAUVE_STATE", "state_fields = {")
@@ -179,7 +180,7 @@ def test_the_state_fields_of_the_page(rebuilt: RebuiltPackage, tmp_path: Path) -
         encoding="utf-8",
     )
     library = tmp_path / "pid.so"
-    compile_plugin(rebuilt.headers, source, library)
+    compile_plugin(source, library)
     names: dict[str, Any] = {"Core": Core}
     exec(python, names)  # noqa: S102 - a block of the page
     pid = names["Pid"](None)

@@ -33,11 +33,8 @@ def bash(script: str, **environment: str) -> list[str]:
         f"source {SCRIPTS}/{part}.sh; " for part in ("lib", "progress", "python_packages", "system_packages")
     )
     settings = "".join(f"{name}={value}; " for name, value in environment.items())
-    return [
-        "bash",
-        "-c",
-        f"set -euo pipefail; {parts} with_lint=false with_tests=false with_benchmarks=false jazzy=; {settings} {script}",
-    ]
+    nothing = "with_lint=false with_tests=false with_benchmarks=false jazzy="
+    return ["bash", "-c", f"set -euo pipefail; {parts} {nothing}; {settings} {script}"]
 
 
 @contextlib.contextmanager

@@ -1,7 +1,6 @@
 """The supervisor and the executor as processes: a real core is replaced in flight, and back."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from domains import draw_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -39,7 +39,7 @@ class Band:
     """A metronome under an executor, its supervisor, and a peer that plays while `playing`."""
 
     def __init__(self, folder: Path) -> None:
-        self.domain = random.randint(1, 50)  # noqa: S311
+        self.domain = draw_domain()
         self.playing = True
         self.folder = folder
         self.decisions: list[Any] = []

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from domains import draw_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -89,7 +90,7 @@ class Graph:
 
     def __init__(self) -> None:
         self.context = Context()
-        rclpy.init(context=self.context, domain_id=random.randint(1, 50))  # noqa: S311
+        rclpy.init(context=self.context, domain_id=draw_domain())
         self.executor = SingleThreadedExecutor(context=self.context)
 
     def add(self, node: Node) -> Node:
@@ -302,7 +303,7 @@ def run(*arguments: str) -> subprocess.Popen[str]:
         [sys.executable, "-m", "mauve_rt.node.supervisor.main", "--ros-args", *arguments],
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"ROS_DOMAIN_ID": str(random.randint(1, 50))},  # noqa: S311
+        env=os.environ | {"ROS_DOMAIN_ID": str(draw_domain())},
     )
 
 

@@ -1,0 +1,68 @@
+"""Compiles plug-ins of the tests against the installed kernel: by ccache where there is one."""
+
+import fcntl
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from mauve_rt import _kernel
+
+ROOT = Path(__file__).resolve().parents[1]
+PLUGINS = Path(__file__).parent / "plugins"
+INSTALLED = (
+    Path(_kernel.__file__).resolve().parents[4]
+)  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/_kernel...so
+BUILD = ROOT / "build" / "test-plugins"  # in the clone: so clones share what ccache keeps
+FLAGS = ("-std=c++20", "-O1", "-fPIC", f"-I{INSTALLED}/include")
+
+
+def _compile(*words: str | Path) -> None:
+    launcher = [ccache] if (ccache := shutil.which("ccache")) else []
+    settings = {
+        "CCACHE_BASEDIR": str(ROOT),
+        "CCACHE_NOHASHDIR": "1",
+        "CCACHE_SLOPPINESS": "pch_defines,time_macros",
+    }
+    BUILD.mkdir(parents=True, exist_ok=True)
+    subprocess.run([*launcher, "g++", *FLAGS, *words], check=True, cwd=BUILD, env=os.environ | settings)
+
+
+@cache
+def _precompiled() -> Path:
+    """The kernel's headers, precompiled where that is older than one of them: to be included by this name."""
+    header = BUILD / "mauve_rt.hpp"
+    output = BUILD / "mauve_rt.hpp.gch"
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / ".lock").open("w") as lock:  # of another process of tests
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        newest = max(file.stat().st_mtime for file in (INSTALLED / "include" / "mauve_rt").rglob("*.hpp"))
+        if not output.exists() or output.stat().st_mtime <= newest:
+            header.write_text("#include <mauve_rt/mauve_rt.hpp>\n", encoding="utf-8")
+            new = BUILD / "new.gch"
+            _compile("-w", "-x", "c++-header", header, "-o", new)
+            new.replace(output)
+    return header
+
+
+def compile_source(source: Path, output: Path, *flags: str) -> None:
+    """Compile one source into an object."""
+    with_kernel = (
+        ["-fpch-preprocess", "-include", _precompiled()] if "mauve_rt" in source.read_text("utf-8") else []
+    )
+    _compile(*with_kernel, *flags, "-c", source, "-o", output)
+
+
+def link(objects: Sequence[Path], library: Path, *flags: str) -> None:
+    """Link objects to a plug-in library."""
+    words = [f"-L{INSTALLED}/lib", "-lmauve_rt", f"-Wl,-rpath,{INSTALLED}/lib", *flags]
+    subprocess.run(["g++", "-shared", *objects, "-o", library, *words], check=True)
+
+
+def compile_plugin(source: Path, library: Path) -> None:
+    """One library of one source."""
+    compiled = library.with_suffix(".o")
+    compile_source(source, compiled)
+    link([compiled], library)
