@@ -1,4 +1,4 @@
-"""ROS domains for tests. scripts/test gives each process of tests that runs in parallel a range of its own."""
+"""ROS domains for tests. scripts/test gives each process of tests that runs in parallel its own range."""
 
 import os
 import random
