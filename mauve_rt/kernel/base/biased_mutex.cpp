@@ -20,11 +20,6 @@ bool futex_pi(std::atomic<std::uint32_t>& word, int operation) MAUVE_RT {
 
 }  // namespace
 
-void BiasedMutex::Seat::take_thread() noexcept {
-  id_.store(static_cast<std::uint32_t>(MAUVE_RT_TRUSTED(gettid())), std::memory_order_relaxed);
-  thread_.store(MAUVE_RT_TRUSTED(pthread_self()), std::memory_order_relaxed);
-}
-
 /// The user has left, and somebody has taken the bias away: unlocks the futex, if that one has locked it on our behalf.
 void BiasedMutex::Seat::hand_over() noexcept {
   inside_.store(0, std::memory_order_seq_cst);  // once more: before the look at the futex, for all

@@ -51,6 +51,24 @@ struct ByBias {
   std::optional<BiasedMutex::Hold> hold;
 };
 
+/// The seat was of a thread that has ended; glibc gives its pthread_t to the next one, as in a second deployment.
+struct ByBiasOfALaterThread : ByBias {
+  ByBiasOfALaterThread() {
+    const auto enter = [](void* way) -> void* {
+      static_cast<ByBias*>(way)->begin();
+      static_cast<ByBias*>(way)->end();
+      return nullptr;
+    };
+    earlier = make_thread(10, enter, static_cast<ByBias*>(this));
+    pthread_join(earlier, nullptr);
+  }
+  void begin() {
+    if (pthread_equal(earlier, pthread_self()) == 0) GTEST_LOG_(INFO) << "another pthread_t";
+    ByBias::begin();
+  }
+  pthread_t earlier{};
+};
+
 template <typename Way>
 struct Scene {
   Way way;
@@ -63,7 +81,7 @@ struct Scene {
 
 template <typename Way>
 class PriorityInheritance : public ::testing::Test {};
-using Ways = ::testing::Types<ByLock, ByBias>;
+using Ways = ::testing::Types<ByLock, ByBias, ByBiasOfALaterThread>;
 TYPED_TEST_SUITE(PriorityInheritance, Ways, );
 
 TYPED_TEST(PriorityInheritance, TheHighestIsServedBeforeTheMiddle) {

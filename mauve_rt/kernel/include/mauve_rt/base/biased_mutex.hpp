@@ -2,8 +2,6 @@
 // A priority-inheritance mutex that one of its users enters without an atomic read-modify-write.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <cstdint>
 
@@ -31,7 +29,7 @@ namespace mauve {
 /// | is_shared_      | share()                    | add(), remove()  | mutex_                                                   |
 /// | Seat::inside_   | the seat's user            | who holds mutex_ | after inside_ the user looks at owner_, after owner_ the other one at inside_: a barrier between each; release: who finds 0 sees what the user wrote |
 /// | Seat::handover_ | both                       | both             | seq_cst: a futex word; one of them sees the other        |
-/// | Seat::thread_, Seat::id_ | the seat's user   | any              | relaxed: the user finds what it stored itself            |
+/// | Seat::id_       | the seat's user            | any              | relaxed: the user finds what it stored itself            |
 class BiasedMutex {
  public:
   /// Of one thread at a time.
@@ -42,23 +40,23 @@ class BiasedMutex {
     Seat& operator=(const Seat&) = delete;
 
     /// Whether the calling thread is the one that entered by this seat last. [rt]
-    bool is_mine() const MAUVE_RT { return is_this_thread(thread_.load(std::memory_order_relaxed)); }
+    bool is_mine() const MAUVE_RT { return id_.load(std::memory_order_relaxed) == this_thread_id(); }
 
    private:
     friend class BiasedMutex;
 
-    std::uint32_t thread_id() MAUVE_RT {
-      if (!is_mine()) [[unlikely]]
-        take_thread();
-      return id_.load(std::memory_order_relaxed);
+    /// A user of this deployment may be another thread than that of the one before.
+    std::uint32_t take_thread() MAUVE_RT {
+      const std::uint32_t id = this_thread_id();
+      if (id_.load(std::memory_order_relaxed) != id) [[unlikely]]
+        id_.store(id, std::memory_order_relaxed);
+      return id;
     }
-    void take_thread() MAUVE_RT;
     void hand_over() MAUVE_RT;
     void await_leave() MAUVE_RT;
 
     std::atomic<std::uint32_t> inside_{0};
     std::atomic<std::uint32_t> handover_{0};
-    std::atomic<pthread_t> thread_{};  // none, as glibc never calls a thread
     std::atomic<std::uint32_t> id_{0};
     Seat* next_{nullptr};
   };
@@ -116,7 +114,7 @@ class BiasedMutex {
   /// True: by the bias, to be left by leave(). False: by lock().
   bool enter(Seat& seat) MAUVE_RT {
     if (owner_.load(std::memory_order_relaxed) == &seat) [[likely]] {  // relaxed: a hint
-      seat.inside_.store(seat.thread_id(), std::memory_order_relaxed);
+      seat.inside_.store(seat.take_thread(), std::memory_order_relaxed);
       light_barrier();
       if (owner_.load(std::memory_order_acquire) == &seat) [[likely]]
         return true;
