@@ -204,7 +204,7 @@ bool Probation::note_request() noexcept {
 bool Probation::begin_end() noexcept {
   std::uint32_t running = kRunning;
   if (!phase_.compare_exchange_strong(running, kEnding, std::memory_order_acq_rel)) return false;
-  for (const auto& limits : limits_) limits->port.unwatch();
+  for (const auto& limits : limits_) limits->port.unwatch(*limits);
   return true;
 }
 

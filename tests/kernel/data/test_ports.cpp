@@ -39,6 +39,37 @@ struct PortsFixture : ::testing::Test {
   TestShell second;
 };
 
+/// Refuses every value, and counts them.
+struct Refusing final : OutputWatch {
+  bool admits(const void* /*value*/) MAUVE_RT override {
+    ++asked;
+    return false;
+  }
+  int asked{0};
+};
+
+/// The end of a probation, in another thread, may come after the begin of the next one.
+TEST_F(PortsFixture, ALaterWatchStaysWhereAnEarlierOneIsTakenAway) {
+  SharedData<Number> resource;
+  shell.output.connect(resource.write, "r");
+  Refusing earlier;
+  Refusing later;
+  shell.output.watch(earlier);
+  write_at(10, 1.0);
+  shell.output.watch(later);
+  shell.output.unwatch(earlier);
+  write_at(20, 2.0);
+  write_at(30, 3.0);
+  EXPECT_EQ(1, earlier.asked);
+  EXPECT_EQ(2, later.asked);
+  shell.output.unwatch(later);
+  write_at(40, 4.0);
+  write_at(50, 5.0);
+  EXPECT_EQ(2, later.asked);
+  shell.input.connect(resource.read, "r");
+  EXPECT_EQ(5.0, shell.input.read().value.value);
+}
+
 /// The same rules for every kind that keeps its value.
 template <typename ResourceType>
 struct KeepingResources : PortsFixture {

@@ -15,8 +15,9 @@ namespace mauve {
 ///
 /// | member         | written by   | read by    | order                                                                |
 /// | -------------- | ------------ | ---------- | -------------------------------------------------------------------- |
-/// | object_        | the owner    | its users  | seq_cst with users_: either a user finds nothing, or it is counted   |
-/// | users_ (futex) | its users    | the owner  | seq_cst: as above; hands over what the users have written            |
+/// | object_        | owners       | its users  | seq_cst with users_: either a user finds nothing, or it is counted   |
+/// | users_ (futex) | its users    | owners     | seq_cst: as above; hands over what the users have written            |
+/// | waiting_       | owners       | its users  | seq_cst with users_: either a user finds it, or it finds the user gone |
 template <typename T>
 class RevocableReference {
  public:
@@ -31,22 +32,39 @@ class RevocableReference {
     users_.fetch_add(1, std::memory_order_seq_cst);
     if (T* const object = object_.load(std::memory_order_seq_cst)) std::forward<Function>(function)(*object);
     users_.fetch_sub(1, std::memory_order_seq_cst);
-    if (!is_set()) futex_wake_all(users_);
+    if (waiting_.load(std::memory_order_seq_cst) != 0) futex_wake_all(users_);
   }
 
-  /// No thread begins to use the object any more; whether all have ended by the instant. [rt]
+  /// No thread begins to use the object any more, whichever it is; whether all have ended by the instant. [rt]
   bool revoke(time_ns_t until_ns) MAUVE_RT {
     object_.store(nullptr, std::memory_order_seq_cst);
-    for (;;) {
-      const std::uint32_t users = users_.load(std::memory_order_seq_cst);
-      if (users == 0) return true;
-      if (!futex_wait_until(users_, users, until_ns)) return users_.load(std::memory_order_seq_cst) == 0;
-    }
+    return await_users(until_ns);
+  }
+  /// As above, of this object: another one that was set since then stays. [rt]
+  bool revoke(const T& object, time_ns_t until_ns) MAUVE_RT {
+    T* own = const_cast<T*>(&object);  // NOLINT(cppcoreguidelines-pro-type-const-cast): only compared
+    object_.compare_exchange_strong(own, nullptr, std::memory_order_seq_cst);
+    return await_users(until_ns);
   }
 
  private:
+  bool await_users(time_ns_t until_ns) MAUVE_RT {
+    waiting_.fetch_add(1, std::memory_order_seq_cst);
+    bool is_unused = true;
+    for (;;) {
+      const std::uint32_t users = users_.load(std::memory_order_seq_cst);
+      if (users == 0) break;
+      if (futex_wait_until(users_, users, until_ns)) continue;
+      is_unused = users_.load(std::memory_order_seq_cst) == 0;
+      break;
+    }
+    waiting_.fetch_sub(1, std::memory_order_seq_cst);
+    return is_unused;
+  }
+
   std::atomic<T*> object_{nullptr};
   std::atomic<std::uint32_t> users_{0};
+  std::atomic<std::uint32_t> waiting_{0};
 };
 
 }  // namespace mauve

@@ -141,29 +141,20 @@ class PortBase {
   /// writes for good. The connection stays until disconnect(). [rt]
   void leave_behind() MAUVE_RT;
 
-  /// Asks the watch before each write, until unwatch(). [rt], on the component's thread, or parked.
+  /// Asks the watch before each write, until it is taken away or another one comes. [rt], on the component's thread, or parked.
   void watch(OutputWatch& watch) MAUVE_RT {
     watch_.set(watch);
     set_special(kWatched, kWatched);
   }
-  /// No thread asks the watch any more afterwards. [rt]
-  void unwatch() MAUVE_RT {
-    watch_.revoke(kForever);
-    set_special(kWatched, 0);
-    if (watch_.is_set()) set_special(kWatched, kWatched);  // another one came in between
-  }
+  /// No thread asks this watch any more afterwards. [rt] The thread that writes next takes the bit away: it sets it, too.
+  void unwatch(const OutputWatch& watch) MAUVE_RT { watch_.revoke(watch, kForever); }
   /// Passes each value read or written to the tap, until untap(). [rt], on the component's thread, or parked.
   void tap(PortTap& tap) MAUVE_RT {
     tap_.set(tap);
     set_special(kTapped, kTapped);
   }
-  /// No thread uses this tap any more afterwards. [rt]
-  void untap(const PortTap& tap) MAUVE_RT {
-    if (!tap_.is(tap)) return;
-    tap_.revoke(kForever);
-    set_special(kTapped, 0);
-    if (tap_.is_set()) set_special(kTapped, kTapped);  // another one came in between
-  }
+  /// No thread uses this tap any more afterwards. [rt] As unwatch().
+  void untap(const PortTap& tap) MAUVE_RT { tap_.revoke(tap, kForever); }
   /// A cell for this port's values, not connected; nullptr: they are not trivially copyable, or not C++. [non-rt]
   virtual std::unique_ptr<PortCell> make_cell() const { return nullptr; }
   /// Where the number at a path lies in a value that it writes; nothing: there is none at a fixed place. [non-rt]
@@ -203,12 +194,13 @@ class PortBase {
   }
   /// Whether the watch lets this value be written. [rt]
   bool admits(const void* value) MAUVE_RT {
-    if (!watch_.is_set()) return true;
+    if (!is_still(watch_, kWatched)) return true;
     bool is_admitted = true;
     watch_.use([&](OutputWatch& watch) MAUVE_RT { is_admitted = watch.admits(value); });
     return is_admitted;
   }
-  bool is_tapped() const MAUVE_RT { return tap_.is_set(); }
+  /// [rt], on the component's thread.
+  bool is_tapped() MAUVE_RT { return is_still(tap_, kTapped); }
   /// Of a tapped port. [rt] Out of line: the ports without a tap are to cost what they cost without taps.
   [[gnu::noinline, gnu::cold]] void tell_read(const void* value, DataStatus status, time_ns_t time_ns)
       MAUVE_RT {
@@ -234,6 +226,14 @@ class PortBase {
     std::uint32_t before = special_.load(std::memory_order_relaxed);
     while (!special_.compare_exchange_weak(before, (before & ~bits) | values, std::memory_order_acq_rel)) {
     }
+  }
+
+  /// Whether there is a watch or a tap; takes its bit away where it has gone.
+  template <typename T>
+  bool is_still(const RevocableReference<T>& reference, std::uint32_t bit) MAUVE_RT {
+    if (reference.is_set()) return true;
+    if (has(bit)) set_special(bit, 0);
+    return false;
   }
 
   const PortConnection& connection() const noexcept {

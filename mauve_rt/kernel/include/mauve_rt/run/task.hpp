@@ -137,9 +137,7 @@ class Task final : public Waiter {
   void end_probation(bool falls_back) MAUVE_RT;
   /// The machine does not refer to the probation any more, which has ended; it may have another by now. [non-rt], the
   /// component claimed.
-  void forget_probation(const Probation& probation) noexcept {
-    if (probation_.is(probation)) probation_.revoke(kForever);
-  }
+  void forget_probation(const Probation& probation) noexcept { probation_.revoke(probation, kForever); }
   /// Lets the machine look whether the old core was asked for; in virtual time it has looked by the return. [non-rt]
   void notify_revert() noexcept;
   /// Puts the old core back in the next step, or at once; the caller is the machine's thread in a wait, or acts for a parked
@@ -157,9 +155,7 @@ class Task final : public Waiter {
   /// The component's parts or wiring change, which ends its shadow. [rt], in a take.
   void end_shadow(ShadowCause why) MAUVE_RT;
   /// No thread uses the shadow any more afterwards; the component may have another by now. [non-rt], the component claimed.
-  void forget_shadow(const Shadow& shadow) noexcept {
-    if (shadow_.is(shadow)) shadow_.revoke(kForever);
-  }
+  void forget_shadow(const Shadow& shadow) noexcept { shadow_.revoke(shadow, kForever); }
 
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
