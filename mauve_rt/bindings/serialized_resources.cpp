@@ -135,6 +135,7 @@ class SerializedResource : public Resource {
       const std::lock_guard lock(owner_.mutex_);
       owner_.floor_.raise(instant_ns);
     }
+    void forget_floor() noexcept override { owner_.floor_.forget(); }
 
    private:
     SerializedResource& owner_;

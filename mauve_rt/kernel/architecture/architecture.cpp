@@ -202,6 +202,9 @@ void Architecture::set_host(Runner& host) {
                 {.expected = "an architecture without a host", .remedy = "shut its host down first"});
   }
   host_ = &host;
+  for (const auto& resource : resources()) {
+    for (ServiceBase* service : resource->services()) service->forget_floor();
+  }
 }
 
 void Architecture::release_host(const Runner& host) noexcept {

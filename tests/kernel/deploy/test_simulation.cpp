@@ -192,6 +192,40 @@ std::vector<TraceRecord> random_run(std::uint64_t seed) {
   return architecture.drain_trace().records;
 }
 
+/// A change hands a writer's end over at the instant T of its clock. The clock of the next simulation begins sooner.
+TEST(Rule13SimulationClocks, WhatOneOrderedDoesNotBindTheNext) {
+  Architecture architecture;
+  for (const char* name : {"p", "q"}) {
+    Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name);
+    component.core_as<TestCore>().work = [&component] {
+      component.core_as<TestCore>().exposed_shell().output.write({component.name() == "q" ? 2.0 : 1.0});
+    };
+  }
+  architecture.add_resource<SharedData<Number>>("r");
+  architecture.connect("p", "output", "r", "write");
+  architecture.configure();
+  {
+    Simulation first({.begin_ns = s_to_ns(1'000'000)});
+    SimulatedHost& host = first.add(architecture);
+    first.deploy();
+    first.run_until(first.epoch_ns() + ms_to_ns(5));
+    Transaction change;
+    change.disconnect("p", "output").connect("q", "output", "r", "write");
+    host.commit(std::move(change));
+    first.run_until(first.epoch_ns() + ms_to_ns(10));
+  }
+  Simulation second({.begin_ns = s_to_ns(1)});
+  second.add(architecture);
+  second.deploy();
+  second.run_until(second.epoch_ns() + ms_to_ns(5));
+  auto& resource = static_cast<SharedData<Number>&>(architecture.resource("r"));
+  ReadPort<Number> port("port");
+  port.connect(resource.read, "r");
+  const Sample<Number> sample = port.read();
+  EXPECT_EQ(2.0, sample.value.value);
+  EXPECT_EQ(second.epoch_ns() + ms_to_ns(5), sample.time_ns);
+}
+
 TEST(Rule13SimulationSeeds, EqualSeedsGiveEqualTracesBitForBit) {
   const auto first = random_run(7);
   const auto again = random_run(7);

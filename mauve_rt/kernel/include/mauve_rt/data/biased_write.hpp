@@ -15,7 +15,7 @@ namespace mauve {
 ///
 /// | member | written by             | under   |
 /// | ------ | ---------------------- | ------- |
-/// | floor_ | commits                | its own |
+/// | floor_ | commits, who deploys   | its own |
 template <Described T, typename Owner>
 class BiasedWrite final : public WriteService<T> {
  public:
@@ -38,6 +38,7 @@ class BiasedWrite final : public WriteService<T> {
     return TryWrite::done;
   }
   void raise_floor(time_ns_t instant_ns) noexcept override { floor_.raise(instant_ns); }
+  void forget_floor() noexcept override { floor_.forget(); }
   bool seat(BiasedMutex::Seat& seat) noexcept override {
     mutex_.add(seat);
     return true;

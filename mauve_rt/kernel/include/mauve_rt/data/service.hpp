@@ -74,7 +74,7 @@ struct ReaderState {
 ///
 /// | member      | written by   | read by | order                                                                           |
 /// | ----------- | ------------ | ------- | ------------------------------------------------------------------------------- |
-/// | instant_ns_ | commits      | writers | relaxed: the new owner writes after the commit, under the same lock as the late one |
+/// | instant_ns_ | commits, who deploys | writers | relaxed: the new owner writes after the commit, under the same lock as the late one |
 class WriteFloor {
  public:
   /// [rt]
@@ -87,6 +87,8 @@ class WriteFloor {
            !instant_ns_.compare_exchange_weak(before_ns, instant_ns, std::memory_order_relaxed)) {
     }
   }
+  /// Admits all: another clock begins. [setup]
+  void forget() noexcept { instant_ns_.store(INT64_MIN, std::memory_order_relaxed); }
 
  private:
   std::atomic<time_ns_t> instant_ns_{INT64_MIN};
@@ -130,6 +132,8 @@ class ServiceBase {
 
   /// A write of an earlier time is dropped from now on. [rt] Does nothing where the service takes no values.
   virtual void raise_floor(time_ns_t /*instant_ns*/) MAUVE_RT {}
+  /// Another clock begins, with a deployment or a simulation: a write of any time counts again. [setup]
+  virtual void forget_floor() noexcept {}
 
   /// A port comes: whether it has a place of its own, until unseat(). What it reads or writes by that place waits for no other
   /// port. [rt] The port is in no use; its component is parked or held.
