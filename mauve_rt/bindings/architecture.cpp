@@ -8,7 +8,7 @@ namespace mauve::bindings {
 namespace {
 
 // A lock that a call may wait for is never waited for under the interpreter's lock.
-using Unlocked = py::call_guard<py::gil_scoped_release>;
+using Unlocked = py::call_guard<InterpreterUnlocked>;
 
 /// Whether a port takes a lock depends on all ports of its service, and changes with them.
 void describe_locking(const Architecture& architecture, std::vector<PortDescription>& ports) {
@@ -20,7 +20,7 @@ void describe_locking(const Architecture& architecture, std::vector<PortDescript
 }
 
 std::vector<ComponentDescription> describe_components(PyArchitecture& self) {
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   const std::lock_guard lock(self.describing);
   std::vector<ComponentDescription> all;
   for (const auto& component : self.architecture.components()) {
@@ -31,7 +31,7 @@ std::vector<ComponentDescription> describe_components(PyArchitecture& self) {
 }
 
 std::vector<RecentMaxima> take_all_recent_maxima(PyArchitecture& self) {
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   const std::lock_guard lock(self.describing);
   std::vector<RecentMaxima> all;
   for (const auto& component : self.architecture.components()) all.push_back(take_recent_maxima(*component));
@@ -46,14 +46,14 @@ std::vector<ResourceDescription> describe_resources(PyArchitecture& self) {
 
 /// Waits for a change under way without the interpreter's lock, which that may need.
 void commit_one(PyArchitecture& self, Transaction transaction) {
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   self.architecture.commit_one(std::move(transaction));
 }
 
 /// A whole transaction without a host; where there is one, by it.
 TransactionReport commit_transaction(PyArchitecture& self, const PyTransaction& steps) {
   Transaction transaction = steps.build(self.registry);
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return self.architecture.commit(std::move(transaction));
 }
 
@@ -196,7 +196,7 @@ element: core, fsm, shell, state, "property NAME", "port NAME"; empty: the targe
       .def(
           "previewed_states",
           [](PyArchitecture& self, const std::string& component) {
-            const py::gil_scoped_release unlocked;  // the fsm may be written in Python
+            const InterpreterUnlocked unlocked;  // the fsm may be written in Python
             return self.architecture.component(component).previewed_states();
           },
           py::arg("component"),

@@ -11,7 +11,7 @@ namespace {
 template <typename Call>
 auto unlocked(const PyComponent& self, Call&& call) {
   Component& component = self.get();
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return call(component);
 }
 

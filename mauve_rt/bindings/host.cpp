@@ -11,7 +11,7 @@ namespace mauve::bindings {
 
 namespace {
 
-using Unlocked = py::call_guard<py::gil_scoped_release>;
+using Unlocked = py::call_guard<InterpreterUnlocked>;
 
 py::bytes to_bytes(const void* data, std::size_t size) { return {static_cast<const char*>(data), size}; }
 
@@ -28,7 +28,7 @@ class PyDeployer final : public PyHost {
   ~PyDeployer() override {
     living().erase(this);
     // A component thread, or a change that is being prepared, may need the interpreter to come to its end.
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     deployer_.reset();
   }
 
@@ -42,7 +42,7 @@ class PyDeployer final : public PyHost {
   }
   static void shut_down_all() {
     const std::set<PyDeployer*> all = living();
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     for (PyDeployer* deployer : all) deployer->deployer_->shutdown();
   }
 
@@ -60,12 +60,12 @@ StepReport replace_core(PyHost& self, const std::string& component, const AnyCor
   const CommitTimeouts limits = timeouts(commit_timeout_ns, phase_timeout_ns);
   if (py::isinstance<py::str>(core)) {
     const auto name = core.cast<std::string>();
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     return self.host().replace_core(component, name, limits);
   }
   Transaction transaction;
   transaction.replace_core(component, make_core(core, self.registry()));
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return self.host().commit(std::move(transaction), {.timeouts = limits}).steps.at(0);
 }
 
@@ -74,7 +74,7 @@ class PyCommitted {
  public:
   explicit PyCommitted(std::unique_ptr<TransactionCommit> work) : work_(std::move(work)) {}
   ~PyCommitted() {
-    const py::gil_scoped_release release;  // a component it removed may need the interpreter for its end
+    const InterpreterUnlocked release;  // a component it removed may need the interpreter for its end
     work_.reset();
   }
   PyCommitted(const PyCommitted&) = delete;
@@ -89,7 +89,7 @@ class PyCommitted {
 std::unique_ptr<PyCommitted> make(PyHost& self, const PyTransaction& steps, bool dry_run,
                                   std::uint64_t expected_revision, time_ns_t commit_timeout_ns, bool force) {
   Transaction transaction = steps.build(self.registry());
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   const TransactionOptions options{.timeouts = timeouts(commit_timeout_ns, 0),
                                    .dry_run = dry_run,
                                    .expected_revision = expected_revision,
@@ -101,7 +101,7 @@ TransactionReport commit(PyHost& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
                          time_ns_t phase_timeout_ns, bool force) {
   const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, force);
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
 
@@ -180,7 +180,7 @@ void PyHost::wake() noexcept {
 
 bool PyHost::write_resource(const std::string& name, const py::bytes& data) {
   const std::string_view message = data;
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return architecture_.resource(name).write_sample(std::as_bytes(std::span(message)), host().now_ns());
 }
 
@@ -189,7 +189,7 @@ ReadMessage PyHost::read_resource(const std::string& name) {
   time_ns_t time_ns = 0;
   std::uint64_t sequence = 0;
   {
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     architecture_.hold_resource(name)->peek_sample(message, time_ns, sequence);
   }
   return py::make_tuple(to_bytes(message.data(), message.size()), sequence, time_ns);
@@ -228,7 +228,7 @@ Called by deploy() if not before.)")
           "deploy",
           [](PyHost& self) {
             shorten_switch_interval();
-            const py::gil_scoped_release release;
+            const InterpreterUnlocked release;
             self.host().deploy();
           },
           R"(Publishes the epoch and starts every component; a simulation deploys all its hosts at once.
@@ -339,7 +339,7 @@ Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.)")
           [](PyHost& self, time_ns_t timeout_ns) {
             std::vector<PyHost::PublishedSample> samples;
             {
-              const py::gil_scoped_release release;
+              const InterpreterUnlocked release;
               samples = self.wait_published(timeout_ns);
             }
             py::list list;

@@ -21,7 +21,7 @@ class PythonObject {
   explicit operator bool() const noexcept { return static_cast<bool>(object_); }
   void reset() noexcept {
     if (!object_) return;
-    const py::gil_scoped_acquire lock;
+    const InterpreterLocked lock;
     object_ = {};
   }
 
@@ -37,9 +37,9 @@ class PythonObject {
 /// Runs a call into Python whose exception refuses something; what comes out holds no Python object.
 template <typename Call>
 auto in_python(Call&& call) {
-  const py::gil_scoped_acquire lock;
+  const InterpreterLocked lock;
   try {
-    return call();
+    return unless_interpreter_ends(call);
   } catch (const py::error_already_set& error) {
     rethrow(error);
   }
@@ -48,9 +48,9 @@ auto in_python(Call&& call) {
 /// Runs a call into Python whose exception is a fault.
 template <typename Call>
 auto on_component(Call&& call) {
-  const py::gil_scoped_acquire lock;
+  const InterpreterLocked lock;
   try {
-    return call();
+    return unless_interpreter_ends(call);
   } catch (const py::error_already_set& error) {
     rethrow_as_fault(error);
   }
@@ -80,7 +80,7 @@ class ShellView {
   py::object property(const std::string& name) const;
   std::vector<PortDescription> ports() const {
     const Shell& described = shell();
-    const py::gil_scoped_release release;  // ports have locks of their own
+    const InterpreterUnlocked release;  // ports have locks of their own
     return describe_ports(described);
   }
   std::vector<PropertyDescription> properties() const { return describe_properties(shell()); }

@@ -8,7 +8,7 @@
 namespace mauve::bindings {
 
 PythonCore::~PythonCore() {
-  const py::gil_scoped_acquire lock;
+  const InterpreterLocked lock;
   link_->shell = nullptr;
   link_->context = nullptr;
   methods_.clear();

@@ -17,7 +17,7 @@ class PythonFsm final : public FsmBase {
  public:
   explicit PythonFsm(std::shared_ptr<PythonObject> factory) : factory_(std::move(factory)) {}
   ~PythonFsm() override {
-    const py::gil_scoped_acquire lock;
+    const InterpreterLocked lock;
     link_->shell = nullptr;
   }
 

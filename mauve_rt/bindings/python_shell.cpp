@@ -102,7 +102,7 @@ PythonShell::PythonShell(const PartFactory& factory, const PluginRegistry& regis
 }
 
 PythonShell::~PythonShell() {
-  const py::gil_scoped_acquire lock;
+  const InterpreterLocked lock;
   link_->shell = nullptr;
   link_->context = nullptr;
 }
@@ -135,7 +135,7 @@ ReadMessage ShellView::read(const std::string& name) const {
   DataStatus status = DataStatus::none;
   time_ns_t time_ns = 0;
   {
-    const py::gil_scoped_release release;  // the resource has a lock of its own
+    const InterpreterUnlocked release;  // the resource has a lock of its own
     port.read_serialized(message, status, time_ns);
   }
   return py::make_tuple(to_bytes(message), static_cast<int>(status), time_ns);
@@ -144,7 +144,7 @@ ReadMessage ShellView::read(const std::string& name) const {
 bool ShellView::write(const std::string& name, const py::bytes& data) const {
   PortBase& port = require_port(name, PortKind::write);
   const std::string_view message = data;
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   return port.write_serialized(as_bytes_view(message));
 }
 
@@ -156,7 +156,7 @@ py::object ShellView::call(const std::string& name, const py::args& args, const 
 
 void ShellView::raise_event(const std::string& name) const {
   auto& port = dynamic_cast<EventPort&>(require_port(name, PortKind::event));
-  const py::gil_scoped_release release;
+  const InterpreterUnlocked release;
   port.raise();
 }
 

@@ -82,7 +82,7 @@ std::unique_ptr<Resource> make_resource(const py::object& part, const PluginRegi
 Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry) {
   const auto kept = std::make_shared<PythonObject>(part);
   return [kept, &registry] {
-    const py::gil_scoped_acquire lock;
+    const InterpreterLocked lock;
     return make_fsm(kept->get(), registry);
   };
 }
@@ -241,7 +241,7 @@ Its actions run on the component's thread under the interpreter's lock.)")
       .def(
           "describe_shell",
           [](const PluginRegistry& self, const std::string& name) {
-            const py::gil_scoped_release release;  // ports have locks of their own
+            const InterpreterUnlocked release;  // ports have locks of their own
             const auto shell = self.make_shell(name);
             return ShellDescription{name, describe_ports(*shell), describe_properties(*shell),
                                     shell->bytes()};

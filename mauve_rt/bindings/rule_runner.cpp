@@ -11,7 +11,7 @@ namespace mauve::bindings {
 
 namespace {
 
-using Unlocked = py::call_guard<py::gil_scoped_release>;
+using Unlocked = py::call_guard<InterpreterUnlocked>;
 
 /// Its threads end without the interpreter's lock, and before the interpreter does: they may need it for parts in Python.
 class PyRuleRunner {
@@ -24,7 +24,7 @@ class PyRuleRunner {
   }
   ~PyRuleRunner() {
     living().erase(this);
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     runner_.reset();
   }
   PyRuleRunner(const PyRuleRunner&) = delete;
@@ -34,7 +34,7 @@ class PyRuleRunner {
 
   static void stop_all() {
     const std::set<PyRuleRunner*> all = living();
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     for (PyRuleRunner* each : all) each->runner_->stop();
   }
 

@@ -8,7 +8,7 @@ namespace mauve::bindings {
 
 namespace {
 
-using Unlocked = py::call_guard<py::gil_scoped_release>;
+using Unlocked = py::call_guard<InterpreterUnlocked>;
 
 constexpr auto kSignalNames =
     std::to_array<std::string_view>({"message", "write", "field", "overruns", "late", "release", "state",

@@ -8,7 +8,7 @@ namespace mauve::bindings {
 namespace {
 
 // Time passes without the interpreter's lock; callbacks and components written in Python take it when they run.
-using Unlocked = py::call_guard<py::gil_scoped_release>;
+using Unlocked = py::call_guard<InterpreterUnlocked>;
 using Callback = Typed<"typing.Callable[[], object]">;
 
 /// A simulation whose last words need no lock of the interpreter's.
@@ -16,7 +16,7 @@ class PySimulation {
  public:
   PySimulation(bool trace, time_ns_t begin_ns) : simulation({.trace = trace, .begin_ns = begin_ns}) {}
   ~PySimulation() {
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     simulation.shutdown();
   }
   PySimulation(const PySimulation&) = delete;

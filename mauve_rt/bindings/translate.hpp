@@ -11,6 +11,7 @@
 
 #include "mauve_rt/mauve_rt.hpp"
 
+#include "interpreter.hpp"
 #include "text.hpp"
 #include "types.hpp"
 
@@ -138,7 +139,7 @@ struct PyArchitecture {
   explicit PyArchitecture(PluginRegistry& plugins)
       : registry(plugins), owned(std::make_unique<Architecture>(&plugins)), architecture(*owned) {}
   ~PyArchitecture() {
-    const py::gil_scoped_release release;  // a component thread may need the interpreter to come to its end
+    const InterpreterUnlocked release;  // a component thread may need the interpreter to come to its end
     owned.reset();
   }
   PyArchitecture(const PyArchitecture&) = delete;

@@ -84,7 +84,7 @@ class ValueLog {
 Typed<"list[tuple[bytes, int]]"> take(ValueLog& self) {
   ValueLog::Writes writes;
   {
-    const py::gil_scoped_release release;
+    const InterpreterUnlocked release;
     writes = self.take();
   }
   py::list all;
@@ -97,7 +97,7 @@ Typed<"list[tuple[bytes, int]]"> take(ValueLog& self) {
 }  // namespace
 
 void bind_value_log(py::module_& module) {
-  using Unlocked = py::call_guard<py::gil_scoped_release>;
+  using Unlocked = py::call_guard<InterpreterUnlocked>;
   py::class_<ValueLog>(
       module, "ValueLog",
       "Every write to the resource of a name, also when another one takes that name. For one thread.")
