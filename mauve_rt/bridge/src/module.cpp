@@ -7,6 +7,7 @@
 
 #include "bridge.hpp"
 #include "console.hpp"
+#include "interpreter.hpp"
 #include "node_watch.hpp"
 #include "parameters.hpp"
 #include "stop_guard.hpp"
@@ -116,7 +117,7 @@ PYBIND11_MODULE(_bridge, module) {
   module.doc() =
       "Resources on ROS topics and services, natively, on a node of rclpy's. C++: mauve_rt/bridge.";
   // What the threads wait for may want the interpreter's lock: never wait for them under it.
-  using Unlocked = py::call_guard<py::gil_scoped_release>;
+  using Unlocked = py::call_guard<bindings::InterpreterUnlocked>;
   module.def("start_console", &Console::start,
              R"(From here on a thread of its own writes the process's log lines to the console.
 

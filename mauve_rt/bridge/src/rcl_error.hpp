@@ -2,6 +2,7 @@
 // What rcl says when it refuses, as this project's errors.
 #pragma once
 
+#include <rcl/context.h>
 #include <rcl/types.h>
 
 #include <string>
@@ -16,5 +17,11 @@ void check(rcl_ret_t outcome, const std::string& what, const std::string& elemen
 
 /// Whether rcl or rmw did it; what they say otherwise is for nobody. [non-rt]
 bool went_well(rcl_ret_t outcome);
+
+enum class Waited { well, failed, for_the_last_time };
+
+/// How a wait ended: after the last one the context was shut down. After a failure the thread pauses, and waits again: what it
+/// receives is lost for as long, not for good. Logs the error, every 10 s at most. [non-rt]
+Waited after_wait(rcl_ret_t outcome, const rcl_context_t& context);
 
 }  // namespace mauve::bridge

@@ -47,7 +47,10 @@ void Receiver::run() {
   }
   for (;;) {
     const time_ns_t waited_ns = monotonic_now_ns();  // before the middleware looks
-    if (ending_.load(std::memory_order_acquire) || !wait(set)) break;
+    if (ending_.load(std::memory_order_acquire)) break;
+    const Waited waited = after_wait(wait(set), context_);
+    if (waited == Waited::for_the_last_time) break;
+    if (waited == Waited::failed) continue;
     for (Arrival* arrival : arrivals_) {
       if (arrival->has_arrived(set)) {
         arrival->take();
@@ -66,13 +69,12 @@ time_ns_t Receiver::longest_wait_ns() const {
   return -1;  // for ever
 }
 
-bool Receiver::wait(rcl_wait_set_t& set) {
-  if (rcl_wait_set_clear(&set) != RCL_RET_OK) return false;
-  if (rcl_wait_set_add_guard_condition(&set, &wake_, nullptr) != RCL_RET_OK) return false;
+rcl_ret_t Receiver::wait(rcl_wait_set_t& set) {
+  rcl_ret_t outcome = rcl_wait_set_clear(&set);
+  if (outcome == RCL_RET_OK) outcome = rcl_wait_set_add_guard_condition(&set, &wake_, nullptr);
+  if (outcome != RCL_RET_OK) return outcome;
   for (Arrival* arrival : arrivals_) arrival->join(set);
-  const rcl_ret_t outcome = rcl_wait(&set, longest_wait_ns());
-  if (outcome != RCL_RET_OK) rcl_reset_error();
-  return outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT;  // else the context was shut down
+  return rcl_wait(&set, longest_wait_ns());
 }
 
 }  // namespace mauve::bridge

@@ -54,7 +54,7 @@ class Receiver {
 
  private:
   void run();
-  bool wait(rcl_wait_set_t& set);
+  rcl_ret_t wait(rcl_wait_set_t& set);
   time_ns_t longest_wait_ns() const;
 
   rcl_context_t& context_;

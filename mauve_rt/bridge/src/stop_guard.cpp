@@ -135,27 +135,28 @@ void StopGuard::run() {
   }
   while (!ending_.load(std::memory_order_acquire)) {
     const bool is_busy = !stops_.empty() || is_unread();
+    const rcl_context_t& context = *guarded_.node.context;
     // A request that is unread ends a wait for requests at once.
-    if (is_busy && !wait(set, stops_.empty() ? kUnreadLook : kStopLook, false)) break;
-    if (!wait(set, is_busy ? 0 : -1, true)) break;
-    look(set);
+    Waited waited = Waited::well;
+    if (is_busy) waited = after_wait(wait(set, stops_.empty() ? kUnreadLook : kStopLook, false), context);
+    if (waited == Waited::well) waited = after_wait(wait(set, is_busy ? 0 : -1, true), context);
+    if (waited == Waited::for_the_last_time) break;
+    if (waited == Waited::well) look(set);
     carry_out_all();
   }
   carry_out_all();  // everything is stopped by now
   if (rcl_wait_set_fini(&set) != RCL_RET_OK) rcl_reset_error();
 }
 
-/// False when the context was shut down. A time of -1: for ever.
-bool StopGuard::wait(rcl_wait_set_t& set, time_ns_t timeout_ns, bool for_requests) {
-  if (rcl_wait_set_clear(&set) != RCL_RET_OK) return false;
-  if (rcl_wait_set_add_guard_condition(&set, &wake_, nullptr) != RCL_RET_OK) return false;
+/// A time of -1: for ever.
+rcl_ret_t StopGuard::wait(rcl_wait_set_t& set, time_ns_t timeout_ns, bool for_requests) {
+  rcl_ret_t outcome = rcl_wait_set_clear(&set);
+  if (outcome == RCL_RET_OK) outcome = rcl_wait_set_add_guard_condition(&set, &wake_, nullptr);
   for (Watched& watched : watched_) {
-    if (for_requests && !went_well(rcl_wait_set_add_service(&set, &watched.service, &watched.place)))
-      return false;
+    if (for_requests && outcome == RCL_RET_OK)
+      outcome = rcl_wait_set_add_service(&set, &watched.service, &watched.place);
   }
-  const rcl_ret_t outcome = rcl_wait(&set, timeout_ns);
-  if (outcome != RCL_RET_OK) rcl_reset_error();
-  return outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT;
+  return outcome == RCL_RET_OK ? rcl_wait(&set, timeout_ns) : outcome;
 }
 
 /// Who reads its requests has read all of them at some look.

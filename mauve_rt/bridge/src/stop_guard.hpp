@@ -102,7 +102,7 @@ class StopGuard {
   };
 
   void run();
-  bool wait(rcl_wait_set_t& set, time_ns_t timeout_ns, bool for_requests);
+  rcl_ret_t wait(rcl_wait_set_t& set, time_ns_t timeout_ns, bool for_requests);
   void look(const rcl_wait_set_t& set);
   bool is_unread() const noexcept;
   void take_stops();
