@@ -134,7 +134,8 @@ RecentMaxima take_recent_maxima(const Component& component) {
                       statistics.wakeup.maximum().take_recent_ns(),
                       statistics.response.take_recent_ns(),
                       {}};
-  for (const auto& [state, time] : *component.state_times())
+  const auto times = component.state_times();  // keeps them to the end of the loop
+  for (const auto& [state, time] : *times)
     maxima.execution_ns[state] = time.maximum().take_recent_ns();
   return maxima;
 }

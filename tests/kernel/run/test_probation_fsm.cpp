@@ -108,7 +108,8 @@ class FsmProbations : public Probations<Way> {
   }
   static std::vector<std::string> timed_states(const Component& component) {
     std::vector<std::string> names;
-    for (const StateTime& time : *component.state_times()) names.push_back(time.state);
+    const auto times = component.state_times();  // keeps them to the end of the loop
+    for (const StateTime& time : *times) names.push_back(time.state);
     return names;
   }
   void expect_old_parts_run_on(Component& component) {
