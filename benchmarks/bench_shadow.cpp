@@ -106,7 +106,7 @@ void measure_ports(const bench::Options& options, bench::JsonLine& line) {
                        {"tapped_write", [&](std::int64_t calls) { tapped.write(calls); }},
                        {"watched_write", [&](std::int64_t calls) { watched.write(calls); }}});
   micro.compare(line, {{"capture", [&](std::int64_t calls) { tapped.end_releases(calls); }}});
-  watched.shell.output.unwatch();
+  watched.shell.output.unwatch(limit);
 }
 
 // ---- releases of a deployed component

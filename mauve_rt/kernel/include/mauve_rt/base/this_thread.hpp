@@ -25,7 +25,7 @@ std::uint32_t ask_thread_id() MAUVE_RT;
 
 /// The system's id of the calling thread, as futexes with priority inheritance know it. [rt]
 inline std::uint32_t this_thread_id() MAUVE_RT {
-  const std::uint32_t id = detail::thread_id;
+  const std::uint32_t id = MAUVE_RT_TRUSTED(detail::thread_id);  // no call: in the initial block
   return id != 0 ? id : detail::ask_thread_id();
 }
 
