@@ -135,8 +135,7 @@ RecentMaxima take_recent_maxima(const Component& component) {
                       statistics.response.take_recent_ns(),
                       {}};
   const auto times = component.state_times();  // keeps them to the end of the loop
-  for (const auto& [state, time] : *times)
-    maxima.execution_ns[state] = time.maximum().take_recent_ns();
+  for (const auto& [state, time] : *times) maxima.execution_ns[state] = time.maximum().take_recent_ns();
   return maxima;
 }
 
