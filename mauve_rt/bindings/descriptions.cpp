@@ -277,7 +277,7 @@ void bind_descriptions(py::module_& module) {
           "Declared max_execution of current_state; 0: none, or a wait.")
       .def_property_readonly(
           "hung_after_ns", [](const C& self) { return self.state_age.hung_after_ns; },
-          "An older state is told as hung.")
+          "An older state is reported as hung.")
       .def_property_readonly(
           "waiting", [](const C& self) { return self.state_age.is_wait; }, "current_state is a wait.")
       .def_property_readonly("hung", [](const C& self) { return self.state_age.is_hung(); });

@@ -237,7 +237,7 @@ On threads: creates these, meets them at the barrier first. Shortens the interpr
 to 0.1 ms where it is longer, for components in Python.)")
       .def(
           "shutdown", [](PyHost& self) { self.host().shutdown(); }, Unlocked(),
-          R"(Stops in reverse order (outputs written), joins the threads; waits for nobody's preparation.
+          R"(Stops in reverse order (outputs written), joins the threads; waits for no preparation.
 
 The architecture can be deployed again.)")
       .def(

@@ -30,10 +30,8 @@ bool went_well(rcl_ret_t outcome) {
 }
 
 Waited after_wait(rcl_ret_t outcome, const rcl_context_t& context) {
-  if (outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT) {
-    if (outcome != RCL_RET_OK) rcl_reset_error();
-    return Waited::well;
-  }
+  if (outcome == RCL_RET_TIMEOUT) rcl_reset_error();
+  if (outcome == RCL_RET_OK || outcome == RCL_RET_TIMEOUT) return Waited::well;
   const std::string message = take_rcl_message();
   if (!rcl_context_is_valid(&context)) return Waited::for_the_last_time;
   RCUTILS_LOG_ERROR_THROTTLE_NAMED(rcutils_steady_time_now, kLogEveryMs, "bridge",

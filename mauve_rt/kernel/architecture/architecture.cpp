@@ -196,12 +196,14 @@ Runner* Architecture::host() const {
 }
 
 void Architecture::set_host(Runner& host) {
-  const std::lock_guard lock(host_mutex_);
-  if (host_ != nullptr) {
-    throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
-                {.expected = "an architecture without a host", .remedy = "shut its host down first"});
+  {
+    const std::lock_guard lock(host_mutex_);
+    if (host_ != nullptr) {
+      throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
+                  {.expected = "an architecture without a host", .remedy = "shut its host down first"});
+    }
+    host_ = &host;
   }
-  host_ = &host;
   for (const auto& resource : resources()) {
     for (ServiceBase* service : resource->services()) service->forget_floor();
   }

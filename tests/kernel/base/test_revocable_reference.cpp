@@ -30,7 +30,7 @@ TEST(RevocableReference, NoObjectIsUsedAfterItWasRevokedNorLost) {
     for (int i = 0; i < kObjects; ++i) {
       auto& object = is_revoked[static_cast<std::size_t>(i)];
       reference.set(object);
-      if (!reference.is(object)) ++lost;  // it is revoked only when it is told of
+      if (!reference.is(object)) ++lost;  // the other thread waits for `newest`
       newest.store(i);
       for (int turn = 0; turn < 3; ++turn)
         reference.use([&](std::atomic<bool>& used) { used_late += used.load() ? 1 : 0; });

@@ -113,22 +113,25 @@ def test_a_missing_tool_is_among_the_packages_to_install(program: str, tmp_path:
     assert not {packages.get(other, other) for other in others} & set(bare.stdout.split())
 
 
+def missing_packages(folder: Path, **settings: str) -> list[str]:
+    """What setup would install where nothing is."""
+    path = folder_of_programs(folder / "path", "python3", "bash", "dirname")
+    command = bash(f"PATH={path}; missing_system_packages || true", **settings)
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+
+
 @pytest.mark.parametrize("with_tests", ["true", "false"])
 def test_ccache_comes_with_the_tests(with_tests: str, tmp_path: Path):
-    path = folder_of_programs(tmp_path / "path", "python3", "bash", "dirname")
-    command = bash(f"PATH={path}; missing_system_packages || true", with_tests=with_tests)
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert ("ccache" in said.split()) is (with_tests == "true")
+    assert ("ccache" in missing_packages(tmp_path, with_tests=with_tests)) is (with_tests == "true")
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root installs it without a question")
 @pytest.mark.skipif(Path("/usr/include/boost").exists(), reason="Boost is installed")
 @pytest.mark.parametrize("with_benchmarks", ["true", "false"])
 def test_boost_comes_with_the_benchmarks(with_benchmarks: str, tmp_path: Path):
-    path = folder_of_programs(tmp_path / "path", "python3", "bash", "dirname")
-    command = bash(f"PATH={path}; missing_system_packages || true", with_benchmarks=with_benchmarks)
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert ("libboost-dev" in said.split()) is (with_benchmarks == "true")
+    assert ("libboost-dev" in missing_packages(tmp_path, with_benchmarks=with_benchmarks)) is (
+        with_benchmarks == "true"
+    )
 
 
 @pytest.fixture
