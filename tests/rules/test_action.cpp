@@ -4,7 +4,7 @@
 
 #include "hosts.hpp"
 
-namespace mauve::rules {
+namespace mauve::rules::test_action {
 namespace {
 
 using namespace mauve::testing;  // NOLINT(google-build-using-namespace): the kernel's fixtures
@@ -52,4 +52,4 @@ TYPED_TEST(ActionTest, WhatIsCalledOffChangesNothing) {
 }
 
 }  // namespace
-}  // namespace mauve::rules
+}  // namespace mauve::rules::test_action

@@ -11,7 +11,7 @@
 #include "mauve_rt/rules/engine.hpp"
 #include "mauve_rt/run/task.hpp"
 
-namespace mauve::rules {
+namespace mauve::rules::test_engine {
 namespace {
 
 using ::testing::ElementsAre;
@@ -858,4 +858,4 @@ TEST(Rules, WhatIsToldOnOtherThreadsIsSeen) {
 }
 
 }  // namespace
-}  // namespace mauve::rules
+}  // namespace mauve::rules::test_engine

@@ -6,7 +6,7 @@
 
 #include "hosts.hpp"
 
-namespace mauve::rules {
+namespace mauve::rules::test_rule_runner {
 namespace {
 
 using namespace mauve::testing;  // NOLINT(google-build-using-namespace): the kernel's fixtures
@@ -779,4 +779,4 @@ TYPED_TEST(RuleRunnerTest, OnlyOneListensToAComponent) {
 }
 
 }  // namespace
-}  // namespace mauve::rules
+}  // namespace mauve::rules::test_rule_runner

@@ -7,7 +7,7 @@
 
 #include "mauve_rt/rules/engine.hpp"
 
-namespace mauve::rules {
+namespace mauve::rules::test_signal {
 namespace {
 
 constexpr double kBound = 10.0;
@@ -164,4 +164,4 @@ TEST(Signal, NoPulseOfAnotherThreadIsLost) {
 }
 
 }  // namespace
-}  // namespace mauve::rules
+}  // namespace mauve::rules::test_signal
