@@ -89,7 +89,8 @@ def build_variant(builds: Path, *macros: str) -> Path:
         objects.append(builds / f"{_file_name(source, given)}.o")
         if not objects[-1].exists():
             compile_source(PLUGINS / f"{source}.cpp", objects[-1], *(f"-D{macro}" for macro in given))
-    link(objects, library, "-Wl,-soname,libreload_tests.so")
+    name = "libreload_other.so" if "OTHER_LIBRARY" in macros else "libreload_tests.so"
+    link(objects, library, f"-Wl,-soname,{name}")
     return library
 
 

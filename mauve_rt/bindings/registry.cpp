@@ -184,6 +184,9 @@ A second call for one path does nothing.)")
            "Puts the kept entries in force and keeps those that go out.")
       .def("generation_of", &PluginRegistry::generation_of, py::arg("kind"), py::arg("name"),
            "1 as first loaded; 0: there is no such entry.")
+      .def("classes_of", &PluginRegistry::classes_of, py::arg("kind"), py::arg("name"),
+           "The C++ class of a shell or core and its bases, of an fsm those of its core, by the compiler's "
+           "names.")
       .def("type_shapes", &PluginRegistry::type_shapes, "The structs of the registered data types.")
       .def(
           "add_python_core",

@@ -6,7 +6,7 @@ loaded. Its parts are in force for the registry: whatever is made from then on i
 
 import itertools
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +14,7 @@ from typing import Any
 
 from mauve_rt._kernel import PluginGeneration, PluginRegistry
 from mauve_rt.errors import PluginError
+from mauve_rt.model.base_classes import check_base_classes, derived_shells
 from mauve_rt.model.code_layouts import check_types, is_same_shell
 from mauve_rt.model.loaded_code import LoadedCode, Stamps
 
@@ -101,14 +102,15 @@ class CodeGenerations:
         *,
         in_use: Collection[Name],
         in_python: Collection[Name],
+        source_of: Callable[[str, str], str],
         add_python_parts: Any,
         dry_run: bool = False,
     ) -> Generation | None:
         """Try rebuilt code in a process of its own, then load it and put it in force in the registry.
 
         `in_use`: parts that components have now, which the new code has to have, too.
-        `in_python`: parts that are no C++ classes. `add_python_parts(module, loaded_module)` registers the
-        parts of a Python module.
+        `in_python`: parts that are no C++ classes. `source_of(kind, name)`: from where a part was loaded.
+        `add_python_parts(module, loaded_module)` registers the parts of a Python module.
 
         Returns None after a dry run.
 
@@ -118,7 +120,14 @@ class CodeGenerations:
         import tempfile  # noqa: PLC0415 - needed by a reload only
 
         with tempfile.TemporaryDirectory(prefix="mauve_rt_") as folder:
-            candidate = self._try(sources, registry, in_use=in_use, in_python=in_python, folder=Path(folder))
+            candidate = self._try(
+                sources,
+                registry,
+                in_use=in_use,
+                in_python=in_python,
+                source_of=source_of,
+                folder=Path(folder),
+            )
             if dry_run:
                 return None
             kept = PluginGeneration()
@@ -212,6 +221,7 @@ class CodeGenerations:
         *,
         in_use: Collection[Name],
         in_python: Collection[Name],
+        source_of: Callable[[str, str], str],
         folder: Path,
     ) -> _Candidate:
         from mauve_rt.model.plugin_trial import Copies, try_plugins  # noqa: PLC0415
@@ -236,6 +246,9 @@ class CodeGenerations:
         names = names_of(sources)
         _check_kept(answer, names_of(libraries), in_use)
         check_types(answer["types"], registry, names)
+        check_base_classes(
+            answer["classes"], registry, names, lambda base: self._loaded.changed_files(source_of(*base))
+        )
         outdated = [name for name in _outdated(answer, names, registry) if name not in in_python]
         _check_not_in_use(outdated, in_use)
         return _Candidate(
@@ -328,15 +341,18 @@ def _check_not_in_use(outdated: Collection[Name], in_use: Collection[Name]) -> N
 
 
 def _outdated(answer: Mapping[str, Any], names: Collection[Name], registry: PluginRegistry) -> list[Name]:
-    """Cores and fsms of other libraries, compiled for a shell that has other members now."""
+    """Parts of other libraries, compiled for a shell that has other members now."""
     changed = {
         name
         for name, shell in answer["shells"].items()
         if name in registry.names("shell") and not is_same_shell(shell, registry.describe_shell(name))
     }
-    return [
+    derived = {name for name in derived_shells(registry, changed) if ("shell", name) not in names}
+    changed |= derived
+    users = [
         (kind, name)
         for kind, shell_of in (("core", registry.core_shell), ("fsm", registry.fsm_shell))
         for name in registry.names(kind)
         if (kind, name) not in names and shell_of(name) in changed
     ]
+    return users + [("shell", name) for name in sorted(derived)]

@@ -54,6 +54,7 @@ def try_plugins(
 
         {"names": {kind: [name, ...]},
          "shells": {name: its shell_layout()},
+         "classes": registered_classes(),
          "types": {name: its layout_of()},
          "copied": [library, ...], "opened": [copy, or a library that it needs, ...]}
 

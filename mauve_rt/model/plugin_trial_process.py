@@ -18,6 +18,7 @@ from typing import Any
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
+from mauve_rt.model.base_classes import registered_classes
 from mauve_rt.model.code_layouts import registered_layouts, shell_layout
 from mauve_rt.model.library_copies import copy_libraries, loaded_dependencies
 from mauve_rt.model.module_generations import load_module
@@ -111,6 +112,7 @@ def _try(request: dict[str, Any], report: Report) -> dict[str, Any]:
     return {
         "names": {kind: registry.names(kind) for kind in KINDS},
         "shells": shells,
+        "classes": registered_classes(registry),
         "copied": copied,
         "opened": libraries,
         "types": registered_layouts(registry, list(shells)),

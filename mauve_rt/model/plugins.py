@@ -238,6 +238,7 @@ class PluginLoader:
             self.registry,
             in_use=in_use,
             in_python={(plugin.kind, plugin.name) for plugin in self.index if plugin.is_python},
+            source_of=self.source_of,
             add_python_parts=self._add_parts_of,
             dry_run=dry_run,
         )

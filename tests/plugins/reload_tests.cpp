@@ -24,6 +24,11 @@ struct LoopShell : mauve::Shell {
 };
 
 class Loop : public mauve::Core<LoopShell> {
+#ifdef OTHER_METHODS
+ public:
+  virtual void first() {}
+#endif
+
  protected:
   double sum() const { return sum_; }
 #ifdef OTHER_STATE
@@ -51,6 +56,7 @@ class Loop : public mauve::Core<LoopShell> {
 
 /// Of a library of its own, which is not built again.
 class Other : public Loop {};
+struct WideShell : LoopShell {};
 
 // Each does one thing wrong, at its third release.
 
@@ -118,6 +124,7 @@ class LoopFsm : public mauve::Fsm<LoopShell, Loop> {
 #ifdef OTHER_LIBRARY
 MAUVE_PLUGINS(registry) {
   registry.core<reload_tests::Other>("reload_tests/Other", "reload_tests/LoopShell");
+  registry.shell<reload_tests::WideShell>("reload_tests/WideShell");
 }
 #else
 MAUVE_PLUGINS(registry) {

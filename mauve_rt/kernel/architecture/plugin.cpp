@@ -154,6 +154,11 @@ void PluginRegistry::load_library(const std::string& path) {
     throw Error(ErrorCode::plugin, "the library registers no plug-ins",
                 {.element = path, .expected = "a MAUVE_PLUGINS(registry) function", .found = "none"});
   }
+  struct Loading {
+    std::string& library;
+    ~Loading() { library.clear(); }
+  };
+  const Loading loading{loading_ = path};
   try {
     register_plugins(*this);
   } catch (const Error&) {
@@ -165,15 +170,60 @@ void PluginRegistry::load_library(const std::string& path) {
   libraries_.insert(path);
 }
 
-void PluginRegistry::add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory) {
-  add(&PluginRegistry::shells_, name, "shell " + name, Entry<Shell>{"", std::move(factory)});
+void PluginRegistry::add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory,
+                               std::vector<std::string> classes) {
+  const std::lock_guard lock(mutex_);
+  add(&PluginRegistry::shells_, name, "shell " + name,
+      Entry<Shell>{
+          .shell = "", .make = std::move(factory), .classes = std::move(classes), .library = loading_});
 }
-void PluginRegistry::add_core(const std::string& name, const std::string& shell_name, CoreFactory factory) {
-  add(&PluginRegistry::cores_, name, "core " + name, Entry<CoreBase>{shell_name, std::move(factory)});
+void PluginRegistry::add_core(const std::string& name, const std::string& shell_name, CoreFactory factory,
+                              std::vector<std::string> classes) {
+  const std::lock_guard lock(mutex_);
+  add(&PluginRegistry::cores_, name, "core " + name,
+      Entry<CoreBase>{.shell = shell_name,
+                      .make = std::move(factory),
+                      .classes = std::move(classes),
+                      .library = loading_});
+  note_builds();
 }
 void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_name,
-                             std::function<std::unique_ptr<FsmBase>()> factory) {
-  add(&PluginRegistry::fsms_, name, "fsm " + name, Entry<FsmBase>{shell_name, std::move(factory)});
+                             std::function<std::unique_ptr<FsmBase>()> factory,
+                             std::vector<std::string> classes) {
+  const std::lock_guard lock(mutex_);
+  add(&PluginRegistry::fsms_, name, "fsm " + name,
+      Entry<FsmBase>{.shell = shell_name,
+                     .make = std::move(factory),
+                     .classes = std::move(classes),
+                     .library = loading_});
+  note_builds();
+}
+
+void PluginRegistry::note_builds() {
+  std::map<std::string, int>
+      in_force;  // of each class, by the core, else the fsm, that was registered for it
+  const auto collect = [&in_force](const auto& entries) {
+    for (const auto& [name, entry] : entries)
+      if (!entry.classes.empty()) in_force.emplace(entry.classes.front(), entry.generation);
+  };
+  collect(cores_);
+  collect(fsms_);
+  const auto note = [&](auto& entries) {
+    for (auto& [name, entry] : entries) {
+      // The parts of a generation are registered in any order: a later one may define the class of an earlier one.
+      const bool is_new =
+          entry.builds == nullptr || (replaced_ != nullptr && entry.generation == generation_);
+      if (!is_new || entry.classes.empty()) continue;
+      ClassBuilds builds{.library = entry.library, .classes = {}};
+      for (const std::string& each : entry.classes) {
+        const auto found = in_force.find(each);
+        builds.classes.push_back({each, found != in_force.end() ? found->second : entry.generation});
+      }
+      entry.builds = std::make_shared<const ClassBuilds>(std::move(builds));
+    }
+  };
+  note(cores_);
+  note(fsms_);
 }
 void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
   const std::string name = kind.name;
@@ -250,6 +300,17 @@ int PluginRegistry::generation_of(const std::string& kind, const std::string& na
   return kind == "resource" ? in(resources_) : 0;
 }
 
+std::vector<std::string> PluginRegistry::classes_of(const std::string& kind, const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto in = [&name](const auto& entries) {
+    const auto found = entries.find(name);
+    return found == entries.end() ? std::vector<std::string>{} : found->second.classes;
+  };
+  if (kind == "shell") return in(shells_);
+  if (kind == "core") return in(cores_);
+  return kind == "fsm" ? in(fsms_) : std::vector<std::string>{};
+}
+
 std::vector<MessageShape> PluginRegistry::type_shapes() const {
   const std::lock_guard lock(mutex_);
   std::vector<MessageShape> shapes;
@@ -266,6 +327,7 @@ auto make_part(const Entry& entry, const std::string& kind, const std::string& n
   auto part = made(kind + " " + name, entry.make);
   part->set_implementation(name);
   part->set_generation(entry.generation);
+  part->set_class_builds(entry.builds);
   return part;
 }
 

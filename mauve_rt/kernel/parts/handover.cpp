@@ -48,8 +48,8 @@ std::string detail::state_name(std::string_view member) {
 }
 
 Handover::Handover(CoreBase& old, CoreBase& fresh) : old_(old), fresh_(fresh) {
-  if (old.generation() != fresh.generation() && !fresh.is_dynamic())
-    stranger_ = std::make_unique<Stranger>(old);
+  const bool is_stranger = old.generation() != fresh.generation() || find_other_build(old, fresh) != nullptr;
+  if (is_stranger && !fresh.is_dynamic()) stranger_ = std::make_unique<Stranger>(old);
   const std::vector<StateField> before = old.state_fields();
   const std::vector<StateField> now = fresh.state_fields();
   const auto named = [](const std::vector<StateField>& fields, const std::string& name) {

@@ -465,7 +465,9 @@ void Component::prepare_fallback() {
 
 void Component::check_fallback(const Shell& shell, const FsmBase& fsm) const {
   if (spare_ == nullptr) return;
-  if (spare_->accepts(shell) && fsm.bind_core(*spare_).is_bound()) return;
+  const std::unique_ptr<CoreBase> rebuilt = rebuilt_core(*spare_);  // renew_fallback() puts it in
+  CoreBase& core = rebuilt != nullptr ? *rebuilt : *spare_;
+  if (core.accepts(shell) && fsm.bind_core(core).is_bound()) return;
   throw Error(ErrorCode::type_mismatch, "the fallback core would not suit the new parts",
               {.component = name_,
                .element = "fallback " + fallback_name_,

@@ -82,25 +82,34 @@ class PluginRegistry {
   std::uint32_t version() const MAUVE_RT { return version_.load(std::memory_order_acquire); }
   /// Of the entry: 1, or that of begin_generation(); 0: there is none. `kind`: "shell", "core", "fsm" or "resource".
   int generation_of(const std::string& kind, const std::string& name) const;
+  /// Of the entry's class and its bases, of an fsm those of the core that it runs: user_classes(). Empty: it was written in
+  /// another language, or is of a class of MAUVE RT. `kind`: "shell", "core" or "fsm".
+  std::vector<std::string> classes_of(const std::string& kind, const std::string& name) const;
   /// The structs of the registered data types, as this process holds them.
   std::vector<MessageShape> type_shapes() const;
 
   template <typename ShellType>
   void shell(const std::string& name) {
-    add_shell(name, [] {
-      auto shell = std::make_unique<ShellType>();
-      shell->set_bytes(sizeof(ShellType));
-      return shell;
-    });
+    add_shell(
+        name,
+        [] {
+          auto shell = std::make_unique<ShellType>();
+          shell->set_bytes(sizeof(ShellType));
+          return shell;
+        },
+        user_classes(typeid(ShellType)));
   }
   /// `shell_name`: the shell it was written for.
   template <typename CoreType>
   void core(const std::string& name, const std::string& shell_name) {
-    add_core(name, shell_name, [] { return std::make_unique<CoreType>(); });
+    add_core(name, shell_name, [] { return std::make_unique<CoreType>(); }, user_classes(typeid(CoreType)));
   }
   template <typename FsmType>
   void fsm(const std::string& name, const std::string& shell_name) {
-    add_fsm(name, shell_name, [] { return std::make_unique<FsmType>(); });
+    std::vector<std::string> classes;
+    if constexpr (requires { typename FsmType::core_type; })
+      classes = user_classes(typeid(typename FsmType::core_type));
+    add_fsm(name, shell_name, [] { return std::make_unique<FsmType>(); }, std::move(classes));
   }
   /// A resource of the plug-in's own; `name` is its kind in architecture files. It is made of its parameters, where
   /// a static parameters() says which they are.
@@ -129,12 +138,14 @@ class PluginRegistry {
     add_given<S>(std::string(CallTraits<S>::name));
   }
 
-  // The same with a factory, for parts that are no C++ class of their own.
+  // The same with a factory, for parts that are no C++ class of their own. `classes`: as of classes_of().
 
-  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory);
-  void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory);
+  void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory,
+                 std::vector<std::string> classes = {});
+  void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory,
+                std::vector<std::string> classes = {});
   void add_fsm(const std::string& name, const std::string& shell_name,
-               std::function<std::unique_ptr<FsmBase>()> factory);
+               std::function<std::unique_ptr<FsmBase>()> factory, std::vector<std::string> classes = {});
   /// A kind without types.
   void add_resource(ResourceKind kind, ResourceFactory factory);
 
@@ -175,7 +186,10 @@ class PluginRegistry {
   struct Entry {
     std::string shell;
     std::function<std::unique_ptr<Product>()> make;
+    std::vector<std::string> classes{};
+    std::string library{};  // empty: none
     int generation{1};
+    std::shared_ptr<const ClassBuilds> builds{};  // of the classes, as they were in force at its registration
   };
   template <typename Product>
   using Entries = std::map<std::string, Entry<Product>>;
@@ -226,11 +240,14 @@ class PluginRegistry {
     }
     return false;
   }
+  /// For which builds of their classes new cores and fsms were compiled: those in force, or of the same generation.
+  void note_builds();
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
   [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const;
 
   mutable std::recursive_mutex mutex_;  // a library registers its parts under it
   std::set<std::string> libraries_;
+  std::string loading_;  // the library that registers its parts now
   Entries<Shell> shells_;
   Entries<CoreBase> cores_;
   Entries<FsmBase> fsms_;

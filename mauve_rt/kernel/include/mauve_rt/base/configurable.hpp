@@ -2,8 +2,11 @@
 // configure() / cleanup() with overridable hooks.
 #pragma once
 
+#include <memory>
 #include <string>
+#include <utility>
 
+#include "mauve_rt/base/class_builds.hpp"
 #include "mauve_rt/base/rt.hpp"
 
 namespace mauve {
@@ -52,9 +55,16 @@ class ConfigurablePart : public Configurable {
   int generation() const MAUVE_RT { return generation_; }
   /// [setup]
   void set_generation(int generation) noexcept { generation_ = generation; }
+  /// nullptr: no library registered the part, so all its classes are of the program itself. [rt]
+  const ClassBuilds* class_builds() const MAUVE_RT { return class_builds_.get(); }
+  /// [setup]
+  void set_class_builds(std::shared_ptr<const ClassBuilds> builds) noexcept {
+    class_builds_ = std::move(builds);
+  }
 
  private:
   int generation_{1};
+  std::shared_ptr<const ClassBuilds> class_builds_;
 };
 
 }  // namespace mauve

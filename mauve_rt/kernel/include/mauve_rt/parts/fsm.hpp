@@ -233,8 +233,10 @@ class Fsm : public FsmBase {
     return shell_ != nullptr;
   }
   CoreBinding bind_core(CoreBase& core) const override {
-    // Its methods, compiled into the fsm, are those of its own build; virtual ones of a base class are the core's.
+    // Its methods, compiled into the fsm, are those of its own build; virtual ones of a base class are the core's. Where they
+    // stand in the core's table the fsm knows by its own build of the base class, which has to be the core's.
     if (typeid(core) == typeid(CoreType)) require_same_generation(core);
+    require_same_builds(*this, core);
     if (auto* typed = dynamic_cast<CoreType*>(&core))
       return {.object = typed, .dynamic = nullptr, .method_slots = {}};
     if (auto* dynamic = dynamic_cast<DynamicCore*>(&core)) return bind_dynamic(*dynamic);
