@@ -73,6 +73,11 @@ void Draft::check_structural(const DraftComponent& component) {
 
 /// The old core is to go back in as it is, with an old fsm, into the parts that they were configured with.
 void Draft::check_probation(const DraftComponent& component) const {
+  try {
+    if (component.probation) check_options(*component.probation, component.name());
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), component.core_step);
+  }
   const auto refuse = [&](ErrorCode code, const char* what, const char* expected, const char* remedy) {
     throw Error(code, what,
                 {.component = component.name(),

@@ -55,12 +55,12 @@ void check_stack(Component& component, std::size_t stack_bytes) {
 }  // namespace
 
 Simulation::Simulation(SimulationOptions options) : options_(options), now_ns_(options.begin_ns) {
-  if (options_.begin_ns > 0 && options_.begin_ns <= kLongest) return;
+  if (options_.begin_ns > 0 && options_.begin_ns <= kLatestBegin) return;
   throw Error(ErrorCode::invalid_argument, "a simulation cannot begin at that instant",
               {.element = "begin_ns",
-               .expected = "1 to " + std::to_string(kLongest),
+               .expected = "1 to " + std::to_string(kLatestBegin) + " ns, which leaves a year to run",
                .found = std::to_string(options_.begin_ns),
-               .remedy = "leave it out, or begin sooner"});
+               .remedy = "leave it out, or begin within these limits"});
 }
 
 Simulation::~Simulation() { shutdown(); }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
@@ -16,13 +17,47 @@ namespace {
 /// Of a value without a named field; each of its numbers is looked at in each write.
 constexpr std::size_t kMostLimits = 1'000;
 
+[[noreturn]] void refuse_option(const char* what, const std::string& component, const std::string& element,
+                                const std::string& expected, const std::string& found, const char* remedy) {
+  throw Error(
+      ErrorCode::invalid_argument, what,
+      {.component = component, .element = element, .expected = expected, .found = found, .remedy = remedy});
+}
+
 std::string number_text(double number) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%g", number);
   return text.data();
 }
 
+void check_bounds(const OutputLimit& limit, const std::string& component) {
+  const std::string element = "output " + limit.port + (limit.field.empty() ? "" : "." + limit.field);
+  const auto refuse = [&](const char* what, const std::string& expected, const std::string& found) {
+    refuse_option(what, component, element, expected, found, "correct the minimum and the maximum");
+  };
+  for (const auto& [name, bound] :
+       {std::pair{"minimum", limit.minimum}, std::pair{"maximum", limit.maximum}}) {
+    if (bound && !std::isfinite(*bound))
+      refuse("a bound of the limit is no finite number", std::string("a finite ") + name + ", or none",
+             name + (" " + number_text(*bound)));
+  }
+  if (limit.minimum && limit.maximum && *limit.minimum > *limit.maximum)
+    refuse("no number is within the limit", "minimum <= maximum",
+           "minimum " + number_text(*limit.minimum) + ", maximum " + number_text(*limit.maximum));
+}
+
 }  // namespace
+
+void check_options(const ProbationOptions& options, const std::string& component) {
+  if (options.duration_ns <= 0 || options.duration_ns > kLongest)
+    refuse_option("a probation cannot last that long", component, "duration_ns",
+                  "1 to " + std::to_string(kLongest) + " ns", std::to_string(options.duration_ns),
+                  "give a duration in which the component has some releases");
+  if (options.min_releases < 1)
+    refuse_option("a probation cannot pass without a release", component, "min_releases", "at least 1",
+                  std::to_string(options.min_releases), "give the number of releases that the verdict needs");
+  for (const OutputLimit& limit : options.outputs) check_bounds(limit, component);
+}
 
 class Probation::PortLimits final : public OutputWatch {
  public:
@@ -71,13 +106,7 @@ Probation::Probation(Component& component, const std::string& to_core, Probation
       to_core_(to_core),
       options_(std::move(options)),
       trace_id_(TraceNames::intern("revert_core " + from_core_)) {
-  if (options_.duration_ns <= 0) {
-    throw Error(ErrorCode::invalid_argument, "a probation needs a duration",
-                {.component = component.name(),
-                 .element = "duration_ns",
-                 .expected = "more than 0 ns",
-                 .found = std::to_string(options_.duration_ns)});
-  }
+  check_options(options_, component.name());
   for (const OutputLimit& limit : options_.outputs) add(limit);
 }
 

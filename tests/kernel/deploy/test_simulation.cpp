@@ -79,14 +79,37 @@ TEST_F(Rule13Simulation, CallbacksBeyondAllInstantsDoNotComeAgain) {
 }
 
 TEST(SimulationOptions, ABeginNearTheLastInstantIsRefused) {
-  for (const time_ns_t begin : {INT64_MIN, time_ns_t{0}, kLongest + 1, INT64_MAX}) {
+  for (const time_ns_t begin :
+       {INT64_MIN, time_ns_t{-1}, time_ns_t{0}, kLatestBegin + 1, kLongest, kLongest + 1, INT64_MAX}) {
     try {
       Simulation simulation({.begin_ns = begin});
       ADD_FAILURE() << begin;
     } catch (const Error& error) {
+      EXPECT_EQ(ErrorCode::invalid_argument, error.code());
       EXPECT_EQ("begin_ns", error.detail().element);
+      EXPECT_EQ("1 to " + std::to_string(kLatestBegin) + " ns, which leaves a year to run",
+                error.detail().expected);
+      EXPECT_EQ(std::to_string(begin), error.detail().found);
+      EXPECT_FALSE(error.detail().remedy.empty());
     }
   }
+}
+
+/// Near kLongest the cut cannot say at which instant the change is made (cut.hpp).
+TEST(SimulationOptions, FromTheLatestBeginAChangeHasAnInstant) {
+  Architecture architecture;
+  architecture.add_component<TestShell, TestCore, BudgetFsm>("p", TaskSettings{})
+      .set_property("period_ms", std::int64_t{10});
+  architecture.configure();
+  Simulation simulation({.begin_ns = kLatestBegin});
+  SimulatedHost& host = simulation.add(architecture);
+  simulation.deploy();
+  simulation.run_until(simulation.epoch_ns() + ms_to_ns(25));
+  Transaction change;
+  change.replace_core("p", std::make_unique<TestCore>());
+  const TransactionReport report = host.commit(std::move(change));
+  EXPECT_GT(report.instant_ns, simulation.epoch_ns() + ms_to_ns(20));
+  EXPECT_LE(report.instant_ns, simulation.epoch_ns() + ms_to_ns(30));
 }
 
 TEST_F(Rule13Simulation, StopAndStartKeepTheGrid) {

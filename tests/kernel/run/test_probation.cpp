@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A core on probation: each violation puts the old core back, whatever else ends a probation, on both kinds of hosts.
 #include <cmath>
+#include <limits>
 #include <random>
+#include <tuple>
+#include <vector>
 
 #include "probation_fixtures.hpp"
 
@@ -445,6 +448,29 @@ TYPED_TEST(Probations, WhatCannotBeOnProbationIsRefused) {
             code({.outputs = {{.port = "output", .field = "x", .not_nan = true}}}));
   EXPECT_EQ(ErrorCode::invalid_argument, code({.outputs = {{.port = "output"}}}, &text));
   EXPECT_THAT(text, HasSubstr("sets no bound"));
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  for (const auto& [minimum, maximum, words] : std::vector<std::tuple<double, double, const char*>>{
+           {kNan, 1.0, "expected a finite minimum, or none, found minimum nan"},
+           {0.0, kNan, "found maximum nan"},
+           {kInfinite, kInfinite, "found minimum inf"},
+           {-kInfinite, 1.0, "found minimum -inf"},
+           {0.0, kInfinite, "found maximum inf"},
+           {2.0, 1.0, "expected minimum <= maximum, found minimum 2, maximum 1"}}) {
+    EXPECT_EQ(ErrorCode::invalid_argument,
+              code({.outputs = {{.port = "output", .minimum = minimum, .maximum = maximum}}}, &text));
+    EXPECT_THAT(text, HasSubstr(words));
+    EXPECT_THAT(text, HasSubstr("component 'c': output output: "));
+    EXPECT_THAT(text, HasSubstr("correct the minimum and the maximum"));
+  }
+  for (const time_ns_t duration : {INT64_MIN, time_ns_t{-1}, kLongest + 1, INT64_MAX}) {
+    EXPECT_EQ(ErrorCode::invalid_argument, code({.duration_ns = duration}, &text));
+    EXPECT_THAT(text, HasSubstr("duration_ns"));
+    EXPECT_THAT(text, HasSubstr("found " + std::to_string(duration)));
+  }
+  for (const std::int64_t releases : {INT64_MIN, std::int64_t{-5}, std::int64_t{0}}) {
+    EXPECT_EQ(ErrorCode::invalid_argument, code({.min_releases = releases}, &text));
+    EXPECT_THAT(text, HasSubstr("expected at least 1, found " + std::to_string(releases)));
+  }
   Transaction both;
   both.replace_core("c", std::make_unique<TrialCore>(), ProbationOptions{.duration_ns = kLong})
       .replace_shell("c", std::make_unique<TestShell>());

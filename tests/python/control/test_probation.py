@@ -114,6 +114,10 @@ def test_what_makes_no_sense_is_refused(world: World) -> None:
         ("{probation_s: 1, revert_on: [{silence: {}}]}", "write a rule with the step revert_core"),
         ("{probation_s: 1, revert_on: [{output: sum.data, maximum: x}]}", "expected numbers"),
         ("{probation_s: 1, revert_on: [{output: total}]}", "total"),
+        (
+            "{probation_s: 1, revert_on: [{output: sum.data, minimum: 2, maximum: 1}]}",
+            "component 'loop': output sum.data: no number is within the limit; expected minimum <= maximum",
+        ),
         ("{probation: 1}", "unknown key 'probation'"),
         ("5", "expected probation_s and revert_on"),
     ):

@@ -22,6 +22,8 @@ constexpr time_ns_t s_to_ns(std::int64_t s) MAUVE_RT { return s * 1'000'000'000;
 inline constexpr time_ns_t kForever = INT64_MAX;
 /// What an fsm's waits may last together, and an offset: 73 years. Added to any instant of the clock it is one still.
 inline constexpr time_ns_t kLongest = INT64_MAX / 4;
+/// The last instant at which virtual time can begin: a year before kLongest, the last clock at which a change can be made (cut.hpp).
+inline constexpr time_ns_t kLatestBegin = kLongest - s_to_ns(365LL * 24 * 60 * 60);
 
 /// instant + length; kForever when that is later than there are instants. [rt]
 constexpr time_ns_t later_by(time_ns_t instant_ns, time_ns_t length_ns) MAUVE_RT {

@@ -42,7 +42,7 @@ class SimulatedClock final : public Clock {
 
 struct SimulationOptions {
   bool trace{true};
-  time_ns_t begin_ns{s_to_ns(1)};  // the virtual time at which it begins; > 0
+  time_ns_t begin_ns{s_to_ns(1)};  // the virtual time at which it begins: 1 to kLatestBegin
 };
 
 class Simulation;

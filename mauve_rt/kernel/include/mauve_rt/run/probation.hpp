@@ -23,7 +23,7 @@ class PartsChange;
 class PortBase;
 struct FaultNote;
 
-/// What a number of an output must be. NaN breaks a bound, too.
+/// What a number of an output must be. NaN breaks a bound, too. Bounds are finite, the minimum not above the maximum.
 struct OutputLimit {
   std::string port{};
   std::string
@@ -35,13 +35,15 @@ struct OutputLimit {
 
 /// How long a new core is on probation, and which violations put the old core back.
 struct ProbationOptions {
-  time_ns_t duration_ns{0};      // > 0, by the host's clock, also while the component is stopped
+  time_ns_t duration_ns{0};      // 1 to kLongest, by the host's clock, also while the component is stopped
   bool on_fault{true};           // an exception, a failed take, an execution over its bound
   bool on_overrun{false};        // a wait entered after its end
   bool on_over_declared{false};  // an execution over its bound (max_execution), without the other faults
   std::vector<OutputLimit> outputs{};
-  std::int64_t min_releases{1};  // with fewer the verdict is inconclusive
+  std::int64_t min_releases{1};  // at least 1; with fewer the verdict is inconclusive
 };
+/// Throws Error (invalid_argument): a duration, a count or a bound makes no sense, whatever the component's ports are. [non-rt]
+void check_options(const ProbationOptions& options, const std::string& component);
 
 /// Numbered for services: fields are added at the end.
 enum class ProbationVerdict : std::uint8_t {
