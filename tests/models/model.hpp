@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "options.hpp"
+#include "search.hpp"
 #include "state.hpp"
 #include "weak_cuts.hpp"
 
@@ -17,6 +18,8 @@ namespace mauve::model {
 
 class Model {
  public:
+  using State = model::State;
+
   static constexpr int kPeriod[kMostComponents] = {2, 3, 2};
 
   explicit Model(const Options& options) : options_(options) {}
@@ -26,6 +29,8 @@ class Model {
   const std::vector<State>& successors(const State& from);
   /// Checks a state in which no step is left.
   void check_end(const State& state);
+  /// Of the changes, in a state in which no step is left.
+  Decisions decisions(const State& state) const;
 
   /// The first invariant that does not hold; empty: all hold so far.
   const std::string& violation() const { return violation_; }

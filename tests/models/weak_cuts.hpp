@@ -2,6 +2,7 @@
 // The twins of mauve::Cut, and the call of the cut that a model's twin asks for: by default mauve::Cut itself.
 #pragma once
 
+#include "cut_call.hpp"
 #include "options.hpp"
 #include "state.hpp"
 
@@ -72,15 +73,6 @@ struct CutAtFrontier : WeakCut {
   }
 };
 
-template <typename AnyCut, typename Call>
-auto call_on(std::uint8_t& word, Call call) {
-  AnyCut cut{CutWord{word}};
-  const auto answer = call(cut);
-  word = static_cast<std::uint8_t>(cut.look().bits);
-  return answer;
-}
-
-/// One call of the cut is one step: its compare-exchange takes effect at one moment.
 template <typename Call>
 auto call_cut(Twin twin, std::uint8_t& word, Call call) {
   switch (twin) {

@@ -40,6 +40,13 @@ int Model::next_instant(int i, int from) const {
   return instant > options_.last_instant ? options_.last_instant + 1 : instant;
 }
 
+Decisions Model::decisions(const State& state) const {
+  Decisions decisions;
+  for (int k = 0; k < options_.changes; ++k)
+    ++(state.changes[k].cut().is_closed() ? decisions.made : decisions.off);
+  return decisions;
+}
+
 const std::vector<State>& Model::successors(const State& from) {
   next_.clear();
   for (int i = 0; i < options_.components; ++i) {
