@@ -49,8 +49,11 @@ class SerializedWritePort final : public PortBase {
   void write_zero(time_ns_t time_ns) noexcept override {
     if (service_ != nullptr) service_->write(zero_, time_ns);
   }
-  TryWrite try_write_zero() noexcept override {
-    return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
+  TryWrite try_write_zero(ServiceBase& service, time_ns_t time_ns) noexcept override {
+    return static_cast<SerializedWriteService&>(service).try_write(zero_, time_ns);
+  }
+  void write_zero_to(ServiceBase& service, time_ns_t time_ns) noexcept override {
+    static_cast<SerializedWriteService&>(service).write(zero_, time_ns);
   }
   bool write_serialized(std::span<const std::byte> message) override {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;

@@ -316,9 +316,9 @@ bool RuleRunner::prepare(std::size_t index) {
   return changed || is_other;
 }
 
-/// What is in effect can be undone, what is not can be done; would it be possible to undo that? To find out claims the
-/// components, and what is ready cannot be committed meanwhile: so that is tried only where somebody else has changed them, or
-/// the structure.
+/// What is in effect can be undone, what is not can be done; would it be possible to undo that? To find out is a
+/// preparation, and keeps requests for the components waiting: so that is tried only where somebody else has changed them, or the
+/// structure.
 bool RuleRunner::make_ready(Rule& rule, bool after_own) {
   if (!rule.may_prepare.load(std::memory_order_relaxed)) return false;
   const std::uint64_t revision = host_.architecture().revision();

@@ -43,19 +43,22 @@ Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
 }
 
 Architecture::~Architecture() {
-  if (!end_threads()) {
+  const bool have_ended = end_threads();
+  std::erase_if(open_, [](const auto& change) { return change->settle(); });
+  if (!have_ended || !open_.empty()) {
     // A thread that does not come back from its state is left behind with all it may use: nothing of that is freed.
-    for (const auto& resource : resources_) resource->set_notifier(nullptr);
-    keep_for_ever(std::move(resources_));
+    for (const auto& resource : lists_.resources) resource->set_notifier(nullptr);
+    keep_for_ever(std::move(lists_.resources));
     for (const Leaving& leaving : leaving_) leaving.component->task().detach_thread();
     keep_for_ever(std::move(leaving_));
+    auto& components = lists_.components;
     const auto has_ended = [](const auto& component) { return component->task().has_ended(); };
-    const auto first = std::partition(components_.begin(), components_.end(), has_ended);
-    std::for_each(first, components_.end(), [](const auto& component) { component->task().detach_thread(); });
-    keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components_.end()));
+    const auto first = std::partition(components.begin(), components.end(), has_ended);
+    std::for_each(first, components.end(), [](const auto& component) { component->task().detach_thread(); });
+    keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components.end()));
     keep_for_ever(std::move(open_));  // a thread that was left behind may not have taken its change
-    components_.erase(first, components_.end());
-    resources_.clear();
+    components.erase(first, components.end());
+    lists_.resources.clear();
   }
   open_.clear();
   Configurable::cleanup();
@@ -73,6 +76,11 @@ void Architecture::cleanup() {
 
 std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
                                                       const TransactionOptions& options) {
+  struct Disposed {
+    ~Disposed() { architecture.wait_disposed(); }
+    const Architecture& architecture;
+  };
+  const Disposed last{*this};
   const std::lock_guard change(change_lock_);
   std::shared_lock<std::shared_mutex> use;
   Runner* const host = use_host(use);
@@ -80,6 +88,14 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
   work->make(std::move(transaction));
   return work;
 }
+
+void Architecture::dispose(const std::string& what, std::function<void()> work) {
+  const Runner* const runner = host();
+  if (runner == nullptr || runner->is_simulated()) return work();
+  keeper_.take(what, std::move(work));
+}
+
+void Architecture::wait_disposed() const { keeper_.wait(later_by(monotonic_now_ns(), s_to_ns(1))); }
 
 TransactionReport Architecture::commit(Transaction transaction, const TransactionOptions& options) {
   return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
@@ -102,45 +118,56 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
 }
 
 void Architecture::settle_changes() noexcept {
+  has_open_.store(!open_.empty(),
+                  std::memory_order_relaxed);  // relaxed: a hint; first: one may be made meanwhile
   for (OpenChange* prepared : prepared_) prepared->settle();
-  std::erase_if(open_, [](const auto& change) { return change->settle(); });
-  has_open_.store(!open_.empty(), std::memory_order_relaxed);  // relaxed: a hint
+  const auto open = open_;  // a hook may ask for a change of its own
+  for (const auto& change : open) {
+    if (change->settle()) forget_open(*change);
+  }
 }
 
 void Architecture::settle_probations() noexcept {
   for (const auto& component : components()) {
     const auto shadow = component->last_shadow();
+    if (shadow != nullptr) shadow->conclude_if_hung(component->task().state_age().hung_after_ns);
     const bool has_shadow_ended = shadow != nullptr && shadow->is_to_settle();
     if (!component->is_probation_over() && !has_shadow_ended) continue;
     ChangeMark& mark = component->change_mark();
     const bool is_reverted = component->is_probation_reverted();
     {
-      const std::lock_guard gate(commit_gate_.mutex);
-      if (mark.is_claimed() || mark.is_unsettled()) continue;
+      const CommitGate::Look table(commit_gate_);
+      if (mark.is_claimed() || mark.is_unsettled() || commit_gate_.has_open_about(component->task()))
+        continue;
       mark.claim();
+      mark.hold();
       if (is_reverted) mark.set_changed();
     }
     drop_stale_prepared();  // they refer to the core that goes now
     component->settle_probation();
     component->settle_shadow();
     if (is_reverted) note_author(component->name(), "core", "probation");
-    const std::lock_guard gate(commit_gate_.mutex);
+    const CommitGate::Look table(commit_gate_);
     mark.release();
   }
 }
 
 void Architecture::settle_probations_if_idle() noexcept {
   if (!change_lock_.try_lock()) return;
-  const std::lock_guard change(change_lock_, std::adopt_lock);
-  std::shared_lock<std::shared_mutex> use;
-  use_host(use);
-  settle_changes();
-  settle_probations();
+  {
+    const std::lock_guard change(change_lock_, std::adopt_lock);
+    std::shared_lock<std::shared_mutex> use;
+    use_host(use);
+    settle_changes();
+    settle_probations();
+  }
+  wait_disposed();
 }
 
-void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
-  open_.push_back(std::move(change));
-  has_open_.store(true, std::memory_order_relaxed);  // relaxed: a hint
+void Architecture::keep_open(std::shared_ptr<OpenChange> change) { open_.push_back(std::move(change)); }
+
+void Architecture::forget_open(const OpenChange& change) noexcept {
+  std::erase_if(open_, [&change](const auto& each) { return each.get() == &change; });
 }
 
 void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look) {
@@ -149,18 +176,18 @@ void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<Ea
     settle_changes();
     const EarlierChange earlier = look();
     if (earlier == EarlierChange::none) return;
-    if (earlier == EarlierChange::late && monotonic_now_ns() >= until) throw_late(timeout_ns);
+    if (monotonic_now_ns() >= until) throw_earlier(earlier, timeout_ns);
     change_lock_.wait_for_others();
   }
 }
 
-bool Architecture::has_open_addition(const std::string& name) const noexcept {
-  const auto has_added = [&name](const auto& change) { return change->has_added(name); };
-  return std::any_of(prepared_.begin(), prepared_.end(), has_added) ||
-         std::any_of(open_.begin(), open_.end(), has_added);
-}
-
-void Architecture::throw_late(time_ns_t waited_ns) const {
+void Architecture::throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const {
+  if (earlier == EarlierChange::under_way) {
+    throw Error(ErrorCode::timeout,
+                "another change of the same is being prepared or made; nothing was changed",
+                {.expected = "its end within " + std::to_string(waited_ns / ms_to_ns(1)) + " ms",
+                 .remedy = "try again, or allow a longer commit timeout"});
+  }
   for (const auto& change : open_) {
     if (const Task* late = change->find_late())
       late->throw_state_running("the component has not taken an earlier change yet; nothing was changed",
@@ -204,9 +231,16 @@ void Architecture::set_host(Runner& host) {
     }
     host_ = &host;
   }
-  for (const auto& resource : resources()) {
+  const Lists all = lists();
+  for (const auto& resource : all.resources) {
     for (ServiceBase* service : resource->services()) service->forget_floor();
   }
+  // What happened when belongs to another clock.
+  const CommitGate::Look table(commit_gate_);
+  for (const auto& resource : all.resources) {
+    for (ServiceBase* service : resource->services()) service->set_since_ns(0);
+  }
+  for (const auto& component : all.components) component->change_mark().set_since_ns(0);
 }
 
 void Architecture::release_host(const Runner& host) noexcept {
@@ -218,9 +252,9 @@ void Architecture::release_host(const Runner& host) noexcept {
 bool Architecture::end_threads() noexcept {
   const time_ns_t until = monotonic_now_ns() + kEndTimeout;
   bool all_ended = true;
-  for (const auto& component : components_) {
+  for (const auto& component : lists_.components) {
     all_ended &= component->task().end_thread(until);
-    component->set_architecture(nullptr);
+    component->leave_architecture();
   }
   for (const Leaving& leaving : leaving_) all_ended &= leaving.component->task().end_thread(until);
   return all_ended;
@@ -277,7 +311,7 @@ void Architecture::subscribe(const std::string& name) {
 
 void Architecture::note_restructured() noexcept {
   const std::lock_guard structural(commit_gate_.structural);
-  const std::lock_guard gate(commit_gate_.mutex);
+  const CommitGate::Look table(commit_gate_);
   commit_gate_.restructured();
 }
 
@@ -292,36 +326,79 @@ void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
   if (topic == TopicBinding::publish || resource.client() != nullptr) resource.set_notifier(&publications_);
 }
 
+namespace {
+
+/// A copy of what the gate's mutex guards, into room that was made before: nothing is allocated under it.
+template <typename Item>
+std::vector<Item> copy_within(CommitGate& gate, const std::vector<Item>& items) {
+  std::vector<Item> copy;
+  for (std::size_t room = 16;; room *= 2) {
+    copy.reserve(room);
+    const CommitGate::Look table(gate);
+    if (items.size() > copy.capacity()) continue;
+    copy.assign(items.begin(), items.end());
+    return copy;
+  }
+}
+
+}  // namespace
+
 std::vector<std::shared_ptr<Component>> Architecture::components() const {
-  const std::lock_guard lock(list_mutex_);
-  return components_;
+  return copy_within(commit_gate_, lists_.components);
 }
 
 std::vector<std::shared_ptr<Resource>> Architecture::resources() const {
-  const std::lock_guard lock(list_mutex_);
-  return resources_;
+  return copy_within(commit_gate_, lists_.resources);
+}
+
+Lists Architecture::lists() const {
+  Lists copy;
+  for (std::size_t room = 16;; room *= 2) {
+    copy.components.reserve(room);
+    copy.resources.reserve(room);
+    const CommitGate::Look table(commit_gate_);
+    if (std::max(lists_.components.size(), lists_.resources.size()) > room) continue;
+    copy.components.assign(lists_.components.begin(), lists_.components.end());
+    copy.resources.assign(lists_.resources.begin(), lists_.resources.end());
+    return copy;
+  }
+}
+
+std::vector<Wiring> Architecture::wiring() const {
+  std::vector<Wiring> copy;
+  for (std::size_t room = 16;; room *= 2) {
+    copy.reserve(room);
+    const CommitGate::Look table(commit_gate_);
+    if (lists_.components.size() > copy.capacity()) continue;
+    for (const auto& component : lists_.components)
+      copy.push_back({.component = component, .wires = component->wires()});
+    return copy;
+  }
+}
+
+void Architecture::swap_lists(Lists& lists) noexcept {
+  lists_.components.swap(lists.components);
+  lists_.resources.swap(lists.resources);
 }
 
 std::shared_ptr<Component> Architecture::hold_component(const std::string& name) const {
-  const std::lock_guard lock(list_mutex_);
-  if (auto found = find_in(components_, name)) return found;
-  throw_no_component(name, components_);
+  if (auto found = find_component(name)) return found;
+  throw_no_component(name, components());
 }
 
 std::shared_ptr<Resource> Architecture::hold_resource(const std::string& name) const {
-  const std::lock_guard lock(list_mutex_);
-  if (auto found = find_in(resources_, name)) return found;
-  throw_no_resource(name, resources_);
+  if (auto found = find_resource(name)) return found;
+  throw_no_resource(name, resources());
 }
 
 std::shared_ptr<Component> Architecture::find_component(const std::string& name) const {
-  const std::lock_guard lock(list_mutex_);
-  return find_in(components_, name);
+  const CommitGate::Look table(commit_gate_);
+  return find_in(lists_.components, name);
 }
 
 std::shared_ptr<Resource> Architecture::find_resource(const std::string& name) const {
-  const std::lock_guard lock(list_mutex_);
-  return find_in(resources_, name);
+  const CommitGate::Look table(commit_gate_);
+  return find_in(lists_.resources, name);
 }
 
 Component& Architecture::component(const std::string& name) const { return *hold_component(name); }
@@ -347,8 +424,8 @@ void Architecture::require_ready_cores() const {
 
 bool Architecture::configure_hook() {
   try {
-    for (const auto& resource : resources_) resource->configure();
-    for (const auto& component : components_) component->configure();
+    for (const auto& resource : resources()) resource->configure();
+    for (const auto& component : components()) component->configure();
   } catch (...) {
     cleanup_hook();
     throw;
@@ -369,9 +446,11 @@ void Architecture::check_cleanup() const {
 }
 
 void Architecture::cleanup_hook() {
-  for (auto component = components_.rbegin(); component != components_.rend(); ++component)
+  const Lists all = lists();
+  for (auto component = all.components.rbegin(); component != all.components.rend(); ++component)
     (*component)->cleanup();
-  for (auto resource = resources_.rbegin(); resource != resources_.rend(); ++resource) (*resource)->cleanup();
+  for (auto resource = all.resources.rbegin(); resource != all.resources.rend(); ++resource)
+    (*resource)->cleanup();
 }
 
 }  // namespace mauve

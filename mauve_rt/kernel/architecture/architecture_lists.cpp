@@ -21,18 +21,6 @@ struct Member {
   Component component;
 };
 
-template <typename Item>
-void take_out(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::shared_ptr<Item>>& gone) {
-  if (gone.empty()) return;
-  std::erase_if(
-      items, [&gone](const auto& item) { return std::find(gone.begin(), gone.end(), item) != gone.end(); });
-}
-
-template <typename Item>
-void append(std::vector<std::shared_ptr<Item>>& items, const std::vector<std::shared_ptr<Item>>& more) {
-  items.insert(items.end(), more.begin(), more.end());
-}
-
 }  // namespace
 
 std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) {
@@ -89,49 +77,46 @@ void Architecture::give_back_numbers(std::size_t numbers) {
   numbered_.erase(numbered_.lower_bound(static_cast<std::uint16_t>(numbers)), numbered_.end());
 }
 
-void Architecture::change_lists(const ListChange& change) {
-  {
-    const std::lock_guard lock(list_mutex_);
-    for (const auto& component : change.removed_components) component->set_architecture(nullptr);
-    take_out(components_, change.removed_components);
-    take_out(resources_, change.removed_resources);
-    append(resources_, change.added_resources);
-    append(components_, change.added_components);
-    for (const auto& component : change.added_components) component->set_architecture(this);
-    for (Component* component : change.changed) component->show();
-  }
-  changes_.bump();
+void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed) {
+  const std::lock_guard lock(list_mutex_);
+  leaving_.push_back({.component = std::move(component), .was_listed = was_listed});
 }
 
-void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
-                                    const std::vector<std::shared_ptr<Resource>>& gone) {
-  Leaving leaving{.component = std::move(component), .was_listed = was_listed, .uses = {}};
-  std::vector<std::shared_ptr<Resource>> all = resources();
-  append(all, gone);
-  for (const auto& resource : all) {
-    if (leaving.component->uses(*resource)) leaving.uses.push_back(resource);
+void Architecture::retire(std::vector<std::shared_ptr<Resource>> resources) {
+  if (resources.empty()) return;
+  {
+    const std::lock_guard lock(list_mutex_);
+    retiring_.insert(retiring_.end(), resources.begin(), resources.end());
   }
-  const std::lock_guard lock(list_mutex_);
-  leaving_.push_back(std::move(leaving));
+  resources.clear();
+  reap();
 }
 
 void Architecture::reap() {
   std::vector<Leaving> ended;
+  std::vector<std::shared_ptr<Resource>> unused;
+  const auto split = [](auto& all, auto& out, const auto& is_over) {
+    const auto first = std::partition(all.begin(), all.end(), [&](const auto& one) { return !is_over(one); });
+    out.assign(std::make_move_iterator(first), std::make_move_iterator(all.end()));
+    all.erase(first, all.end());
+  };
   {
     const std::lock_guard lock(list_mutex_);
-    const auto has_ended = [](const Leaving& leaving) {
-      return leaving.component->task().end_thread(monotonic_now_ns());
-    };
-    const auto first = std::partition(leaving_.begin(), leaving_.end(),
-                                      [&](const Leaving& leaving) { return !has_ended(leaving); });
-    ended.assign(std::make_move_iterator(first), std::make_move_iterator(leaving_.end()));
-    leaving_.erase(first, leaving_.end());
+    split(leaving_, ended,
+          [](const Leaving& leaving) { return leaving.component->task().end_thread(monotonic_now_ns()); });
   }
   for (const Leaving& leaving : ended) {
     for (const auto& port : leaving.component->shell().ports()) port->disconnect();
-    leaving.component->cleanup();
+    dispose("cleanup of the removed " + leaving.component->description(),
+            [component = leaving.component] { component->cleanup(); });
     if (leaving.was_listed) retire_trace(leaving.component->task());
   }
+  {
+    const std::lock_guard lock(list_mutex_);
+    split(retiring_, unused, [](const auto& resource) { return !resource->is_in_use(); });
+  }
+  for (const auto& resource : unused)
+    dispose("cleanup of the removed " + resource->description(), [resource] { resource->cleanup(); });
 }
 
 std::size_t Architecture::threads_left_behind() const {
@@ -139,12 +124,6 @@ std::size_t Architecture::threads_left_behind() const {
   return static_cast<std::size_t>(std::count_if(leaving_.begin(), leaving_.end(), [](const Leaving& leaving) {
     return !leaving.component->task().has_ended();
   }));
-}
-
-bool Architecture::is_used_by_left_behind(const Resource& resource) const {
-  const std::lock_guard lock(list_mutex_);
-  return std::any_of(leaving_.begin(), leaving_.end(),
-                     [&resource](const Leaving& leaving) { return leaving.component->uses(resource); });
 }
 
 std::vector<std::string> Architecture::trace_components() const {

@@ -81,13 +81,11 @@ std::string text_of(const ResourceFacts& facts) {
 
 ArchitectureDescription Architecture::describe() const {
   ArchitectureDescription description;
-  {
-    const std::lock_guard lock(list_mutex_);
-    const time_ns_t epoch_ns = deployment_epoch_ns();
-    for (const auto& component : components_)
-      description.components.push_back(facts_of(*component, epoch_ns));
-    for (const auto& resource : resources_) description.resources.push_back(facts_of(*resource));
-  }
+  const Lists all = lists();
+  const time_ns_t epoch_ns = deployment_epoch_ns();
+  for (const auto& component : all.components)
+    description.components.push_back(facts_of(*component, epoch_ns));
+  for (const auto& resource : all.resources) description.resources.push_back(facts_of(*resource));
   sort_by_name(description.components);
   sort_by_name(description.resources);
   return description;
@@ -95,8 +93,7 @@ ArchitectureDescription Architecture::describe() const {
 
 std::vector<Authored> Architecture::authors() const {
   std::vector<Authored> found = authors_.all();
-  const std::lock_guard lock(list_mutex_);
-  for (const auto& component : components_) {
+  for (const auto& component : components()) {
     if (!component->task().has_fallen_back()) continue;
     std::erase_if(
         found, [&](const Authored& one) { return one.target == component->name() && one.element == "core"; });

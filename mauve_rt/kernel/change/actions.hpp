@@ -43,8 +43,7 @@ class StateGuard final : public CommitAction {
   const Task* changed_{nullptr};
 };
 
-/// Takes over a writer's end that another component of the same change has: what that one writes before it has taken the change
-/// too is dropped.
+/// Gains a writer's end: what a component that had it before writes to it, late, is dropped.
 class FloorChange final : public CommitAction {
  public:
   explicit FloorChange(ServiceBase& service) : service_(service) {}
@@ -106,19 +105,36 @@ class WiringChange final : public CommitAction {
  public:
   WiringChange(PortBase& port, PortConnection connection)
       : port_(port),
+        gains_(port.kind() == PortKind::write ? connection.service : nullptr),
         connection_(std::move(connection)),
         trace_id_(TraceNames::intern("wire " + port.name())) {}
   void take() noexcept override { port_.swap(connection_); }
+  bool make_safe(bool may_wait, time_ns_t time_ns) noexcept override {
+    if (gains_ == nullptr) return true;
+    gains_->raise_floor(time_ns);
+    return port_.make_safe(*gains_, may_wait, time_ns);
+  }
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 
  private:
   PortBase& port_;
-  PortConnection connection_;
+  ServiceBase* const gains_;   // a writer's end; nullptr: none
+  PortConnection connection_;  // the new one; after take the old one
   std::uint32_t trace_id_;
 };
 
+/// An event wait's port is disconnected: the events of its resource are heeded no more from the commit on.
+class ListeningEnd final : public CommitAction {
+ public:
+  explicit ListeningEnd(EventInput& input) : input_(input) {}
+  void take() noexcept override { input_.mute(); }
+
+ private:
+  EventInput& input_;
+};
+
 /// Listens to a rewired port's new resource for an event wait: has its place there before the commit, as nothing may
-/// fail after it, and passes events on from the commit, so that none is missed.
+/// fail after it, and passes events on from the commit, so that none is missed. Those of the old resource are heeded no more then.
 ///
 /// | member | written by             | read by | order                                  |
 /// | ------ | ---------------------- | ------- | -------------------------------------- |
@@ -127,19 +143,24 @@ class WiringChange final : public CommitAction {
 class ListenerChange final : public CommitAction, public EventListener {
  public:
   /// Throws Error (out_of_range) when the resource takes no more listeners. [non-rt]
-  ListenerChange(Resource& resource, EventInput& input) : resource_(resource), input_(input) {
+  ListenerChange(Resource& resource, EventInput& input)
+      : resource_(resource), use_(resource.use()), input_(input) {
     resource_.listen(*this);
   }
   ~ListenerChange() override { resource_.unlisten(*this); }
-  void take() noexcept override { live_.store(true, std::memory_order_release); }
+  void take() noexcept override {
+    input_.mute();
+    live_.store(true, std::memory_order_release);
+  }
   void on_event(time_ns_t time_ns) noexcept override {
-    if (live_.load(std::memory_order_acquire)) input_.on_event(time_ns);
+    if (live_.load(std::memory_order_acquire)) input_.heed(time_ns);
   }
   /// Lets the event wait listen itself. [non-rt], after the commit
   void hand_over() noexcept { input_.listen_for(*this, resource_); }
 
  private:
   Resource& resource_;
+  std::shared_ptr<const void> use_;
   EventInput& input_;
   std::atomic<bool> live_{false};
 };
@@ -166,13 +187,12 @@ class Repair final : public CommitAction {
 class Retreat final : public CommitAction {
  public:
   explicit Retreat(const Shell& shell) {
-    for (const auto& port : shell.ports()) {
-      if (port->is_connected()) ports_.emplace_back(port.get(), PortConnection{});
-    }
+    for (const auto& port : shell.ports()) ports_.emplace_back(port.get(), PortConnection{});
   }
   /// Whose component it is. [non-rt], before the commit.
   void set_place(const Participant& place) noexcept { place_ = &place; }
   void take() noexcept override {
+    place_->task->set_removed();
     if (place_->in_flight) place_->task->write_outputs(false, instant_ns - 1);
     for (auto& [port, connection] : ports_) {
       if (place_->left_behind) {

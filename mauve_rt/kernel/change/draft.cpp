@@ -10,20 +10,6 @@ namespace mauve {
 
 namespace {
 
-DraftComponent present(std::shared_ptr<Component> component) {
-  DraftComponent draft;
-  draft.state = component->task().state();
-  draft.ran = draft.runs = draft.state == ComponentState::running;
-  for (const auto& port : component->shell().ports()) {
-    if (!port->is_connected()) continue;
-    draft.wires.emplace(port->name(),
-                        Wire{.resource = port->resource_name(), .service = port->service(), .step = 0});
-  }
-  draft.wires_before = draft.wires;
-  draft.component = std::move(component);
-  return draft;
-}
-
 bool leads_to(const Wire& wire, const Resource& resource) {
   const auto& services = resource.services();
   return std::find(services.begin(), services.end(), wire.service) != services.end();
@@ -58,39 +44,56 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
   return found != by_name_.end() ? found->second : nullptr;
 }
 
-void Draft::claim(const std::shared_ptr<Component>& component) {
+/// What an unlisted one has is nobody else's: a thread that was left behind takes no change any more, and what comes now removes
+/// its component.
+DraftComponent Draft::claim(std::shared_ptr<Component> component) {
+  DraftComponent draft;
   claimed_.reserve(claimed_.size() + 1);
-  const std::lock_guard gate(architecture_.commit_gate().mutex);
-  const ChangeMark& mark = component->change_mark();
-  // A thread that was left behind takes no change any more: what comes now removes its component.
-  if (mark.is_claimed() || (mark.is_unsettled() && !component->task().is_left_behind())) {
+  std::shared_ptr<const Wires> wires;
+  bool is_free = false;
+  {
+    const CommitGate::Look table(architecture_.commit_gate());
+    ChangeMark& mark = component->change_mark();
+    is_free = !mark.is_claimed() && (!mark.is_unsettled() || component->task().is_left_behind());
+    if (is_free) {
+      mark.claim();
+      claimed_.push_back(component);
+      draft.changes = mark.changes();
+      wires = component->wires();
+    }
+  }
+  if (!is_free) {
     throw Error(ErrorCode::wrong_revision, "an earlier change of the component is not completed yet",
                 {.component = component->name(), .remedy = "read it again, then ask again"});
   }
-  component->change_mark().claim();
-  claimed_.push_back(component);
+  draft.state = component->task().state();
+  draft.ran = draft.runs = draft.state == ComponentState::running;
+  draft.wires = draft.wires_before = *wires;
+  for (auto& [port, wire] : draft.wires) wire.step = 0;
+  draft.component = std::move(component);
+  return draft;
 }
 
-void Draft::set_changed() noexcept {
-  const std::lock_guard gate(architecture_.commit_gate().mutex);
-  for (const auto& component : claimed_) component->change_mark().set_changed();
-  if (is_structural()) architecture_.commit_gate().restructured();
+void Draft::hold(const DraftComponent& component) {
+  bool is_same = false;
+  {
+    const CommitGate::Look table(architecture_.commit_gate());
+    ChangeMark& mark = component.component->change_mark();
+    is_same = mark.changes() == component.changes &&
+              !architecture_.commit_gate().has_open_about(component.component->task());
+    if (is_same) mark.hold();
+  }
+  if (is_same) return;
+  throw Error(ErrorCode::wrong_revision, "a prepared change came before this one; nothing was changed",
+              {.component = component.name(), .remedy = "read the architecture, then ask again"});
 }
 
 void Draft::release() noexcept {
   if (claimed_.empty()) return;
-  const std::lock_guard gate(architecture_.commit_gate().mutex);
-  for (const auto& component : claimed_) component->change_mark().release();
-  claimed_.clear();
-}
-
-std::vector<std::shared_ptr<Component>> Draft::release_unsettled() noexcept {
-  const std::lock_guard gate(architecture_.commit_gate().mutex);
-  for (const auto& component : claimed_) {
-    component->change_mark().unsettle();
-    component->change_mark().release();
+  const CommitGate::Look table(architecture_.commit_gate());
+  if (std::exchange(is_claiming_, false)) {
+    for (const auto& component : claimed_) component->change_mark().release();
   }
-  return std::exchange(claimed_, {});
 }
 
 bool Draft::is_structural() const noexcept {
@@ -105,8 +108,7 @@ DraftComponent& Draft::touch(const std::string& name) {
   if (component == nullptr) {
     auto found = is_removed(name) ? nullptr : architecture_.find_component(name);
     if (found == nullptr) throw_no_component(name, component_names());
-    claim(found);
-    components_.push_back(present(std::move(found)));
+    components_.push_back(claim(std::move(found)));
     component = &components_.back();
     component->first_step = step_;
     by_name_.emplace(name, component);
@@ -153,8 +155,7 @@ Resource& Draft::resource(const std::string& name) {
 
 DraftComponent& Draft::add_component(const std::string& name, const TaskSettings& settings) {
   check_name("component", name);
-  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr) ||
-      architecture_.has_open_addition(name))
+  if (find(name) != nullptr || (!is_removed(name) && architecture_.find_component(name) != nullptr))
     throw_taken("component", name);
   DraftComponent added;
   added.component = architecture_.make_unlisted(name);
@@ -184,7 +185,7 @@ void Draft::remove_component(const std::string& name) {
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic,
                          time_ns_t longest_hold_ns) {
   check_name("resource", name);
-  if (find_resource(name) != nullptr || architecture_.has_open_addition(name)) throw_taken("resource", name);
+  if (find_resource(name) != nullptr) throw_taken("resource", name);
   resource->set_name(name);
   if (longest_hold_ns != 0) resource->set_longest_hold_ns(longest_hold_ns);
   architecture_.prepare_outward(*resource, topic);
@@ -195,17 +196,15 @@ void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> reso
 /// The ports that will be connected to it.
 std::vector<std::string> Draft::ports_of(const Resource& resource) const {
   std::vector<std::string> ports;
-  const auto look = [&](const DraftComponent& component) {
-    for (const auto& [port, wire] : component.wires) {
-      if (leads_to(wire, resource)) ports.push_back(component.name() + "." + port);
+  const auto look = [&](const std::string& component, const Wires& wires) {
+    for (const auto& [port, wire] : wires) {
+      if (leads_to(wire, resource)) ports.push_back(component + "." + port);
     }
   };
-  for (const DraftComponent& component : components_) look(component);
-  for (const auto& component : architecture_.components()) {
-    if (by_name_.contains(component->name()) || is_removed(component->name())) continue;
-    const std::lock_guard structural(
-        architecture_.commit_gate().structural);  // a prepared commit may wire it
-    look(present(component));
+  for (const DraftComponent& component : components_) look(component.name(), component.wires);
+  for (const auto& [component, wires] : architecture_.wiring()) {
+    if (!by_name_.contains(component->name()) && !is_removed(component->name()))
+      look(component->name(), *wires);
   }
   return ports;
 }
@@ -236,6 +235,11 @@ void Draft::set_property(DraftComponent& component, const std::string& name, con
   }
 }
 
+bool Draft::is_unsettled(Component& component) const {
+  const CommitGate::Look table(architecture_.commit_gate());
+  return component.change_mark().is_unsettled();
+}
+
 void Draft::resynchronise() {
   if (!deployed_) {
     throw Error(ErrorCode::not_configured, "the architecture is not deployed",
@@ -244,7 +248,8 @@ void Draft::resynchronise() {
   resynchronise_step_ = step_;
   for (const auto& component : architecture_.components()) {
     const ComponentState state = component->task().state();
-    const bool can_take_part = state != ComponentState::faulted && state != ComponentState::unconfigured;
+    const bool can_take_part = state != ComponentState::faulted && state != ComponentState::unconfigured &&
+                               !is_unsettled(*component);  // one that is late
     if (can_take_part && !is_removed(component->name())) touch(component->name());
   }
 }

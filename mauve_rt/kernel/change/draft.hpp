@@ -16,16 +16,6 @@
 
 namespace mauve {
 
-/// Steps count from 1; 0 stands for what was there before.
-struct Wire {
-  std::string resource;
-  ServiceBase* service{nullptr};
-  int step{0};
-};
-
-/// Same resources, same services.
-inline bool operator==(const Wire& a, const Wire& b) noexcept { return a.service == b.service; }
-
 struct DraftProperty {
   PropertyValue value;  // as PropertyBase::checked returned it
   int step{0};
@@ -41,8 +31,9 @@ struct DraftComponent {
   std::optional<time_ns_t> clock_ns{};
   Parts fresh{};  // of an added one: all its parts
   Component::FsmFactory make_fsm{};
-  std::map<std::string, Wire> wires_before{};  // by port
-  std::map<std::string, Wire> wires{};
+  std::uint32_t changes{0};  // of one that was there: ChangeMark, as the draft found it
+  Wires wires_before{};
+  Wires wires{};
   std::map<std::string, int> disconnected{};  // by port: the last step that disconnected it
   std::map<std::string, DraftProperty> properties{};
   int shell_step{0};
@@ -50,6 +41,7 @@ struct DraftComponent {
   int core_step{0};
   std::optional<ProbationOptions> probation{};  // of the new core
   std::shared_ptr<Shadow> promoted{};           // the new core is its candidate
+  bool is_candidate_out{false};                 // the preparation has taken it out of the shadow
   std::shared_ptr<Shadow> shadow{};             // begins
   int shadow_step{0};
   bool core_unready{false};  // the new core is put in as it is
@@ -77,7 +69,7 @@ struct DraftComponent {
     });
   }
   bool has_new_parts() const noexcept {
-    return fresh.shell != nullptr || fresh.core != nullptr || fresh.fsm != nullptr;
+    return fresh.shell != nullptr || fresh.core != nullptr || fresh.fsm != nullptr || promoted != nullptr;
   }
 };
 
@@ -89,7 +81,8 @@ struct DraftResource {
 };
 
 /// An overlay of an architecture: what the steps touch of it, and nothing else, however large it is. Nothing of it is in
-/// force. Ordinary threads, the architecture's change lock held while steps enter and finish() checks.
+/// force. Ordinary threads, the architecture's change lock held while steps enter and finish() checks. It notes how often each
+/// component that it touches has changed by then: an urgent change may come before it is made, which is refused then.
 class Draft {
  public:
   Draft(Architecture& architecture, bool deployed) : architecture_(architecture), deployed_(deployed) {}
@@ -105,12 +98,18 @@ class Draft {
   void begin(int step) noexcept { step_ = step; }
   int step() const noexcept { return step_; }
 
-  /// The change is made. CommitGate::structural held where the draft is structural.
-  void set_changed() noexcept;
-  /// Every component that was there before and is touched is claimed until then: no other change is about it.
+  /// Every component that was there before and is touched is claimed until then, or until the change is made: no other change
+  /// that is not urgent is about it.
   void release() noexcept;
-  /// The same where a late component has not taken the change yet: no change claims these until they are settled.
-  std::vector<std::shared_ptr<Component>> release_unsettled() noexcept;
+  /// No change at all is made of this one meanwhile: its parts that are in are acted on. Throws Error (wrong_revision) when it is
+  /// not as the draft found it any more.
+  void hold(const DraftComponent& component);
+  /// The change is made: whether who publishes it is to release the claims. [rt], within a CommitGate::Look
+  bool forget_claims() MAUVE_RT {
+    const bool is_claiming = is_claiming_;
+    is_claiming_ = false;
+    return is_claiming;
+  }
   const std::vector<std::shared_ptr<Component>>& claimed() const noexcept { return claimed_; }
   /// Whether it adds or removes something, wires a port, or replaces a shell: of such changes one at a time is made.
   bool is_structural() const noexcept;
@@ -151,8 +150,9 @@ class Draft {
   std::vector<std::shared_ptr<Resource>>& removed_resources() noexcept { return removed_resources_; }
 
  private:
-  void claim(const std::shared_ptr<Component>& component);
+  DraftComponent claim(std::shared_ptr<Component> component);
   bool is_removed(const std::string& component) const noexcept;
+  bool is_unsettled(Component& component) const;
   std::shared_ptr<Resource> find_resource(const std::string& name) const;
   std::vector<std::string> component_names() const;
   std::vector<std::string> ports_of(const Resource& resource) const;
@@ -170,6 +170,7 @@ class Draft {
   int step_{0};
   int resynchronise_step_{0};
   std::vector<std::shared_ptr<Component>> claimed_;
+  bool is_claiming_{true};  // under the gate's mutex
   std::list<DraftComponent> components_;
   std::map<std::string, DraftComponent*> by_name_;  // of components_
   std::list<DraftComponent> removed_components_;    // those that were there before

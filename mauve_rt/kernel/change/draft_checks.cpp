@@ -148,33 +148,39 @@ void Draft::check_required_ports(const DraftComponent& component) const {
 
 void Draft::check_port_counts() const {
   struct Count {
-    std::int64_t before{0};
-    std::int64_t after{0};
-    int step{0};  // the last that connected to it
+    std::uint32_t ports{0};  // that there will be
+    std::uint32_t fresh{0};  // of them those that come
+    int step{0};             // the last that connected to it
     std::string component;
   };
   std::map<ServiceBase*, Count> counts;
-  const auto count_before = [&](const DraftComponent& component) {
-    for (const auto& [port, wire] : component.wires_before) ++counts[wire.service].before;
-  };
-  for (const DraftComponent& component : removed_components_) count_before(component);
   for (const DraftComponent& component : components_) {
-    count_before(component);
     for (const auto& [port, wire] : component.wires) {
       Count& count = counts[wire.service];
-      ++count.after;
+      const auto before = component.wires_before.find(port);
+      const bool stays = before != component.wires_before.end() && before->second == wire;
+      count.fresh += stays && component.shell_step == 0 ? 0 : 1;
       if (wire.step <= count.step) continue;
       count.step = wire.step;
       count.component = component.name();
     }
   }
+  std::erase_if(counts, [](const auto& count) { return count.second.step == 0 && count.second.fresh == 0; });
+  if (counts.empty()) return;
+  const auto count_all = [&](const Wires& wires) {
+    for (const auto& [port, wire] : wires) {
+      if (const auto count = counts.find(wire.service); count != counts.end()) ++count->second.ports;
+    }
+  };
+  for (const DraftComponent& component : components_) count_all(component.wires);
+  for (const auto& [component, wires] : architecture_.wiring()) {
+    if (!by_name_.contains(component->name()) && !is_removed(component->name())) count_all(*wires);
+  }
   for (const auto& [service, count] : counts) {
-    if (count.step == 0) continue;
     try {
-      // Others than components may have ports of their own.
-      const auto ports = static_cast<std::uint32_t>(service->ports() + count.after - count.before);
-      service->check_ports(ports);
-      service->make_room(ports);
+      service->check_ports(count.ports + service->inputs());
+      // A port that goes, in this change or in one that a late component has yet to take, has its place until then.
+      service->make_room(service->ports() + count.fresh);
     } catch (const Error& failure) {
       rethrow_as_of(failure, count.component, count.step);
     }

@@ -19,12 +19,12 @@ std::string change_name(const Parts& parts) {
 }
 
 /// Takes over what fits: a property that the new shell has not, or has in another type or range, keeps its default.
-void copy_properties(const Shell& from, Shell& to) {
-  for (const auto& property : from.properties()) {
-    PropertyBase* same = to.find_property(property->name());
+void copy_properties(const std::vector<ShownProperty>& from, Shell& to) {
+  for (const ShownProperty& property : from) {
+    PropertyBase* same = to.find_property(property.name);
     if (same == nullptr) continue;
     try {
-      PropertyValue value = same->checked(property->boxed());
+      PropertyValue value = same->checked(property.value);
       same->swap(value);
     } catch (const Error&) {
       continue;
@@ -48,6 +48,7 @@ ErrorDetail preparation_detail(const Error& failure, const std::string& componen
 PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory make_fsm)
     : component_(component),
       parts_(std::move(fresh)),
+      new_shell_(parts_.shell.get()),
       fsm_before_(&component.fsm()),
       restarts_(parts_.shell != nullptr || parts_.fsm != nullptr),
       trace_id_(TraceNames::intern(change_name(parts_))) {
@@ -56,7 +57,7 @@ PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory mak
   if (parts_.fsm != nullptr) parts_.fsm->set_factory(std::move(make_fsm));
   if (parts_.shell == nullptr) return;
   parts_.shell->set_context(&component_.task().context());
-  copy_properties(component_.shell(), *parts_.shell);
+  copy_properties(component_.shown().properties, *parts_.shell);
   if (parts_.fsm != nullptr) return;
   if (!fsm_before_->factory()) {
     throw Error(ErrorCode::prepare_failed,
@@ -80,7 +81,7 @@ PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory mak
 
 PartsChange::~PartsChange() { retire(); }
 
-Shell& PartsChange::shell() noexcept { return parts_.shell != nullptr ? *parts_.shell : component_.shell(); }
+Shell& PartsChange::shell() noexcept { return new_shell_ != nullptr ? *new_shell_ : component_.shell(); }
 
 const FsmBase& PartsChange::fsm() const noexcept {
   return parts_.fsm != nullptr ? *parts_.fsm : *fsm_before_;
@@ -201,7 +202,10 @@ void PartsChange::take() noexcept {
   }
   // Made ready for parts that go out this moment; renew_fallback() arms it anew.
   if (restarts_) component_.task_.set_fallback(nullptr);
-  if (parts_.shell != nullptr) std::swap(parts_.shell, component_.parts_.shell);
+  if (parts_.shell != nullptr) {
+    std::swap(parts_.shell, component_.parts_.shell);
+    component_.present_shell_.store(component_.parts_.shell.get(), std::memory_order_release);
+  }
   if (replaces_fsm()) exchange_fsm();
   std::swap(binding_, component_.binding_);
   taken_ = true;
@@ -211,6 +215,17 @@ void PartsChange::take() noexcept {
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
   if (probation_ != nullptr) probation_->begin(*this);
+}
+
+bool PartsChange::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
+  bool all_written = true;
+  if (new_shell_ == nullptr) return true;
+  for (const auto& port : new_shell_->ports()) port->close();
+  for (const auto& port : new_shell_->ports()) {
+    if (port->kind() == PortKind::write && port->is_connected()) port->service()->raise_floor(time_ns);
+    all_written &= port->make_safe(may_wait, time_ns);
+  }
+  return all_written;
 }
 
 /// By the fsm that was just put in; `before` has gone out.

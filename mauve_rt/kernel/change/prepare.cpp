@@ -39,10 +39,12 @@ class Preview {
   Preview& operator=(const Preview&) = delete;
 
   void begin(const Shell& shell, const DraftComponent& draft) {
-    for (const auto& [name, property] : draft.properties) {
-      properties_.push_back(shell.find_property(name));
-      properties_.back()->preview(property.value);
+    // An urgent change may set any of those that are in meanwhile: this one is refused then, but may read no half of a value.
+    if (&shell == &draft.component->shell()) {
+      for (const ShownProperty& shown : draft.component->shown().properties)
+        preview(shell, shown.name, shown.value);
     }
+    for (const auto& [name, property] : draft.properties) preview(shell, name, property.value);
     for (const auto& port : shell.ports()) {
       const auto wire = draft.wires.find(port->name());
       const bool is_wired = wire != draft.wires.end();
@@ -53,6 +55,13 @@ class Preview {
   }
 
  private:
+  void preview(const Shell& shell, const std::string& name, const PropertyValue& value) {
+    PropertyBase* const property = shell.find_property(name);
+    if (property == nullptr) return;
+    properties_.push_back(property);
+    property->preview(value);
+  }
+
   std::vector<PropertyBase*> properties_;
   std::vector<PortBase*> ports_;
 };
@@ -114,13 +123,14 @@ void TransactionCommit::Work::prepare_added(DraftComponent& added) {
   set_all(component.shell(), added.properties);
   connect_all(component.shell(), added.wires);
   for (const auto& [name, wire] : added.wires) prepare_floor(component, *wire.service);
+  component.show();
   if (!architecture_.is_configured()) return;
   component.configure();
   if (!deployed_ || options_.dry_run) return;
   Task& task = component.task();
   task.join(architecture_.deployment_epoch_ns());
-  host_->attach(task);
-  if (added.runs || draft_->resynchronise_step() != 0) changes_.push_back({.draft = &added});
+  host_->attach(added.component);
+  changes_.push_back({.draft = &added});
 }
 
 void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
@@ -132,6 +142,7 @@ void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
 void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
   Component& component = *changed.component;
   if (!architecture_.is_configured() || options_.dry_run) return;
+  draft_->hold(changed);
   ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
   component.task().swap_fault(before.fault);
   Preview preview;
@@ -170,6 +181,11 @@ void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
 void TransactionCommit::Work::prepare_parts(Change& change) {
   DraftComponent& draft = *change.draft;
   Component& component = *draft.component;
+  constexpr time_ns_t kStateEnd = s_to_ns(1);
+  if (draft.promoted != nullptr) {
+    draft.fresh.core = draft.promoted->suspend(kStateEnd);
+    draft.is_candidate_out = true;
+  }
   change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh), std::move(draft.make_fsm));
   if (draft.core_unready) change.parts->leave_unready();
   if (draft.shell_step != 0) {
@@ -177,9 +193,8 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     connect_all(change.parts->shell(), draft.wires);
     for (const auto& [name, wire] : draft.wires) prepare_floor(component, *wire.service);
     // The old ports let go in the commit, before the new ones are used.
-    for (const auto& port : component.shell().ports()) {
-      if (port->is_connected()) keep(component, std::make_unique<WiringChange>(*port, PortConnection{}));
-    }
+    for (const auto& [name, wire] : draft.wires_before)
+      keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
   }
   if (draft.is_repaired()) change.parts->start_afresh();
   if (draft.promoted != nullptr) change.parts->promote();
@@ -212,7 +227,7 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
   for (DraftComponent& changed : draft_->components()) {
     if (changed.shadow != nullptr)
       changed.shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
-    if (changed.promoted == nullptr) continue;
+    if (!changed.is_candidate_out) continue;
     std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);
     for (Change& change : changes_) {
       if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
@@ -230,7 +245,9 @@ void TransactionCommit::Work::prepare_wiring(Change& change) {
     keep(component, std::make_unique<ShadowEnd>(component.task(), ShadowCause::changed));
   for (const auto& [name, before] : draft.wires_before) {
     if (draft.wires.contains(name)) continue;
-    keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
+    PortBase& port = component.require_port(name);
+    keep(component, std::make_unique<WiringChange>(port, PortConnection{}));
+    prepare_listening(change, port, nullptr);
   }
   for (const auto& [name, wire] : draft.wires) {
     const auto before = draft.wires_before.find(name);
@@ -238,38 +255,28 @@ void TransactionCommit::Work::prepare_wiring(Change& change) {
     PortBase& port = component.require_port(name);
     prepare_floor(component, *wire.service);
     keep(component, std::make_unique<WiringChange>(port, port.prepare(*wire.service, wire.resource)));
-    prepare_listening(change, port, *wire.service);
+    prepare_listening(change, port, wire.service);
   }
 }
 
-/// Where the component takes over the end of one that runs and loses it.
+/// A component that had the end before may be late to let it go, by this change or by an earlier one.
 void TransactionCommit::Work::prepare_floor(const Component& component, ServiceBase& service) {
-  if (service.kind() != PortKind::write) return;
-  const auto leads_there = [&](const std::map<std::string, Wire>& wires) {
-    return std::any_of(wires.begin(), wires.end(),
-                       [&](const auto& wire) { return wire.second.service == &service; });
-  };
-  const auto loses_it = [&](const DraftComponent& other) {
-    return other.ran && leads_there(other.wires_before) && !leads_there(other.wires);
-  };
-  const auto has_it = [&](const DraftComponent& other) {
-    return other.ran && leads_there(other.wires_before);
-  };
-  const auto& kept = draft_->components();
-  const auto& removed = draft_->removed_components();
-  if (std::any_of(kept.begin(), kept.end(), loses_it) || std::any_of(removed.begin(), removed.end(), has_it))
-    keep(component, std::make_unique<FloorChange>(service));
+  if (service.kind() == PortKind::write) keep(component, std::make_unique<FloorChange>(service));
 }
 
-void TransactionCommit::Work::prepare_listening(const Change& change, const PortBase& port,
-                                                ServiceBase& service) {
-  if (service.resource() == nullptr) return;
+/// `service`: what the port will be connected to; nullptr: nothing.
+void TransactionCommit::Work::prepare_listening(Change& change, const PortBase& port, ServiceBase* service) {
   if (change.parts != nullptr && change.parts->restarts())
     return;  // a new fsm has listened there since its prepare()
-  for (const auto& state : change.draft->component->fsm().states()) {
+  Component& component = *change.draft->component;
+  for (const auto& state : component.fsm().states()) {
     if (state->event == nullptr || &state->event->port() != &port) continue;
-    listener_changes_.push_back(&keep(*change.draft->component,
-                                      std::make_unique<ListenerChange>(*service.resource(), *state->event)));
+    if (service == nullptr || service->resource() == nullptr) {
+      keep(component, std::make_unique<ListeningEnd>(*state->event));
+    } else {
+      change.listeners.push_back(
+          &keep(component, std::make_unique<ListenerChange>(*service->resource(), *state->event)));
+    }
   }
 }
 
@@ -285,51 +292,56 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   Task& task = component->task();
   if (task.is_abandoned()) component->stop_listening();
   component->conclude_shadow();
-  const bool ended = host_ != nullptr ? host_->detach(task) : task.end_thread(monotonic_now_ns());
+  const bool ended = host_ != nullptr ? host_->detach(*component) : task.end_thread(monotonic_now_ns());
   if (task.is_parked()) {
     for (const auto& port : component->shell().ports()) port->disconnect();
     if (component->is_configured()) component->update_listening();
-    component->cleanup();
+    architecture_.dispose("cleanup of " + component->description(), [component] { component->cleanup(); });
   }
   if (!ended) {
-    architecture_.keep_until_ended(component, was_listed, draft_->removed_resources());
+    architecture_.keep_until_ended(component, was_listed);
   } else if (was_listed) {
     architecture_.retire_trace(task);
   }
 }
 
-/// The thread of a component that was given up may come back to what it was working with.
-void TransactionCommit::Work::leave_behind() {
-  struct Used {
-    std::vector<std::unique_ptr<CommitAction>> actions;
-    std::vector<std::unique_ptr<PartsChange>> parts;
-    std::unique_ptr<Commit> commit;
-  };
-  if (commit_ == nullptr || commit_->kept_by() == nullptr) return;
-  Task& task = *commit_->kept_by();
-  auto used = std::make_shared<Used>();
-  for (Change& change : changes_) used->parts.push_back(std::move(change.parts));
-  used->actions = std::move(actions_);
-  used->commit = std::move(commit_);
-  task.leave_behind(std::move(used));
+/// Of one that is not made.
+void TransactionCommit::Work::discard() noexcept {
+  if (commit_ == nullptr || commit_->is_left()) {
+    discard_rest();
+    architecture_.forget_open(*this);
+    phase_.store(Phase::settled, std::memory_order_release);
+    return;
+  }
+  // An adopt does not end, and its thread will come back to the record: others go on.
+  draft_->release();
+  release_whole();
+  architecture_.forget_open(*this);
+  architecture_.keep_open(shared_from_this());
 }
 
-void TransactionCommit::Work::discard() noexcept {
-  leave_behind();
+void TransactionCommit::Work::discard_rest() noexcept {
   give_back_candidates();
   settle_with_host();
-  for (Change& change : changes_) change.parts.reset();  // cleans up, and disconnects a new shell
+  for (Change& change : changes_) dispose(change);
   for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);
-  for (const auto& resource : prepared_resources_) resource->cleanup();
+  for (const auto& resource : prepared_resources_)
+    architecture_.dispose("cleanup of " + resource->description(), [resource] { resource->cleanup(); });
   // Others may have taken numbers since the draft was finished.
   if (numbers_after_ == 0 || architecture_.numbers() == numbers_after_)
     architecture_.give_back_numbers(numbers_before_);
   if (draft_ != nullptr) {
-    if (!configured_anew_.empty()) draft_->set_changed();
+    if (!configured_anew_.empty()) note_configured_anew();
     draft_->release();
   }
   release_whole();
+}
+
+/// What was configured anew is not what others were prepared for.
+void TransactionCommit::Work::note_configured_anew() noexcept {
+  const CommitGate::Look table(architecture_.commit_gate());
+  for (const ConfiguredAnew& done : configured_anew_) done.component->change_mark().set_changed();
 }
 
 }  // namespace mauve

@@ -45,10 +45,10 @@ std::size_t allocated_bytes() noexcept {
 /// | ---------- | --------------------------------------- | ------------- | -------------------------------------------- |
 /// | the rest   | [setup]                                 | anyone        | -                                            |
 /// | used       | who commits first                       | anyone        | acq_rel: one commits                         |
-/// | phase      | who commits, first under the gate; then who holds the change lock | both | release/acquire: hands over the work |
+/// | phase      | who commits, first within a look at the table; then who holds the change lock | both | release/acquire: hands over the work |
 /// | outcome    | who commits                             | who completes | relaxed: phase, or its caller, hands it over |
-/// | is_called_off | who calls off, under the gate        | who commits   | relaxed: under the gate, or a hint           |
-/// | is_dropped | who holds the change lock, under the gate | anyone      | release/acquire                              |
+/// | is_called_off | who calls off, within a look         | who commits   | relaxed: within a look, or a hint            |
+/// | is_dropped | who holds the change lock, within a look | anyone       | release/acquire                              |
 /// | work       | who commits; else who holds the change lock | the same  | phase: committing; is_dropped                |
 /// | failure    | who holds the change lock               | the same      | -                                            |
 class PreparedTransaction::State {
@@ -59,32 +59,37 @@ class PreparedTransaction::State {
         deployment(its_host.deployments()),
         work(std::make_shared<TransactionCommit::Work>(its_architecture, &its_host, options)) {}
 
-  /// Once false, false for ever. A change that is under way may still be refused.
+  /// Once false, false for ever.
   bool is_unchanged() const MAUVE_RT {
     if (basis.is_structural && architecture.commit_gate().structure() != basis.structure) return false;
     if (const PluginRegistry* registry = architecture.registry(); registry != nullptr) {
       if (registry->version() != basis.code)
         return false;  // its new parts may be of code that was loaded anew
     }
-    return std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
-      return touched.component->change_mark().changes() == touched.changes;
-    });
+    return basis.is_run_only ||
+           std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
+             return touched.component->change_mark().changes() == touched.changes;
+           });
   }
   bool is_current() const MAUVE_RT {
     if (is_dropped.load(std::memory_order_acquire)) return false;
     if (!host.is_deployed() || host.deployments() != deployment) return false;
     return is_unchanged() && std::all_of(basis.touched.begin(), basis.touched.end(), [](const auto& touched) {
-             return touched.component->task().state() == touched.state &&
-                    !touched.component->change_mark().is_claimed();
+             return touched.component->task().state() == touched.state;
            });
   }
-  /// Claims all; or why not. CommitGate::structural held where it is structural.
+  /// Why not. An ordinary change that is open was called off; another prepared one, or one that acts on the parts that are in,
+  /// comes before this one. CommitGate::structural held where it is structural.
   std::optional<PreparedOutcome> begin() noexcept {
-    const std::lock_guard gate(architecture.commit_gate().mutex);
+    CommitGate& gate = architecture.commit_gate();
+    const CommitGate::Look table(gate);
     if (is_called_off.load(std::memory_order_relaxed) || !host.is_deployed())
       return PreparedOutcome::withdrawn;
-    if (!is_current()) return PreparedOutcome::stale;
-    for (const auto& touched : basis.touched) touched.component->change_mark().claim();
+    const bool is_kept_off =
+        std::any_of(basis.touched.begin(), basis.touched.end(), [&gate](const auto& touched) {
+          return touched.component->change_mark().is_held() || gate.has_open_about(touched.component->task());
+        });
+    if (is_kept_off || !is_current()) return PreparedOutcome::stale;
     phase.store(kCommitting, std::memory_order_release);
     return std::nullopt;
   }
@@ -93,21 +98,12 @@ class PreparedTransaction::State {
                        [this]() MAUVE_RT { return is_called_off.load(std::memory_order_relaxed); });
   }
   void call_off() MAUVE_RT {
-    const std::lock_guard gate(architecture.commit_gate().mutex);
+    const CommitGate::Look table(architecture.commit_gate());
     is_called_off.store(true, std::memory_order_relaxed);
-    if (phase.load(std::memory_order_relaxed) == kCommitting) work->call_off();  // relaxed: under the gate
+    if (phase.load(std::memory_order_relaxed) == kCommitting) work->call_off();  // relaxed: within a look
   }
   void end(bool is_made) noexcept {
-    const std::lock_guard gate(architecture.commit_gate().mutex);
-    for (const auto& touched : basis.touched) {
-      ChangeMark& mark = touched.component->change_mark();
-      if (is_made) {
-        mark.set_changed();
-        mark.unsettle();
-      }
-      mark.release();
-    }
-    if (is_made && basis.is_structural) architecture.commit_gate().restructured();
+    const CommitGate::Look table(architecture.commit_gate());
     phase.store(is_made ? kCommitted : kNotMade, std::memory_order_release);
   }
   PreparedOutcome commit(time_ns_t until_ns) noexcept {
@@ -120,6 +116,7 @@ class PreparedTransaction::State {
       case Outcome::timed_out:
         return PreparedOutcome::timed_out;
       case Outcome::changed:
+      case Outcome::stale:
         return PreparedOutcome::stale;
       case Outcome::off:
         return PreparedOutcome::withdrawn;
@@ -167,9 +164,7 @@ PreparedTransaction::~PreparedTransaction() {
   state_->architecture.delist(*this);
   if (settle()) return;
   if (state_->phase.load(std::memory_order_acquire) == State::kCommitted) {
-    std::vector<std::shared_ptr<Component>> unsettled;
-    for (const auto& touched : state_->basis.touched) unsettled.push_back(touched.component);
-    state_->work->keep_open(std::move(unsettled));
+    state_->architecture.keep_open(state_->work);
   } else {
     let_go();
   }
@@ -186,12 +181,16 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
   CommitGate& gate = state.architecture.commit_gate();
   gate.press(state.urgent);
   const bool has_gate = !state.basis.is_structural || state.lock_structure(until_ns);
-  gate.relax(state.urgent);
   const std::optional<PreparedOutcome> why_not = has_gate ? state.begin() : PreparedOutcome::timed_out;
+  // The structure is free again at the decision, before the components have taken the change.
+  std::unique_lock structural(gate.structural, std::defer_lock);
+  if (has_gate && state.basis.is_structural) structural = std::unique_lock(gate.structural, std::adopt_lock);
   const PreparedOutcome outcome = why_not ? *why_not : state.commit(until_ns);
   state.outcome.store(outcome, std::memory_order_relaxed);  // relaxed: phase, or its caller, hands it on
   if (!why_not) state.end(outcome == PreparedOutcome::committed);
-  if (has_gate && state.basis.is_structural) gate.structural.unlock();
+  gate.relax(state.urgent);  // only now: an ordinary commit that is installed meanwhile would come in its way
+  if (structural.owns_lock()) structural.unlock();
+  if (outcome == PreparedOutcome::committed) state.work->await_passes(until_ns);
   return outcome;
 }
 
@@ -202,22 +201,16 @@ bool PreparedTransaction::settle() noexcept {
   State& state = *state_;
   const State::Phase phase = state.phase.load(std::memory_order_acquire);
   if (phase != State::kCommitted) return phase == State::kSettled;
-  if (!state.work->wait_passed(0)) return false;
-  try {
-    state.work->settle_committed();
-  } catch (...) {
-    state.failure = std::current_exception();
-  }
-  const std::lock_guard gate(state.architecture.commit_gate().mutex);
-  for (const auto& touched : state.basis.touched) touched.component->change_mark().settle();
-  state.phase.store(State::kSettled, std::memory_order_release);
-  return true;
+  const bool is_settled = state.work->settle();
+  state.failure = state.work->failure();
+  if (is_settled) state.phase.store(State::kSettled, std::memory_order_release);
+  return is_settled;
 }
 
 /// The change lock held.
 void PreparedTransaction::drop_if_stale() noexcept {
   {
-    const std::lock_guard gate(state_->architecture.commit_gate().mutex);
+    const CommitGate::Look table(state_->architecture.commit_gate());
     const State::Phase phase = state_->phase.load(std::memory_order_acquire);
     const bool is_in_use =
         phase == State::kCommitting || phase == State::kCommitted || phase == State::kSettled;
@@ -226,10 +219,6 @@ void PreparedTransaction::drop_if_stale() noexcept {
   }
   note_failure();
   let_go();
-}
-
-bool PreparedTransaction::has_added(const std::string& name) const noexcept {
-  return state_->phase.load(std::memory_order_acquire) == State::kCommitted && state_->work->has_added(name);
 }
 
 /// The change lock held.
@@ -267,6 +256,7 @@ TransactionReport PreparedTransaction::complete() {
     settle();
     note_failure();
   }
+  state.architecture.wait_disposed();
   if (outcome == PreparedOutcome::stale) {
     throw Error(ErrorCode::wrong_revision,
                 "what the change was prepared against has changed, or is being changed; nothing was changed",

@@ -46,9 +46,8 @@ void TransactionCommit::Work::begin_alone() {
                  .found = std::to_string(revision),
                  .remedy = "read it again, then ask again"});
   }
-  if (claimed_.structure) {
-    const std::lock_guard structural(
-        architecture_.commit_gate().structural);  // after a prepared one that is being made
+  {
+    const CommitGate::Look table(architecture_.commit_gate());
     structure_ = architecture_.commit_gate().structure();
   }
   architecture_.reap();
@@ -59,6 +58,7 @@ void TransactionCommit::Work::begin_alone() {
 void TransactionCommit::Work::make(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
   begin(std::move(transaction));
+  if (!options_.dry_run) architecture_.keep_open(shared_from_this());
   try {
     draft_steps();
     const auto pause = let_others_in();
@@ -66,29 +66,20 @@ void TransactionCommit::Work::make(Transaction transaction) {
     prepare_ns_ = monotonic_now_ns() - began;
     if (!options_.dry_run) {
       require_host_open();
-      gather();
       commit_by_force_if_asked();
     }
   } catch (...) {
+    phase_.store(Phase::off, std::memory_order_release);
     discard();
     throw;
   }
-  if (options_.dry_run) return discard();
-  set_epoch();
-  if (commit_->has_passed()) return finish();
-  keep_open(draft_->release_unsettled());
+  if (options_.dry_run) {
+    phase_.store(Phase::off, std::memory_order_release);
+    return discard();
+  }
+  if (settle()) architecture_.forget_open(*this);
   release_whole();
-}
-
-void TransactionCommit::Work::finish() {
-  architecture_.note_authors(transaction_);  // first: who sees the new revision sees who made it
-  publish();
-  architecture_.drop_stale_prepared();  // they refer to what goes now
-  settle_with_host();
-  retire();
-  draft_->release();
-  release_whole();
-  keep_for_report();
+  if (failure_) std::rethrow_exception(failure_);
 }
 
 /// What would be done before the commit cannot wait for it.
@@ -129,24 +120,24 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
       const auto pause = let_others_in();
       prepare();
     }
-    in_reach_ = architecture_.resources();
     gather();
     require_host_open();
-    basis.is_structural = draft_->is_structural();
+    basis.is_structural = is_structural_;
+    basis.is_run_only = is_run_only_;
     basis.structure = structure_;
     for (const auto& component : draft_->claimed())
       basis.touched.push_back({.component = component, .changes = 0, .state = {}});
     const auto found = [&](std::list<DraftComponent>& components) {
       for (const DraftComponent& component : components) {
         for (Basis::Touched& touched : basis.touched) {
-          if (touched.component == component.component) touched.state = component.state;
+          if (touched.component != component.component) continue;
+          touched.state = component.state;
+          touched.changes = component.changes;
         }
       }
     };
     found(draft_->components());
     found(draft_->removed_components());
-    for (Basis::Touched& touched : basis.touched)
-      touched.changes = touched.component->change_mark().changes();
     draft_->release();
     release_whole();
   } catch (...) {
@@ -158,14 +149,12 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
 }
 
 Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
-  const time_ns_t timeout_ns = std::max<time_ns_t>(0, until_ns - monotonic_now_ns());
-  const Commit::Outcome outcome = commit_->carry_out(timeout_ns, architecture_.commit_gate());
+  Commit::Outcome outcome = commit_->decide(until_ns, architecture_.commit_gate());
   committed_ = outcome == Commit::Outcome::made;
+  if (!committed_) phase_.store(Phase::off, std::memory_order_release);
   const bool is_changed = outcome == Commit::Outcome::refused && commit_->refused_by() == &guard_;
   return is_changed ? Commit::Outcome::changed : outcome;
 }
-
-void TransactionCommit::Work::settle_committed() { finish(); }
 
 /// A shutdown waits for nobody's preparation: what was prepared for a running architecture is of no use any more.
 void TransactionCommit::Work::require_host_open() const {
@@ -177,8 +166,8 @@ void TransactionCommit::Work::require_host_open() const {
 /// Either a shutdown sees the threads of what was added, and gets those of what was changed, or they end here.
 void TransactionCommit::Work::settle_with_host() {
   if (!deployed_ || host_->is_deployed()) return;
-  for (DraftComponent* added : prepared_added_) host_->detach(added->component->task());
-  for (const Change& change : changes_) host_->detach(change.draft->component->task());
+  for (DraftComponent* added : prepared_added_) host_->detach(*added->component);
+  for (const Change& change : changes_) host_->detach(*change.draft->component);
 }
 
 void TransactionCommit::Work::draft_steps() {
@@ -194,7 +183,8 @@ void TransactionCommit::Work::draft_steps() {
     const DraftComponent* component = draft_->find(report.component);
     if (component == nullptr || component->core_step != number) continue;
     if (!component->is_added) report.from_core = component->component->core_implementation();
-    report.to_core = component->fresh.core->implementation();
+    report.to_core = component->promoted != nullptr ? component->promoted->core_name()
+                                                    : component->fresh.core->implementation();
   }
   try {
     draft_->finish();
@@ -223,7 +213,8 @@ void TransactionCommit::Work::gather() {
   for (const auto& repair : repairs_) actions.push_back(repair.get());
   commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
   auto place = commit_->participants().begin();
-  for (const Change& change : changes_) {
+  for (Change& change : changes_) {
+    change.place = &*place;
     place->task = &change.draft->component->task();
     place->afterwards = afterwards_of(change);
     place->replaces_parts = change.parts != nullptr;
@@ -239,14 +230,18 @@ void TransactionCommit::Work::gather() {
   touched_.clear();
   for (const Change& change : changes_) touched_.push_back(change.draft->component);
   commit_->assign_actions();
-  if (draft_->is_structural()) commit_->set_structural();
+  prepare_publication();
+  commit_->set_publication(*this);
+  if (is_structural_) commit_->set_structural();
 }
 
 void TransactionCommit::Work::commit_by_force_if_asked() {
+  gather();
   try {
     return carry_out_commit();
   } catch (const Error& failure) {
-    if (!options_.force || failure.code() != ErrorCode::timeout || !force_hung()) throw;
+    const bool is_left = commit_->is_left();  // else a thread may come back to the record
+    if (!options_.force || failure.code() != ErrorCode::timeout || !is_left || !force_hung()) throw;
   }
   gather();
   carry_out_commit();
@@ -297,29 +292,30 @@ bool TransactionCommit::Work::stop_by_force(const Change& change) {
 
 void TransactionCommit::Work::carry_out_commit() {
   CommitGate& gate = architecture_.commit_gate();
-  std::unique_lock structural(gate.structural, std::defer_lock);
-  if (draft_->is_structural()) {
-    structural.lock();
-    require_same_structure();
+  const time_ns_t until_ns = later_by(monotonic_now_ns(), options_.timeouts.commit_ns);
+  commit_->set_yields();
+  Commit::Outcome outcome{};
+  {
+    std::unique_lock structural(gate.structural, std::defer_lock);
+    if (is_structural_) structural.lock();
+    outcome = commit_->decide(until_ns, gate);
   }
-  if (!changes_.empty()) {
-    commit_->set_yields();
-    committed_ = commit_->carry_out(options_.timeouts.commit_ns, gate) == Commit::Outcome::made;
-    if (!committed_) throw_not_made();
+  committed_ = outcome == Commit::Outcome::made;
+  if (outcome == Commit::Outcome::stale) {
+    throw Error(ErrorCode::wrong_revision,
+                is_structural_
+                    ? "a prepared change added, removed or connected something first; nothing was changed"
+                    : "a prepared change came before this one; nothing was changed",
+                {.remedy = "read the architecture, then ask again"});
   }
-  draft_->set_changed();
-}
-
-/// A prepared commit that came while this change was being prepared; of what it touches it is kept off otherwise.
-void TransactionCommit::Work::require_same_structure() const {
-  if (architecture_.commit_gate().structure() == structure_) return;
-  throw Error(ErrorCode::wrong_revision,
-              "a prepared change added, removed or connected something first; nothing was changed",
-              {.remedy = "read the architecture, then ask again"});
+  if (!committed_) throw_not_made();
+  note_made();
+  set_epoch();
+  commit_->await_passes(until_ns);
 }
 
 void TransactionCommit::Work::throw_not_made() {
-  const bool is_adopts_own = commit_->refused_by() != nullptr && commit_->kept_by() == nullptr;
+  const bool is_adopts_own = commit_->refused_by() != nullptr && !commit_->has_given_up();
   try {
     commit_->rethrow_refusal();
   } catch (const Error& failure) {
@@ -356,30 +352,16 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
   throw Error(ErrorCode::adopt_refused, what);
 }
 
-/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again.
+/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again. One that is late keeps
+/// its grid.
 void TransactionCommit::Work::set_epoch() {
-  if (draft_->resynchronise_step() == 0) return;
-  const time_ns_t from_ns = committed_ ? commit_->instant_ns() - 1 : host_->clock().now_ns();
-  const time_ns_t epoch_ns = later_by(from_ns, kDeploymentLead);
+  if (!resynchronises_) return;
+  const time_ns_t epoch_ns = later_by(commit_->instant_ns() - 1, kDeploymentLead);
   architecture_.set_deployment_epoch(epoch_ns);
   for (const auto& component : architecture_.components()) {
-    if (!places_.contains(component->name())) component->task().join(epoch_ns);
+    Task& task = component->task();
+    if (!places_.contains(component->name()) && task.is_parked()) task.join(epoch_ns);
   }
-}
-
-void TransactionCommit::Work::publish() {
-  ListChange lists;
-  for (const DraftComponent& component : draft_->components()) {
-    if (component.is_added) lists.added_components.push_back(component.component);
-    lists.changed.push_back(component.component.get());
-  }
-  for (const DraftComponent& component : draft_->removed_components())
-    lists.removed_components.push_back(component.component);
-  for (const DraftResource& resource : draft_->resources()) {
-    lists.added_resources.push_back(resource.resource);
-  }
-  lists.removed_resources = draft_->removed_resources();
-  architecture_.change_lists(lists);
 }
 
 /// The fallback stays ready as long as shell and fsm are the ones it was made ready for, unless it has just been replaced
@@ -402,46 +384,18 @@ void TransactionCommit::Work::settle_shadow(const DraftComponent& changed) {
   for (const auto& [name, property] : changed.properties) shadow->set_property(name, property.value);
 }
 
-void TransactionCommit::Work::retire() {
-  for (const Change& change : changes_) {
-    const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
-    if (handover == nullptr || handover->is_whole()) continue;
-    reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
-        "a field of the old core could not be read at the change: its value is that of the preparation");
-  }
-  for (ListenerChange* change : listener_changes_) change->hand_over();
-  for (Change& change : changes_) {
-    Component& component = *change.draft->component;
-    if (change.retreat == nullptr && component.is_configured()) component.update_listening();
-    settle_shadow(*change.draft);
-    if (change.parts == nullptr) continue;
-    component.settle_probation();  // the take has ended it
-    if (!change.parts->has_probation()) change.parts->retire();
-    renew_fallback(change);
-    if (change.parts->has_probation()) component.keep_probation(std::move(change.parts));
-    change.parts.reset();
-  }
-  for (const DraftComponent& removed : draft_->removed_components()) {
-    try {  // somebody who still held it may have started it again
-      const Task& task = removed.component->task();
-      if (!task.is_parked() && !task.is_abandoned()) removed.component->task().stop();
-    } catch (const Error&) {  // it faulted, or is in a state: ending its thread is the answer
-    }
-    let_go(removed.component, true);
-  }
-  for (const auto& resource : draft_->removed_resources()) {
-    if (!architecture_.is_used_by_left_behind(*resource)) resource->cleanup();
-  }
-}
-
 /// Whoever waits for the report keeps nothing that others may take away meanwhile.
 void TransactionCommit::Work::keep_for_report() {
   changes_.clear();
-  listener_changes_.clear();
   actions_.clear();
   repairs_.clear();
   prepared_added_.clear();
   prepared_resources_.clear();
+  lists_ = {};
+  wires_.clear();
+  added_.clear();
+  elements_.clear();
+  services_.clear();
   draft_.reset();
 }
 
@@ -454,6 +408,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
+  const std::lock_guard lock(reports_mutex_);
   TransactionReport report{.steps = reports_,
                            .revision = architecture_.revision(),
                            .prepare_ns = is_simulated_ ? 0 : prepare_ns_,

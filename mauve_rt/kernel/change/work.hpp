@@ -2,8 +2,10 @@
 // The work of one transaction, from its draft to its report.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -15,7 +17,18 @@
 
 namespace mauve {
 
-class TransactionCommit::Work : public std::enable_shared_from_this<TransactionCommit::Work> {
+/// Its record: what it was drafted from, what it puts in, what it has put out. It is held by who asked for it, and by the
+/// architecture from its draft on until nothing of it is left to be done: no component is to take it, or to come back to it, and
+/// what it has put out is retired. Ordinary threads, with the architecture's change lock, but for these:
+///
+/// | member                | written by                     | read by | order                                          |
+/// | --------------------- | ------------------------------ | ------- | ---------------------------------------------- |
+/// | phase_                | who publishes, who asked       | anyone  | release/acquire: the decision, and all before it |
+/// | lists_ ... services_  | who asked, before the commit   | who publishes, once | the gate's mutex                   |
+/// | reports_              | who asked, then who settles    | who asked | reports_mutex_, from the commit on           |
+class TransactionCommit::Work final : public std::enable_shared_from_this<TransactionCommit::Work>,
+                                      public OpenChange,
+                                      private Publication {
  public:
   Work(Architecture& architecture, Runner* host, const TransactionOptions& options);
 
@@ -32,24 +45,26 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
       ComponentState state;
     };
     std::vector<Touched> touched{};
+    bool is_run_only{
+        false};  // it starts and stops, and assigns nothing else: other changes do not make it stale
     bool is_structural{false};
     std::uint32_t structure{0};
     std::uint32_t code{0};  // the registry's version
   };
   /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
   Basis prepare_for_later(Transaction transaction);
-  /// All components of the basis claimed, the basis checked. [rt] as far as the actions are.
+  /// The basis checked. [rt] as far as the actions are.
   Commit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
+  /// Of one that was committed: waits until all components have taken it, at most until the instant and a little longer. [rt]
+  void await_passes(time_ns_t until_ns) noexcept { commit_->await_passes(until_ns); }
   /// Calls off commit_prepared(), before or while it runs. [rt]
   void call_off() MAUVE_RT { commit_->call_off(Commit::Off::preempted); }
   /// Sleeps until all components have taken the change that was committed, at most until the instant. [non-rt]
   bool wait_passed(time_ns_t until_ns) const noexcept;
-  /// Has the architecture complete a prepared change that was committed. [non-rt], the change lock held.
-  void keep_open(std::vector<std::shared_ptr<Component>> unsettled);
-  /// Whether it adds a component or resource of that name. [non-rt], before it is completed.
-  bool has_added(const std::string& name) const noexcept;
-  /// What follows the commit, once all components have taken the change. [non-rt], the change lock held.
-  void settle_committed();
+  bool settle() noexcept override;
+  /// What went wrong when what it has put out was retired, first; the change is in. [non-rt]
+  const std::exception_ptr& failure() const noexcept { return failure_; }
+  const Task* find_late() const noexcept override;
   /// Throws why it was not made. [non-rt]
   [[noreturn]] void throw_not_made();
   /// [non-rt], the change lock held.
@@ -60,8 +75,19 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   struct Change {
     DraftComponent* draft;
     std::unique_ptr<PartsChange> parts{};
-    Retreat* retreat{nullptr};  // of a removed one
+    Retreat* retreat{nullptr};                 // of a removed one
+    std::vector<ListenerChange*> listeners{};  // among the actions
+    Participant* place{nullptr};
+    bool is_settled{false};
   };
+  enum class Phase : std::uint8_t { being_made, made, off, settled };
+
+  // the table
+  time_ns_t since_ns() const noexcept override;
+  bool is_current() const noexcept override;
+  void publish(time_ns_t instant_ns) noexcept override;
+  void prepare_publication();
+  void prepare_lists();
 
   // draft
   void begin(Transaction transaction);
@@ -87,27 +113,31 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   void prepare_floor(const Component& component, ServiceBase& service);
   void prepare_properties(Change& change);
   void prefault_parts();
-  void prepare_listening(const Change& change, const PortBase& port, ServiceBase& service);
+  void prepare_listening(Change& change, const PortBase& port, ServiceBase* service);
   // commit
   void gather();
   void commit_by_force_if_asked();
   bool force_hung();
   bool stop_by_force(const Change& change);
   void carry_out_commit();
-  void require_same_structure() const;
-  void finish();
   void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
   // after it
-  void publish();
   void settle_with_host();
-  void retire();
+  void note_made() noexcept;
+  bool settle_if_over(Change& change) noexcept;
+  void settle_place(Change& change);
+  void dispose(Change& change);
+  void note_handover(const Change& change);
+  void retire_removed(const std::shared_ptr<Component>& component);
+  void end_settlement() noexcept;
+  void discard_rest() noexcept;
+  void note_configured_anew() noexcept;
   void set_epoch();
   void keep_for_report();
   static void renew_fallback(Change& change);
   static void settle_shadow(const DraftComponent& changed);
   void give_back_candidates() noexcept;
-  void leave_behind();
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 
   template <typename Part>
@@ -128,10 +158,10 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   std::size_t numbers_before_{0};
   std::size_t numbers_after_{0};
   ArchitectureClaims claimed_{};
-  std::uint32_t structure_{0};                       // of a structural one: as it was when this began to look
-  std::vector<std::shared_ptr<Resource>> in_reach_;  // of a prepared one: outlive what refers to them
+  std::uint32_t structure_{0};  // of a structural one: as it was when this began to look
   std::unique_ptr<Draft> draft_;
 
+  std::mutex reports_mutex_;
   std::vector<StepReport> reports_;  // by step
   time_ns_t prepare_ns_{0};
   std::vector<std::shared_ptr<Resource>> prepared_resources_;
@@ -145,29 +175,30 @@ class TransactionCommit::Work : public std::enable_shared_from_this<TransactionC
   std::vector<std::unique_ptr<Repair>> repairs_;  // taken in last: the new parts are in
   std::vector<Change> changes_;
   std::vector<std::unique_ptr<CommitAction>>
-      actions_;                                    // in the order they are taken in; the new parts come after
-  std::vector<ListenerChange*> listener_changes_;  // among the actions
+      actions_;  // in the order they are taken in; the new parts come after
   StateGuard guard_;
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};
+  std::atomic<Phase> phase_{Phase::being_made};
+  std::atomic<bool> is_noted_{false};
+  std::exception_ptr failure_{};  // of its retirement
+  bool resynchronises_{false};
 
-  class Late;
-};
-
-/// A change that a late component has not taken yet.
-class TransactionCommit::Work::Late final : public OpenChange {
- public:
-  Late(std::shared_ptr<Work> work, std::vector<std::shared_ptr<Component>> unsettled)
-      : work_(std::move(work)), unsettled_(std::move(unsettled)) {}
-  bool settle() noexcept override;
-  const Task* find_late() const noexcept override;
-  bool has_added(const std::string& name) const noexcept override { return work_->has_added(name); }
-
- private:
-  std::shared_ptr<Work> work_;
-  std::vector<std::shared_ptr<Component>> unsettled_;
+  // what it makes of the table
+  struct Element {
+    Component* component;
+    std::uint32_t changes;  // as the draft found it
+    bool has_place;         // it takes part in the commit
+  };
+  bool is_structural_{false};
+  bool is_run_only_{false};
+  Lists lists_{};
+  std::vector<Element> elements_{};  // of the components that were there
+  std::vector<std::pair<Component*, std::shared_ptr<const Wires>>> wires_{};
+  std::vector<Component*> added_{};
+  std::vector<ServiceBase*> services_{};  // to which a port is connected or disconnected
 };
 
 /// Takes the time of a part of a step's preparation, and says of its errors whose they are.

@@ -14,20 +14,22 @@ EarlierChange TransactionCommit::Work::look_at_earlier() const {
   if ((claims.structure && is_structural()) || (claims.revision && options_.expected_revision != 0))
     return EarlierChange::under_way;
   const auto& steps = transaction_.steps();
+  const bool is_for_all =
+      std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
   const auto is_named = [&steps](const Component& component) {
     return std::any_of(steps.begin(), steps.end(), [&component](const auto& step) {
       return step->is_for_all() || step->component() == component.name();
     });
   };
   const auto components = architecture_.components();
-  const std::lock_guard gate(architecture_.commit_gate().mutex);
+  const CommitGate::Look table(architecture_.commit_gate());
   EarlierChange found = EarlierChange::none;
   for (const auto& component : components) {
     const ChangeMark& mark = component->change_mark();
-    const bool is_late = mark.is_unsettled() && !component->task().is_left_behind();
-    if ((!mark.is_claimed() && !is_late) || !is_named(*component)) continue;
+    if ((!mark.is_claimed() && !mark.is_unsettled()) || !is_named(*component)) continue;
     if (mark.is_claimed()) return EarlierChange::under_way;
-    found = EarlierChange::late;
+    // One that hangs is removed as it is, and a new epoch leaves out those that are late.
+    if (!component->task().is_left_behind() && !is_for_all) found = EarlierChange::late;
   }
   return found;
 }
@@ -61,37 +63,206 @@ bool TransactionCommit::Work::wait_passed(time_ns_t until_ns) const noexcept {
   return commit_->wait_passed(until_ns);
 }
 
-void TransactionCommit::Work::keep_open(std::vector<std::shared_ptr<Component>> unsettled) {
-  architecture_.keep_open(std::make_shared<Late>(shared_from_this(), std::move(unsettled)));
+// ---- what it makes of the architecture's table
+
+void TransactionCommit::Work::prepare_publication() {
+  is_structural_ = draft_->is_structural();
+  resynchronises_ = draft_->resynchronise_step() != 0;
+  const bool is_plain = std::all_of(changes_.begin(), changes_.end(), [](const Change& change) {
+    return change.parts == nullptr && change.retreat == nullptr && !change.draft->is_added;
+  });
+  is_run_only_ = is_plain && !is_structural_ && !resynchronises_ && !changes_.empty() && actions_.empty() &&
+                 repairs_.empty() && configured_anew_.empty();
+  elements_.clear();
+  wires_.clear();
+  added_.clear();
+  services_.clear();
+  const auto note = [this](DraftComponent& component, const Wires& wires) {
+    const bool has_place = std::any_of(changes_.begin(), changes_.end(),
+                                       [&](const Change& change) { return change.draft == &component; });
+    if (component.is_added)
+      added_.push_back(component.component.get());
+    else
+      elements_.push_back(
+          {.component = component.component.get(), .changes = component.changes, .has_place = has_place});
+    if (!component.is_added && component.shell_step == 0 && wires == component.wires_before) return;
+    wires_.emplace_back(component.component.get(), std::make_shared<const Wires>(wires));
+    for (const Wires* each : std::initializer_list<const Wires*>{&wires, &component.wires_before}) {
+      for (const auto& [port, wire] : *each) services_.push_back(wire.service);
+    }
+  };
+  for (DraftComponent& component : draft_->components()) note(component, component.wires);
+  for (DraftComponent& component : draft_->removed_components()) note(component, {});
+  for (const auto& resource : draft_->removed_resources())
+    services_.insert(services_.end(), resource->services().begin(), resource->services().end());
+  if (is_structural_) prepare_lists();
 }
 
-bool TransactionCommit::Work::Late::settle() noexcept {
-  Architecture& architecture = work_->architecture_;
-  if (!work_->commit_->has_passed()) return false;
-  work_->host_ = architecture.host();  // the one that it was made by may be gone
-  work_->deployed_ = work_->host_ != nullptr && work_->host_->is_deployed();
-  try {
-    work_->finish();
-  } catch (...) {  // what cannot be retired stays; the change is in
+void TransactionCommit::Work::prepare_lists() {
+  lists_ = architecture_.lists();
+  const auto& removed = draft_->removed_components();
+  std::erase_if(lists_.components, [&](const auto& component) {
+    return std::any_of(removed.begin(), removed.end(),
+                       [&](const DraftComponent& gone) { return gone.component == component; });
+  });
+  const auto& gone = draft_->removed_resources();
+  std::erase_if(lists_.resources, [&](const auto& resource) {
+    return std::find(gone.begin(), gone.end(), resource) != gone.end();
+  });
+  for (const DraftComponent& component : draft_->components()) {
+    if (component.is_added) lists_.components.push_back(component.component);
   }
-  const std::lock_guard gate(architecture.commit_gate().mutex);
-  for (const auto& component : unsettled_) component->change_mark().settle();
+  for (const DraftResource& resource : draft_->resources()) lists_.resources.push_back(resource.resource);
+}
+
+time_ns_t TransactionCommit::Work::since_ns() const noexcept {
+  time_ns_t latest_ns = 0;
+  for (const Element& element : elements_)
+    latest_ns = std::max(latest_ns, element.component->change_mark().since_ns());
+  for (const ServiceBase* service : services_) latest_ns = std::max(latest_ns, service->since_ns());
+  return latest_ns;
+}
+
+bool TransactionCommit::Work::is_current() const noexcept {
+  if (is_structural_ && architecture_.commit_gate().structure() != structure_) return false;
+  return is_run_only_ || std::all_of(elements_.begin(), elements_.end(), [](const Element& element) {
+           return element.component->change_mark().changes() == element.changes;
+         });
+}
+
+void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
+  if (is_structural_) architecture_.swap_lists(lists_);
+  for (auto& [component, wires] : wires_) component->swap_wires(wires);
+  for (ServiceBase* service : services_) service->set_since_ns(instant_ns);
+  const bool has_claimed = draft_->forget_claims();
+  for (const Element& element : elements_) {
+    ChangeMark& mark = element.component->change_mark();
+    if (!is_run_only_) mark.set_changed();
+    if (element.has_place) mark.unsettle();
+    if (has_claimed) mark.release();
+    mark.set_since_ns(instant_ns);
+  }
+  for (Component* component : added_) component->enter(architecture_);
+  if (is_structural_) architecture_.commit_gate().restructured();
+  architecture_.note_open();
+  phase_.store(Phase::made, std::memory_order_release);
+  architecture_.changes().bump();
+}
+
+// ---- what is left of it when it is decided
+
+bool TransactionCommit::Work::settle() noexcept {
+  const Phase phase = phase_.load(std::memory_order_acquire);
+  if (phase == Phase::being_made) return false;
+  host_ = architecture_.host();  // the one that it was made by may be gone
+  deployed_ = host_ != nullptr && host_->is_deployed();
+  if (phase == Phase::off) {
+    if (!commit_->is_left()) return false;
+    discard_rest();
+  }
+  if (phase == Phase::made) {
+    note_made();
+    architecture_.drop_stale_prepared();  // they refer to what goes now
+    bool is_all = true;
+    for (Change& change : changes_) is_all &= settle_if_over(change);
+    if (!is_all) return false;
+    end_settlement();
+  }
+  phase_.store(Phase::settled, std::memory_order_release);
   return true;
 }
 
-const Task* TransactionCommit::Work::Late::find_late() const noexcept {
-  for (const Participant& place : work_->commit_->participants()) {
-    if (!place.has_passed()) return place.task;
-  }
-  return nullptr;
+void TransactionCommit::Work::note_made() noexcept {
+  if (is_noted_.exchange(true, std::memory_order_relaxed)) return;  // relaxed: the notes have a mutex
+  architecture_.note_authors(transaction_);
 }
 
-bool TransactionCommit::Work::has_added(const std::string& name) const noexcept {
-  const auto& resources = draft_->resources();
-  const DraftComponent* component = draft_->find(name);
-  return (component != nullptr && component->is_added) ||
-         std::any_of(resources.begin(), resources.end(),
-                     [&name](const DraftResource& added) { return added.name() == name; });
+/// What a change that is under way looks at stays as it is.
+bool TransactionCommit::Work::settle_if_over(Change& change) noexcept {
+  if (change.is_settled) return true;
+  if (!Commit::is_over(*change.place)) return false;
+  ChangeMark& mark = change.draft->component->change_mark();
+  if (!change.draft->is_added) {
+    const CommitGate::Look table(architecture_.commit_gate());
+    if (mark.is_claimed()) return false;
+  }
+  try {
+    settle_place(change);
+  } catch (...) {  // what cannot be retired stays; the change is in
+    failure_ = std::current_exception();
+  }
+  change.is_settled = true;
+  if (change.draft->is_added) return true;
+  const CommitGate::Look table(architecture_.commit_gate());
+  mark.settle();
+  return true;
+}
+
+void TransactionCommit::Work::settle_place(Change& change) {
+  DraftComponent& draft = *change.draft;
+  Component& component = *draft.component;
+  const bool has_taken = change.place->has_passed();  // else its thread hung, and has ended
+  if (has_taken) note_handover(change);
+  if (has_taken && change.retreat == nullptr) {
+    component.show();
+    for (ListenerChange* listener : change.listeners) listener->hand_over();
+    if (component.is_configured()) component.update_listening();
+    settle_shadow(draft);
+  }
+  if (has_taken && change.parts != nullptr) {
+    component.settle_probation();  // the take has ended it
+    if (change.parts->has_probation()) {
+      renew_fallback(change);
+      component.keep_probation(std::move(change.parts));
+    } else if (!component.fallback_implementation().empty()) {  // the core that is out may be the next spare
+      change.parts->retire();
+      renew_fallback(change);
+    }
+  }
+  dispose(change);
+  const auto is_its = [&](const auto& action) { return action->task == &component.task(); };
+  change.listeners.clear();
+  std::erase_if(actions_, is_its);
+  std::erase_if(repairs_, is_its);
+  draft.wires.clear();  // they keep resources in use
+  draft.wires_before.clear();
+  if (change.retreat != nullptr) retire_removed(draft.component);
+}
+
+/// Cleans up the parts that are out: the old ones, or new ones that were not taken.
+void TransactionCommit::Work::dispose(Change& change) {
+  if (change.parts == nullptr) return;
+  std::shared_ptr<PartsChange> parts = std::move(change.parts);
+  architecture_.dispose(
+      "cleanup of parts of " + change.draft->component->description(),
+      [component = change.draft->component, parts = std::move(parts)]() mutable { parts.reset(); });
+}
+
+void TransactionCommit::Work::note_handover(const Change& change) {
+  const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
+  if (handover == nullptr || handover->is_whole()) return;
+  const std::lock_guard lock(reports_mutex_);
+  reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
+      "a field of the old core could not be read at the change: its value is that of the preparation");
+}
+
+void TransactionCommit::Work::retire_removed(const std::shared_ptr<Component>& component) {
+  component->leave_architecture();
+  let_go(component, true);
+}
+
+void TransactionCommit::Work::end_settlement() noexcept {
+  auto gone = draft_->removed_resources();
+  keep_for_report();
+  architecture_.retire(std::move(gone));
+}
+
+const Task* TransactionCommit::Work::find_late() const noexcept {
+  if (phase_.load(std::memory_order_acquire) != Phase::made) return nullptr;
+  for (const Change& change : changes_) {
+    if (!change.is_settled && !change.place->has_passed()) return change.place->task;
+  }
+  return nullptr;
 }
 
 }  // namespace mauve

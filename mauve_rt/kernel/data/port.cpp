@@ -79,6 +79,7 @@ void PortBase::check(const ServiceBase& service) const {
 PortConnection PortBase::prepare(ServiceBase& service, const std::string& resource_name) const {
   check(service);
   PortConnection connection{.service = &service, .resource = resource_name};
+  if (service.resource() != nullptr) connection.use = service.resource()->use();
   if (kind_ == PortKind::call) connection.trace_id = TraceNames::intern(resource_name + "." + service.name());
   return connection;
 }
@@ -95,13 +96,17 @@ void PortBase::swap(PortConnection& connection) noexcept {
   MAUVE_RT_TRUSTED(std::swap(connection_, connection));  // moves: nothing is allocated, nothing freed
 }
 
-bool PortBase::make_safe(bool may_wait) noexcept {
-  if (is_safe_ || output().on_stop != OutputPolicy::set_zero) return true;
-  const TryWrite tried = try_write_zero();
-  is_safe_ = tried == TryWrite::done;
-  if (tried != TryWrite::must_wait || !may_wait) return is_safe_;
-  write_zero();
-  return is_safe_ = true;
+bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
+  if (is_safe_ || connection_.service == nullptr) return true;
+  return is_safe_ = make_safe(*connection_.service, may_wait, time_ns);
+}
+
+bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {
+  if (output().on_stop != OutputPolicy::set_zero) return true;
+  const TryWrite tried = try_write_zero(service, time_ns);
+  if (tried != TryWrite::must_wait || !may_wait) return tried == TryWrite::done;
+  write_zero_to(service, time_ns);
+  return true;
 }
 
 void PortBase::leave_behind() noexcept {

@@ -83,13 +83,28 @@ void Resource::begin_log(std::size_t /*bytes*/) {
                .remedy = "record another resource"});
 }
 
+std::shared_ptr<const void> Resource::use() {
+  const std::lock_guard lock(use_mutex_);
+  if (auto present = use_.lock()) return present;
+  const std::shared_ptr<Resource> self = weak_from_this().lock();
+  if (self == nullptr) return nullptr;
+  const std::shared_ptr<const void> fresh = std::make_shared<const std::shared_ptr<Resource>>(self);
+  use_ = fresh;
+  return fresh;
+}
+
+bool Resource::is_in_use() const {
+  const std::lock_guard lock(use_mutex_);
+  return !use_.expired();
+}
+
 void Resource::bind_input() {
   for (const ServiceBase* service : services_) {
     if (service->kind() == PortKind::write) service->check_ports(service->ports() + 1);
   }
   for (ServiceBase* service : services_) {
     if (service->kind() != PortKind::write) continue;
-    service->add_port();
+    service->bind_input();
     service->share();
   }
 }

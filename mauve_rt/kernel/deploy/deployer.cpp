@@ -122,6 +122,7 @@ void Deployer::create_threads() {
   try {
     for (const auto& component : components) {
       component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace, watchdog_);
+      note_hosted(component);
       barrier_->created_one();
     }
   } catch (...) {
@@ -135,13 +136,13 @@ void Deployer::create_threads() {
 
 void Deployer::shutdown() noexcept {
   const std::lock_guard life(life_mutex_);
-  shut_down(false);
+  shut_down();
 }
 
 void Deployer::end() noexcept {
   const std::lock_guard life(life_mutex_);
   has_ended_ = true;
-  shut_down(true);
+  shut_down();
 }
 
 bool Deployer::all_ended() noexcept {
@@ -157,29 +158,31 @@ void Deployer::end_all() noexcept {
   for (Deployer* deployer : all.deployers) deployer->end();
 }
 
-void Deployer::shut_down(bool for_good) noexcept {
+void Deployer::shut_down() noexcept {
   if (!is_deployed()) return;
   set_deployed(false);
-  architecture().commit_gate().close();
+  architecture()
+      .commit_gate()
+      .close();  // from here on each change is made or not, and hosted() is all that can run
   stop_all(monotonic_now_ns() + kStopTimeout);
-  if (for_good) give_up_hung();
+  give_up_hung();
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
-  for (const auto& component : architecture().components()) component->task().end_thread(until);
-  shadow_thread_.end(until);  // stop_all() has ended its shadows
-  watchdog_->stop();          // last: stopping is watched too
+  for (const auto& component : hosted()) component->task().end_thread(until);
+  shadow_threads_.end(until);  // stop_all() has ended its shadows
+  watchdog_->stop();           // last: stopping is watched too
   architecture().release_host(*this);
   architecture().changes().bump();
 }
 
-void Deployer::attach(Task& task) {
+void Deployer::begin_task(Task& task) {
   task.create_thread(nullptr, options_.require_realtime, options_.trace, watchdog_);
 }
 
 void Deployer::run_shadow(const std::shared_ptr<Shadow>& shadow) {
   const std::lock_guard life(life_mutex_);
-  if (is_deployed()) shadow_thread_.add(shadow);  // else the change finds the host shut down
+  if (is_deployed()) shadow_threads_.add(shadow);  // else the change finds the host shut down
 }
 
-bool Deployer::detach(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
+bool Deployer::end_task(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
 
 }  // namespace mauve

@@ -42,8 +42,26 @@ void Host::stop(const std::string& component, time_ns_t timeout_ns) {
 
 bool Host::stop(const std::string& component, const StopOptions& options) {
   require_deployed();
-  return architecture_.hold_component(component)->task().stop(is_simulated() ? 0 : options.timeout_ns,
-                                                              options.force);
+  const time_ns_t timeout_ns = is_simulated() ? 0 : options.timeout_ns;
+  const auto present = architecture_.find_component(component);
+  // One of that name that was removed, and is late to end: a stop reaches both.
+  const auto leaving = find_leaving(component, present.get());
+  if (leaving != nullptr && present == nullptr) return leaving->task().stop(timeout_ns, options.force);
+  if (leaving != nullptr) {
+    try {
+      leaving->task().stop(timeout_ns, options.force);
+    } catch (const Error&) {  // what is told is told of the one that is listed
+    }
+  }
+  return architecture_.hold_component(component)->task().stop(timeout_ns, options.force);
+}
+
+std::shared_ptr<Component> Host::find_leaving(const std::string& name, const Component* present) const {
+  for (const auto& each : hosted()) {
+    if (each.get() != present && each->name() == name && each->task().state() == ComponentState::running)
+      return each;
+  }
+  return nullptr;
 }
 
 time_ns_t Host::get_time(const std::string& component) const {
@@ -134,8 +152,38 @@ void Host::start_all(time_ns_t epoch_ns) {
   }
 }
 
+void Host::attach(const std::shared_ptr<Component>& component) {
+  begin_task(component->task());
+  note_hosted(component);
+}
+
+bool Host::detach(Component& component) noexcept {
+  if (!end_task(component.task())) return false;
+  const std::lock_guard lock(hosted_mutex_);
+  std::erase_if(hosted_, [&](const auto& each) {
+    const auto held = each.lock();
+    return held == nullptr || held.get() == &component;
+  });
+  return true;
+}
+
+void Host::note_hosted(const std::shared_ptr<Component>& component) {
+  const std::lock_guard lock(hosted_mutex_);
+  const auto is_it = [&](const auto& each) { return each.lock() == component; };
+  if (std::none_of(hosted_.begin(), hosted_.end(), is_it)) hosted_.push_back(component);
+}
+
+std::vector<std::shared_ptr<Component>> Host::hosted() const {
+  const std::lock_guard lock(hosted_mutex_);
+  std::vector<std::shared_ptr<Component>> all;
+  for (const auto& each : hosted_) {
+    if (auto component = each.lock()) all.push_back(std::move(component));
+  }
+  return all;
+}
+
 void Host::stop_all(time_ns_t until_ns) noexcept {
-  const auto components = architecture_.components();
+  const auto components = hosted();
   const auto stop = [](Task& task, time_ns_t by_ns) {
     try {
       task.stop(std::max<time_ns_t>(0, by_ns - monotonic_now_ns()));
@@ -155,7 +203,7 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
 }
 
 void Host::give_up_hung() noexcept {
-  for (const auto& component : architecture_.components()) {
+  for (const auto& component : hosted()) {
     try {
       if (component->task().state() == ComponentState::stopping) component->task().stop(0, true);
     } catch (

@@ -180,7 +180,7 @@ void SimulatedHost::deploy() {
 void SimulatedHost::begin(time_ns_t epoch_ns) {
   const auto change = architecture().change_lock().join_alone();
   architecture().settle_changes();
-  for (const auto& component : architecture().components()) attach(component->task());
+  for (const auto& component : architecture().components()) attach(component);
   start_all(epoch_ns);
   architecture().commit_gate().open();
   set_deployed(true);
@@ -194,7 +194,7 @@ void SimulatedHost::shutdown() noexcept {
   set_deployed(false);
   architecture().commit_gate().close();
   stop_all(0);
-  for (const auto& component : architecture().components()) {
+  for (const auto& component : hosted()) {
     component->settle_shadow();  // no thread of its own retires it
     component->task().end_simulation();
   }
@@ -206,9 +206,9 @@ const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
   return none;
 }
 
-void SimulatedHost::attach(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }
+void SimulatedHost::begin_task(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }
 
-bool SimulatedHost::detach(Task& task) noexcept {
+bool SimulatedHost::end_task(Task& task) noexcept {
   task.end_simulation();
   return true;
 }

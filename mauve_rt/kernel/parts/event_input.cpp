@@ -9,7 +9,10 @@
 namespace mauve {
 
 void EventInput::on_event(time_ns_t time_ns) noexcept {
-  if (!is_live_.load(std::memory_order_relaxed)) return;
+  if (is_live_.load(std::memory_order_relaxed)) heed(time_ns);
+}
+
+void EventInput::heed(time_ns_t time_ns) noexcept {
   keep(time_ns);
   waiter_.load(std::memory_order_relaxed)->signal_event();
 }
@@ -66,8 +69,9 @@ void EventInput::listen() {
 }
 
 void EventInput::listen_for(EventListener& stand_in, Resource& resource) noexcept {
+  if (resource_ != nullptr) resource_->unlisten(*this);  // first: it heeds events from the next line on
+  is_live_.store(true, std::memory_order_relaxed);
   resource.relisten(stand_in, *this);
-  if (resource_ != nullptr) resource_->unlisten(*this);
   resource_ = &resource;
 }
 

@@ -59,6 +59,11 @@ Participant* Commit::find(const Task& task) const noexcept {
 
 // ---- participants
 
+time_ns_t Participant::limit_ns() const noexcept {
+  const time_ns_t declared = declared_ns();
+  return declared == 0 ? kForever : later_by(declared, Commit::kPatience);
+}
+
 bool Commit::adopt(Participant& participant) noexcept {
   const Clock& clock = participant.task->clock();
   time_ns_t began = clock.now_ns();
@@ -152,33 +157,65 @@ Commit::Off Commit::off() const noexcept {
 
 // ---- the requester
 
-Commit::Outcome Commit::carry_out(time_ns_t timeout_ns, CommitGate& gate) noexcept {
-  timeout_ns_ = timeout_ns;
-  const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
-  if (!lock(until)) return cut_.look().is_off() ? Outcome::off : Outcome::timed_out;
-  unfit_ = find_unfit();
-  if (unfit_ != nullptr) {
-    unlock();
-    return Outcome::changed;
+bool Commit::prepare_install() noexcept {
+  if (publication_ == nullptr) return true;
+  if (!publication_->is_current()) return false;
+  cut_.raise(publication_->since_ns());
+  return true;
+}
+
+void Commit::publish() noexcept {
+  if (publication_ != nullptr) publication_->publish(instant_ns());
+}
+
+Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
+  timeout_ns_ = std::max<time_ns_t>(0, until_ns - monotonic_now_ns());
+  if (!await_slots(until_ns)) return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
+  // Before it waits for a lock: an urgent commit that needs the same calls it off there, too.
+  if (!gate.begin(*this)) return Outcome::stale;
+  const bool has_commands = lock(until_ns);
+  if (!has_commands) call_off(Off::timed_out);  // unless that is why
+  if (has_commands) {
+    unfit_ = find_unfit();
+    if (unfit_ != nullptr) call_off(Off::withdrawn, unfit_);
+    begin();
+    gate.look_again(*this);
+    if (cut_.look().is_open() && check()) {
+      vote_for_parked();
+      post_all(until_ns);
+      visit_simulated();
+      await_decision(until_ns);
+    }
   }
-  begin();
-  gate.begin(*this);
-  if (cut_.look().is_open() && check()) {
-    vote_for_parked();
-    post_all(until);
-    visit_simulated();
-    await_decision(until);
-  }
-  gate.end(*this);
-  if (is_made()) {
-    complete(until);
-  } else {
-    retract_all(until);
-  }
+  {
+    const CommitGate::Look table(gate);
+  }  // this one is in it, if it is made, and nobody calls it off any more
+  if (!has_commands) return locked_out_ != nullptr ? Outcome::timed_out : Outcome::off;
+  if (is_made())
+    begin_completion();
+  else
+    retract_posted();
   unlock();
   if (is_made()) return Outcome::made;
+  if (unfit_ != nullptr) return Outcome::changed;
+  await_busy(until_ns);
   if (is_refused_.load(std::memory_order_acquire)) return Outcome::refused;
   return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
+}
+
+/// Nothing is held while a component has yet to take an earlier change.
+bool Commit::await_slots(time_ns_t until_ns) noexcept {
+  for (const Participant* participant : order_) {
+    Task& task = *participant->task;
+    while (!task.is_left_behind() && !task.wait_slot(std::min(until_ns, monotonic_now_ns() + kLook))) {
+      if (!cut_.look().is_open()) return false;
+      if (!task.is_simulated() && monotonic_now_ns() < until_ns) continue;
+      occupied_ = &task;
+      call_off(Off::timed_out);
+      return false;
+    }
+  }
+  return true;
 }
 
 bool Commit::lock(time_ns_t until_ns) noexcept {
@@ -208,6 +245,7 @@ const Task* Commit::find_unfit() const noexcept {
 /// The commands held: no start comes between this and the takes of the parked ones.
 void Commit::begin() noexcept {
   bool takes_epoch = false;
+  bool has_own = false;
   for (Participant* participant : order_) {
     Task& task = *participant->task;
     participant->period_ns = task.grid().period_ns;
@@ -216,9 +254,10 @@ void Commit::begin() noexcept {
     // New parts may hang in adopt: that costs the component's own thread, where there is one.
     const bool has_own_thread = task.has_thread() && participant->replaces_parts;
     participant->is_own = participant->in_flight || (!participant->left_behind && has_own_thread);
-    has_own_ |= participant->is_own;
+    has_own |= participant->is_own;
     takes_epoch |= participant->epoch_lead_ns != 0;
   }
+  has_own_.store(has_own, std::memory_order_relaxed);
   // A new epoch counts from T, and lies ahead of all that was executed by now.
   if (takes_epoch) cut_.raise(order_.front()->task->clock().now_ns());
 }
@@ -261,7 +300,7 @@ void Commit::visit_simulated() noexcept {
 }
 
 void Commit::await_decision(time_ns_t until_ns) noexcept {
-  const bool is_simulated = has_own_ && order_.front()->task->is_simulated();
+  const bool is_simulated = has_own() && order_.front()->task->is_simulated();
   while (cut_.look().is_open()) {
     const time_ns_t now = monotonic_now_ns();
     if (now >= until_ns || is_simulated) {
@@ -282,22 +321,30 @@ void Commit::call_off_if_one_left() noexcept {
   }
 }
 
-void Commit::retract_all(time_ns_t until_ns) noexcept {
-  if (off() == Off::shut_down || off() == Off::preempted)
-    until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
+void Commit::retract_posted() noexcept {
   for (Participant* participant : order_) {
     if (participant->left_behind) participant->task->give_up_claim();
+    if (participant->is_own) participant->task->retract(*participant, 0);
+  }
+}
+
+/// A slot whose adopt lasts is left to its thread, after a little patience: that ends sooner or later.
+void Commit::await_busy(time_ns_t until_ns) noexcept {
+  const bool is_timed_out = off() == Off::timed_out;
+  if (!is_timed_out) until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
+  const bool gives_up = is_timed_out || off() == Off::shut_down || off() == Off::preempted;
+  for (Participant* participant : order_) {
     if (!participant->is_own) continue;
-    while (!participant->task->retract(*participant, monotonic_now_ns() + kLook)) {  // busy: its adopt
-      const bool is_late = monotonic_now_ns() >= until_ns && give_up(*participant, "adopt");
-      if (!is_late && !participant->task->is_left_behind()) continue;
-      kept_by_ = participant->task;  // its thread may come back to the record
-      break;
+    while (!participant->task->retract(*participant, monotonic_now_ns() + kLook)) {
+      if (participant->task->is_left_behind()) break;
+      if (monotonic_now_ns() < until_ns) continue;
+      if (!gives_up || give_up(*participant, "adopt")) break;
     }
   }
 }
 
-void Commit::complete(time_ns_t until_ns) noexcept {
+/// Made, the commands held: nothing of what follows waits for a component.
+void Commit::begin_completion() noexcept {
   for (Participant* participant : order_) {
     if (participant->is_own) {
       participant->task->notify_commit();
@@ -307,6 +354,9 @@ void Commit::complete(time_ns_t until_ns) noexcept {
     }
   }
   visit_simulated();
+}
+
+void Commit::await_passes(time_ns_t until_ns) noexcept {
   until_ns = std::max(until_ns, monotonic_now_ns() + kPatience);
   start_parked(until_ns);
   for (Participant* participant : order_) {
@@ -322,6 +372,20 @@ void Commit::complete(time_ns_t until_ns) noexcept {
     }
   }
   answered_.store(true, std::memory_order_relaxed);  // relaxed: a hint
+}
+
+bool Commit::is_over(const Participant& participant) noexcept {
+  if (participant.has_passed()) return true;
+  return participant.task->is_abandoned() && participant.task->has_ended();
+}
+
+bool Commit::is_left() const noexcept {
+  if (is_made()) return std::all_of(order_.begin(), order_.end(), [](auto* each) { return is_over(*each); });
+  return std::all_of(order_.begin(), order_.end(), [](const Participant* each) {
+    if (!each->is_own) return true;
+    Task& task = *each->task;
+    return task.retract(*each, 0) || (task.is_abandoned() && task.has_ended());
+  });
 }
 
 /// Those whose threads the requester has started: a thread that gets no processor is not waited for beyond the instant.
@@ -420,8 +484,7 @@ void Commit::throw_timeout() const {
   for (const Participant* participant : order_) {
     if (!participant->is_own || participant->has_agreed.load(std::memory_order_relaxed)) continue;
     if (participant->unfit_waits.load(std::memory_order_relaxed) != 0) {
-      time_ns_t declared = 0;
-      for (const CommitAction* action : participant->actions) declared += action->declared_ns();
+      const time_ns_t declared = participant->declared_ns();
       throw Error(ErrorCode::timeout,
                   "the declared budget fits in no wait of the component; nothing was changed",
                   {.component = participant->task->name(),

@@ -25,37 +25,60 @@ bool is_in_the_way(const Commit& commit, const UrgentCommit& urgent) MAUVE_RT {
 
 }  // namespace
 
-void CommitGate::begin(Commit& commit) noexcept {
-  const std::lock_guard lock(under_way_mutex_);
+/// Takes the commits that are decided off the list; those that are made are in the table then.
+void CommitGate::take_in() noexcept {
+  for (Commit** place = &under_way_; *place != nullptr;) {
+    Commit& commit = **place;
+    const CutWord seen = commit.look();
+    if (seen.is_open()) {
+      place = &commit.next;
+      continue;
+    }
+    *place = commit.next;
+    if (seen.is_closed()) commit.publish();
+  }
+}
+
+bool CommitGate::begin(Commit& commit) noexcept {
+  const Look look(*this);
+  if (!commit.prepare_install()) return false;
   commit.next = under_way_;
   under_way_ = &commit;
   call_off_if_unwanted(commit);
+  return true;
 }
 
-void CommitGate::end(Commit& commit) noexcept {
-  const std::lock_guard lock(under_way_mutex_);
-  unlink(under_way_, commit);
+void CommitGate::look_again(Commit& commit) noexcept {
+  const Look look(*this);
+  if (commit.look().is_open()) call_off_if_unwanted(commit);
+}
+
+bool CommitGate::has_open_about(const Task& task) const noexcept {
+  for (const Commit* commit = under_way_; commit != nullptr; commit = commit->next) {
+    if (commit->look().is_open() && commit->is_about(task)) return true;
+  }
+  return false;
 }
 
 void CommitGate::press(UrgentCommit& urgent) noexcept {
-  const std::lock_guard lock(under_way_mutex_);
+  const Look look(*this);
   urgent.next = urgent_;
   urgent_ = &urgent;
   for (Commit* commit = under_way_; commit != nullptr; commit = commit->next) call_off_if_unwanted(*commit);
 }
 
 void CommitGate::relax(UrgentCommit& urgent) noexcept {
-  const std::lock_guard lock(under_way_mutex_);
+  const Look look(*this);
   unlink(urgent_, urgent);
 }
 
 void CommitGate::open() noexcept {
-  const std::lock_guard lock(under_way_mutex_);
+  const Look look(*this);
   is_open_ = true;
 }
 
 void CommitGate::close() noexcept {
-  const std::lock_guard lock(under_way_mutex_);
+  const Look look(*this);
   is_open_ = false;
   for (Commit* commit = under_way_; commit != nullptr; commit = commit->next) call_off_if_unwanted(*commit);
 }

@@ -29,23 +29,29 @@ Component::~Component() {
   Configurable::cleanup();
 }
 
-void Component::set_architecture(Architecture* architecture) noexcept {
-  architecture_.store(architecture, std::memory_order_release);
-  task_.changes().set_listener(architecture != nullptr ? &architecture->changes() : nullptr);
+void Component::enter(Architecture& architecture) noexcept {
+  architecture_.store(&architecture, std::memory_order_release);
+  task_.changes().listener.set(architecture.changes());
+}
+
+void Component::leave_architecture() noexcept {
+  architecture_.store(nullptr, std::memory_order_release);
+  task_.changes().set_listener(nullptr);
 }
 
 class Component::JoinedChange {
  public:
-  JoinedChange(Architecture* architecture, ChangeMark& mark) {
+  JoinedChange(Architecture* architecture, const Task& task, ChangeMark& mark) {
     if (architecture == nullptr) return;
     lock_ = architecture->change_lock().join();
     if (!lock_.owns_lock()) return;  // a part of a change, which has claimed what it touches
     CommitGate& commits = architecture->commit_gate();
     architecture->wait_for_earlier(kEarlierChange, [&] {
-      const std::lock_guard gate(commits.mutex);
-      if (mark.is_claimed()) return EarlierChange::under_way;
+      const CommitGate::Look table(commits);
+      if (mark.is_claimed() || commits.has_open_about(task)) return EarlierChange::under_way;
       if (mark.is_unsettled()) return EarlierChange::late;
       mark.claim();
+      mark.hold();
       return EarlierChange::none;
     });
     gate_ = &commits;
@@ -53,7 +59,7 @@ class Component::JoinedChange {
   }
   ~JoinedChange() {
     if (mark_ == nullptr) return;
-    const std::lock_guard gate(gate_->mutex);
+    const CommitGate::Look table(*gate_);
     mark_->set_changed();
     mark_->release();
   }
@@ -67,7 +73,7 @@ class Component::JoinedChange {
 };
 
 Component::JoinedChange Component::join_change() {
-  return {architecture_.load(std::memory_order_acquire), change_mark_};
+  return {architecture_.load(std::memory_order_acquire), task_, change_mark_};
 }
 
 Architecture& Component::require_listed() const {
@@ -78,6 +84,18 @@ Architecture& Component::require_listed() const {
 void Component::put_back_parked(Probation& probation) {
   const auto change = join_change();
   task_.put_back_parked(probation);
+}
+
+/// Where the core that is out may be the next fallback it is cleaned up at once.
+void Component::dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bool at_once) noexcept {
+  Architecture* const architecture = architecture_.load(std::memory_order_acquire);
+  if (at_once || architecture == nullptr || !fallback_name_.empty()) {
+    parts->retire();
+    return renew_fallback_if_needed(parts->give_back_core(), is_outdated);
+  }
+  architecture->dispose(
+      "cleanup of parts of " + description(),
+      [own = architecture->find_component(name_), parts = std::move(parts)]() mutable { parts.reset(); });
 }
 
 void Component::configure() {
@@ -94,6 +112,7 @@ void Component::set_parts(Parts parts, FsmFactory make_fsm) {
   parts_ = std::move(parts);
   parts_.fsm->set_factory(std::move(make_fsm));
   parts_.shell->set_context(&task_.context());
+  present_shell_.store(parts_.shell.get(), std::memory_order_release);
   present_core_.store(parts_.core.get(), std::memory_order_release);
   present_fsm_.store(parts_.fsm.get(), std::memory_order_release);
   declared_core_ = parts_.core->implementation();
@@ -198,12 +217,10 @@ void Component::check_allowed(const std::string& core_implementation) const {
 }
 
 PropertyBase& Component::require_property(const std::string& name) const {
-  return find_property(*parts_.shell, name, name_);
+  return find_property(shell(), name, name_);
 }
 
-PortBase& Component::require_port(const std::string& name) const {
-  return find_port(*parts_.shell, name, name_);
-}
+PortBase& Component::require_port(const std::string& name) const { return find_port(shell(), name, name_); }
 
 void Component::check_structural(const PropertyBase& property, const PropertyValue& value,
                                  ReadBy replaced) const {
@@ -517,13 +534,6 @@ void Component::stop_listening() noexcept {
   }
 }
 
-bool Component::uses(const Resource& resource) const {
-  const auto& ports = parts_.shell->ports();
-  return std::any_of(ports.begin(), ports.end(), [&resource](const auto& port) {
-    return port->is_connected() && port->service()->resource() == &resource;
-  });
-}
-
 void Component::configure_anew() {
   require_parked("configure");
   cleanup();
@@ -534,7 +544,7 @@ void Component::check_cleanup() const { require_parked("cleanup"); }
 
 void Component::cleanup_hook() {
   conclude_probation();
-  settle_probation();
+  settle_probation(true);
   conclude_shadow();
   settle_shadow();
   task_.set_fallback(nullptr);

@@ -15,7 +15,9 @@ constexpr time_ns_t kParkedLook = ms_to_ns(20);
 
 std::shared_ptr<Probation> Component::present_probation() const {
   const std::lock_guard lock(shown_mutex_);
-  return probation_;
+  // Under this mutex the change that has it does not let go of it.
+  Probation* const next = next_probation_.load(std::memory_order_acquire);
+  return next != nullptr ? next->weak_from_this().lock() : probation_;
 }
 
 std::vector<ProbationRecord> Component::probations() const {
@@ -23,6 +25,8 @@ std::vector<ProbationRecord> Component::probations() const {
   std::vector<ProbationRecord> records;
   if (last_probation_) records.push_back(*last_probation_);
   if (probation_ != nullptr) records.push_back(probation_->record());
+  if (const Probation* next = next_probation_.load(std::memory_order_acquire))
+    records.push_back(next->record());
   return records;
 }
 
@@ -30,6 +34,7 @@ void Component::keep_probation(std::unique_ptr<PartsChange> parts) {
   auto probation = parts->release_probation();
   probation->keep(std::move(parts));
   const std::lock_guard lock(shown_mutex_);
+  next_probation_.store(nullptr, std::memory_order_relaxed);  // relaxed: under the mutex
   probation_ = std::move(probation);
 }
 
@@ -47,15 +52,18 @@ void Component::conclude_probation() noexcept {
   if (const auto probation = present_probation()) probation->conclude(ProbationCause::ended);
 }
 
-void Component::settle_probation() noexcept {
-  const auto probation = present_probation();
+void Component::settle_probation(bool at_once) noexcept {
+  std::shared_ptr<Probation> probation;
+  {
+    const std::lock_guard lock(shown_mutex_);
+    probation = probation_;
+  }
   if (probation == nullptr || !probation->has_ended()) return;
   task_.forget_probation(*probation);
-  if (const std::unique_ptr<PartsChange> parts = probation->release_parts()) {
+  if (std::shared_ptr<PartsChange> parts = probation->release_parts()) {
     const bool is_fsm_back = probation->is_reverted() && parts->replaces_fsm();
-    parts->retire();
     if (is_fsm_back) show();  // other states, and other times
-    renew_fallback_if_needed(parts->give_back_core(), is_fsm_back);
+    dispose(std::move(parts), is_fsm_back, at_once);
   }
   ProbationRecord record = probation->record();
   const std::lock_guard lock(shown_mutex_);

@@ -176,6 +176,7 @@ void Probation::begin(PartsChange& parts) noexcept {
   phase_.store(kRunning, std::memory_order_release);  // release: who reads it finds all this
   for (const auto& limits : limits_) limits->port.watch(*limits);
   component_.task().set_probation(*this);
+  component_.set_next_probation(*this);
 }
 
 bool Probation::is_watched() const noexcept {
@@ -278,8 +279,19 @@ bool Probation::wait_ended(time_ns_t until_ns) const noexcept {
   return true;
 }
 
+/// Whether the core that is watched executes a state, which has to end, or to be given up, before anything is decided.
+bool Probation::is_executing() noexcept {
+  Task& task = component_.task();
+  if (task.is_simulated() || task.is_parked()) return false;
+  if (task.is_left_behind()) return true;
+  const StateAge age = task.state_age();
+  if (age.is_wait || age.age_ns == 0 || !is_watched()) return false;
+  if (age.age_ns > age.hung_after_ns) task.give_up_on_probation(age);
+  return true;
+}
+
 bool Probation::conclude_if_over() noexcept {
-  if (phase() == kRunning && component_.task().clock().now_ns() >= end_ns_) {
+  if (phase() == kRunning && !is_executing() && component_.task().clock().now_ns() >= end_ns_) {
     const bool is_enough = releases_.load(std::memory_order_relaxed) >= options_.min_releases;
     conclude(is_enough ? ProbationCause::none : ProbationCause::too_few);
   }
@@ -298,6 +310,12 @@ ProbationRecord Probation::record() const {
                          .releases = releases_.load(std::memory_order_relaxed),
                          .begin_ns = begin_ns_,
                          .end_ns = end_ns_};
+  const bool reverts_hang = options_.on_fault || options_.on_overrun;
+  if (now == kRunning && reverts_hang && component_.task().is_given_up_on_probation()) {
+    record.verdict = ProbationVerdict::reverted;
+    record.cause = ProbationCause::fault;
+    record.reason = component_.task().fault().what + "; the old core goes in when it ends";
+  }
   if (now < kConcluded) return record;
   record.cause = cause_;
   record.end_ns = ended_ns_;

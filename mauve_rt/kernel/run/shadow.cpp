@@ -51,6 +51,8 @@ const char* to_string(ShadowVerdict verdict) noexcept {
       return "faulted";
     case ShadowVerdict::promoted:
       return "promoted";
+    case ShadowVerdict::hung:
+      return "hung";
   }
   return "ended";
 }
@@ -161,6 +163,13 @@ void Shadow::end_release(time_ns_t instant_ns, const State* next_wait) noexcept 
   MAUVE_RT_TRUSTED(run_pending());  // in virtual time, where nothing is real-time
 }
 
+void Shadow::conclude_if_hung(time_ns_t longest_ns) noexcept {
+  if (signal_ == nullptr) return;  // in virtual time this thread would be the one that hangs
+  const time_ns_t since_ns = executing_since_ns_.load(std::memory_order_relaxed);
+  const time_ns_t now_ns = monotonic_now_ns();
+  if (since_ns != 0 && now_ns - since_ns > longest_ns) conclude(ShadowCause::hung, now_ns);
+}
+
 void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
   std::uint32_t seen = phase_.load(std::memory_order_acquire);
   do {
@@ -230,6 +239,7 @@ ShadowRecord Shadow::record() const {
   if (phase == kEnded) {
     record.verdict = cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
                      : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
+                     : cause_ == ShadowCause::hung      ? ShadowVerdict::hung
                                                         : ShadowVerdict::ended;
     record.end_ns = ended_ns_;
     record.reason = reason();
@@ -258,6 +268,8 @@ std::string Shadow::reason() const {
       return "the component was cleaned up or removed, or its host was shut down";
     case ShadowCause::promotion:
       return "the candidate is the component's core now";
+    case ShadowCause::hung:
+      return "hung: state " + TraceNames::word(machine_.state_name()) + " of the candidate did not end";
     case ShadowCause::lost:
       return "a step promote was refused, and the candidate was cleaned up";
   }

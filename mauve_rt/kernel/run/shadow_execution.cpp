@@ -38,6 +38,7 @@ bool Shadow::run_pending() noexcept {
     return false;
   const time_ns_t instant_ns = release->instant_ns;
   const auto held_before = PiMutex::held_by_this_thread();
+  executing_since_ns_.store(monotonic_now_ns(), std::memory_order_relaxed);
   try {
     execute(*release);
   } catch (const std::exception& failure) {
@@ -47,6 +48,7 @@ bool Shadow::run_pending() noexcept {
     PiMutex::let_go_of_all_but(held_before);
     fault("an exception that is no std::exception", instant_ns);
   }
+  executing_since_ns_.store(0, std::memory_order_relaxed);
   capture_.pop();
   return true;
 }

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <cstring>
-#include <vector>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/shadow.hpp"
@@ -19,93 +18,90 @@ constexpr int kNice = 19;
 
 }  // namespace
 
-/// The thread owns it too: it may outlive its host.
-///
-/// | member           | written by            | read by | under                          |
-/// | ---------------- | --------------------- | ------- | ------------------------------ |
-/// | shadows          | hosts, the thread     | same    | mutex                          |
-/// | is_to_end        | hosts                 | thread  | release/acquire, then signal   |
-/// | has_ended (futex)| thread                | hosts   | release/acquire                |
-struct ShadowThread::Work {
-  std::mutex mutex;
-  std::vector<std::shared_ptr<Shadow>> shadows;
-  std::shared_ptr<ShadowSignal> signal{std::make_shared<ShadowSignal>()};
-  std::atomic<bool> is_to_end{false};
-  std::atomic<std::uint32_t> has_ended{0};
-
-  std::vector<std::shared_ptr<Shadow>> present() {
-    const std::lock_guard lock(mutex);
-    return shadows;
-  }
-  void remove(const Shadow& shadow) {
-    const std::lock_guard lock(mutex);
-    std::erase_if(shadows, [&](const auto& each) { return each.get() == &shadow; });
-  }
-  /// One release of each; whether there was one.
-  bool run_all() {
-    bool has_run = false;
-    for (const auto& shadow : present()) {
-      has_run = shadow->run_pending() || has_run;
-      if (!shadow->has_ended()) continue;
-      shadow->retire();
-      remove(*shadow);
-    }
-    return has_run;
-  }
-  void sleep(std::uint32_t seen) noexcept {
-    signal->is_asleep.store(true, std::memory_order_seq_cst);
-    futex_wait_until(signal->word, seen, kForever);
-    signal->is_asleep.store(false, std::memory_order_seq_cst);
-  }
-};
-
-ShadowThread::ShadowThread() : work_(std::make_shared<Work>()) {}
-
-ShadowThread::~ShadowThread() { end(kForever); }
-
-void* ShadowThread::run(void* work) noexcept {
-  const std::unique_ptr<std::shared_ptr<Work>> handed(static_cast<std::shared_ptr<Work>*>(work));
-  Work& own = **handed;
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // of this thread alone, on Linux
-  while (!own.is_to_end.load(std::memory_order_acquire)) {
-    const std::uint32_t seen = own.signal->word.load(std::memory_order_seq_cst);  // before the look
-    if (!own.run_all()) own.sleep(seen);
-  }
-  own.run_all();  // retires those that have ended
-  own.has_ended.store(1, std::memory_order_release);
-  futex_wake_all(own.has_ended);
-  return nullptr;
-}
-
-void ShadowThread::add(const std::shared_ptr<Shadow>& shadow) {
-  if (!has_thread_) {
+class ShadowThreads::One {
+ public:
+  /// Throws Error (internal): no thread.
+  explicit One(const std::shared_ptr<Shadow>& shadow) {
+    work_->shadow = shadow;
+    shadow->set_signal(work_->signal);
     auto handed = std::make_unique<std::shared_ptr<Work>>(work_);
-    if (const int failure = thread_.start({.name = "shadow"}, &run, handed.get()); failure != 0) {
+    if (const int failure = thread_.start({.name = "shadow"}, &Work::entry, handed.get()); failure != 0) {
       throw Error(ErrorCode::internal, "the shadow thread cannot be created",
                   {.found = std::strerror(failure), .remedy = "raise the limit of threads (ulimit -u)"});
     }
     [[maybe_unused]] const auto* owned_by_thread = handed.release();
-    has_thread_ = true;
   }
-  shadow->set_signal(work_->signal);
-  const std::lock_guard lock(work_->mutex);
-  work_->shadows.push_back(shadow);
+  void ask_to_end() noexcept {
+    work_->is_to_end.store(true, std::memory_order_release);
+    work_->signal->bump();
+  }
+  bool has_ended() const noexcept { return work_->has_ended.load(std::memory_order_acquire) != 0; }
+  void end(time_ns_t until_ns) noexcept {
+    while (!has_ended()) {
+      if (!futex_wait_until(work_->has_ended, 0, until_ns)) break;
+    }
+    if (has_ended()) {
+      thread_.join();
+    } else {
+      thread_.detach();
+    }
+  }
+
+ private:
+  /// The thread owns it too: it may outlive its host.
+  ///
+  /// | member           | written by            | read by | order                          |
+  /// | ---------------- | --------------------- | ------- | ------------------------------ |
+  /// | shadow, signal   | [setup]               | thread  | the thread's creation          |
+  /// | is_to_end        | hosts                 | thread  | release/acquire, then signal   |
+  /// | has_ended (futex)| thread                | hosts   | release/acquire                |
+  struct Work {
+    std::shared_ptr<Shadow> shadow;
+    std::shared_ptr<ShadowSignal> signal{std::make_shared<ShadowSignal>()};
+    std::atomic<bool> is_to_end{false};
+    std::atomic<std::uint32_t> has_ended{0};
+
+    void run() noexcept {
+      while (!is_to_end.load(std::memory_order_acquire) && !shadow->has_ended()) {
+        const std::uint32_t seen = signal->word.load(std::memory_order_seq_cst);  // before the look
+        if (!shadow->run_pending() && !shadow->has_ended()) sleep(seen);
+      }
+      if (shadow->has_ended()) shadow->retire();
+      has_ended.store(1, std::memory_order_release);
+      futex_wake_all(has_ended);
+    }
+    void sleep(std::uint32_t seen) noexcept {
+      signal->is_asleep.store(true, std::memory_order_seq_cst);
+      futex_wait_until(signal->word, seen, kForever);
+      signal->is_asleep.store(false, std::memory_order_seq_cst);
+    }
+    static void* entry(void* work) noexcept {
+      const std::unique_ptr<std::shared_ptr<Work>> handed(static_cast<std::shared_ptr<Work>*>(work));
+      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // of this thread alone, on Linux
+      (*handed)->run();
+      return nullptr;
+    }
+  };
+
+  std::shared_ptr<Work> work_{std::make_shared<Work>()};
+  Thread thread_;
+};
+
+ShadowThreads::ShadowThreads() = default;
+ShadowThreads::~ShadowThreads() { end(kForever); }
+
+void ShadowThreads::add(const std::shared_ptr<Shadow>& shadow) {
+  std::erase_if(threads_, [](const auto& one) {
+    if (one->has_ended()) one->end(0);
+    return one->has_ended();
+  });
+  threads_.push_back(std::make_unique<One>(shadow));
 }
 
-void ShadowThread::end(time_ns_t until_ns) noexcept {
-  if (!has_thread_) return;
-  has_thread_ = false;
-  work_->is_to_end.store(true, std::memory_order_release);
-  work_->signal->bump();
-  while (work_->has_ended.load(std::memory_order_acquire) == 0) {
-    if (!futex_wait_until(work_->has_ended, 0, until_ns)) break;
-  }
-  if (work_->has_ended.load(std::memory_order_acquire) != 0) {
-    thread_.join();
-  } else {
-    thread_.detach();
-  }
-  work_ = std::make_shared<Work>();  // for the next deployment
+void ShadowThreads::end(time_ns_t until_ns) noexcept {
+  for (const auto& one : threads_) one->ask_to_end();
+  for (const auto& one : threads_) one->end(until_ns);
+  threads_.clear();
 }
 
 }  // namespace mauve

@@ -32,8 +32,10 @@ std::size_t ring_capacity(time_ns_t period_ns) {
   return std::max(TraceRing::kDefaultCapacity, static_cast<std::size_t>(std::min(wanted, kMost)));
 }
 
-std::string over_bound(time_ns_t bound_ns) {
-  return "the state ran longer than its declared " + std::to_string(bound_ns / us_to_ns(1)) + " us";
+std::string over_bound(const FaultNote& note) {
+  const std::string what = note.is_visit ? "adopt or take of its new part" : "the state";
+  const time_ns_t declared_ns = note.is_visit ? note.bound_ns - Commit::kPatience : note.bound_ns;
+  return what + " ran longer than its declared " + std::to_string(declared_ns / us_to_ns(1)) + " us";
 }
 
 }  // namespace
@@ -66,7 +68,7 @@ Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
 Task::~Task() { end_thread(kForever); }
 
 void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
-  shell_ = &shell;
+  shell_.store(&shell, std::memory_order_release);
   core_ = core;
   machine_.set_parts(fsm, core, period_ns);
 }
@@ -91,7 +93,7 @@ Fault Task::fault() const {
     note = fault_;
   }
   if (note.when_ns == 0) return {};
-  Fault fault{.what = note.what != nullptr ? *note.what : over_bound(note.bound_ns),
+  Fault fault{.what = note.what != nullptr ? *note.what : over_bound(note),
               .where = TraceNames::word(note.where),
               .when_ns = note.when_ns};
   if (outputs_.load(std::memory_order_acquire) != kAllWritten)
@@ -216,6 +218,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   if (!command_mutex_.try_lock_until(until))
     throw_late("a commit or another command of the component lasts; it was not started", "try again");
   const std::lock_guard lock(command_mutex_, std::adopt_lock);
+  if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until))
+    throw_late("the component has yet to take an earlier change; it was not started", "try again");
   require_startable();
   post_start(start_on(clock_ns));
   if (wait_started(until) || !withdraw_start()) return;
@@ -224,6 +228,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
 }
 
 void Task::require_startable() const {
+  if (removed_.load(std::memory_order_acquire))
+    throw Error(ErrorCode::unknown_component, "the component was removed", {.component = name_});
   switch (state()) {
     case ComponentState::stopped:
       break;

@@ -17,16 +17,21 @@ constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without t
 
 // ---- the slot: the requester's side
 
-bool Task::post(Participant& participant, time_ns_t until_ns) noexcept {
+bool Task::wait_slot(time_ns_t until_ns) noexcept {
   std::uint32_t seen = slot_.load(std::memory_order_acquire);
   while ((seen & kSlot) != kEmpty) {
     if (simulated_) return false;
     if (slot_.compare_exchange_weak(seen, seen | kWaited, std::memory_order_acq_rel) &&
         !futex_wait_until(slot_, seen | kWaited, until_ns))
-      return false;
+      return (slot_.load(std::memory_order_acquire) & kSlot) == kEmpty;
     seen = slot_.load(std::memory_order_acquire);
   }
-  participant_ = &participant;
+  return true;
+}
+
+bool Task::post(Participant& participant, time_ns_t until_ns) noexcept {
+  if (!wait_slot(until_ns)) return false;
+  participant_.store(&participant, std::memory_order_relaxed);  // slot_ hands it over
   // seq_cst: the thread, on its way into a park or its end, sees this, or this thread sees that it has parked or ended
   slot_.store(kPosted, std::memory_order_seq_cst);
   notify_commit();
@@ -43,7 +48,8 @@ void Task::notify_commit() noexcept {
 bool Task::retract(const Participant& participant, time_ns_t until_ns) noexcept {
   std::uint32_t seen = slot_.load(std::memory_order_acquire);
   for (;;) {
-    if ((seen & kSlot) == kEmpty || participant_ != &participant) return true;
+    // relaxed: nobody else stores this one, and it is not stored again
+    if ((seen & kSlot) == kEmpty || participant_.load(std::memory_order_relaxed) != &participant) return true;
     if ((seen & kSlot) == kPosted) {
       if (!slot_.compare_exchange_weak(seen, kEmpty, std::memory_order_acq_rel)) continue;
       control_.fetch_and(~kCommit, std::memory_order_acq_rel);
@@ -93,7 +99,7 @@ bool Task::settle_visit(Visit visit) {
 
 Task::Visit Task::visit_slot() noexcept {
   if (!enter_slot()) return Visit::goes_on;
-  Participant& participant = *participant_;
+  Participant& participant = *participant_.load(std::memory_order_relaxed);
   if (participant.in_flight && !machine_.is_started()) {  // posted just before the park
     end_slot(participant);
     release_withdrawn();
@@ -143,7 +149,7 @@ void Task::trace_refusal(Participant& participant, time_ns_t began_ns) noexcept 
 /// Before the release that is due: the cut says in one step whether its clock belongs to the old parts.
 bool Task::visit_before_release() {
   if (!enter_slot()) return true;
-  Participant& participant = *participant_;
+  Participant& participant = *participant_.load(std::memory_order_relaxed);
   if (!participant.has_voted) {
     leave_slot(kPosted);
     return true;
@@ -159,8 +165,7 @@ bool Task::visit_before_release() {
 bool Task::fits_in_wait(Participant& participant) const noexcept {
   const time_ns_t due = due_ns();
   if (simulated_ || due == kForever) return true;
-  time_ns_t declared = 0;
-  for (const CommitAction* action : participant.actions) declared += action->declared_ns();
+  const time_ns_t declared = participant.declared_ns();
   if (declared == 0 || clock().now_ns() + declared <= due) return true;
   participant.unfit_waits.fetch_add(1, std::memory_order_relaxed);
   return false;
@@ -169,7 +174,7 @@ bool Task::fits_in_wait(Participant& participant) const noexcept {
 /// False when the thread timed out meanwhile; the slot is left then.
 bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
   Commit& commit = *participant.commit;
-  if (!machine_.begin_execution(began_ns, kForever)) {  // the requester watches it
+  if (!machine_.begin_execution(began_ns, participant.limit_ns())) {
     leave_slot(kPosted);
     return false;
   }
@@ -178,6 +183,7 @@ bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
   const bool has_agreed = commit.adopt(participant);
   participant.visit_ns.store(0, std::memory_order_relaxed);
   if (!machine_.end_execution()) {
+    await_time_out();
     commit.call_off(Commit::Off::withdrawn, this);
     leave_slot(kEmpty);
     return false;
@@ -189,7 +195,7 @@ bool Task::vote(Participant& participant, time_ns_t began_ns) noexcept {
 
 Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   Commit& commit = *participant.commit;
-  if (!machine_.begin_execution(clock().now_ns(), kForever)) {
+  if (!machine_.begin_execution(clock().now_ns(), participant.limit_ns())) {
     wake_if_decided(commit);
     leave_slot(kPosted);
     return Visit::timed_out;
@@ -204,9 +210,10 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   if (was_started && participant.replaces_parts) write_outputs(true, commit.instant_ns() - 1);
   place_kept_ = false;
   overlong_ns_ = commit.take(participant);
-  machine_.change_at(commit.instant_ns());
+  note_taken(commit);
   participant.visit_ns.store(0, std::memory_order_relaxed);
   const bool has_timed_out = !machine_.end_execution();
+  if (has_timed_out) await_time_out();
   const bool stops = was_started && participant.afterwards == Afterwards::stop;
   if (was_parked && !has_timed_out) parked_.store(1, std::memory_order_seq_cst);
   if (was_started) trace_take(participant);
@@ -226,6 +233,11 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   pass(participant);
   if (has_timed_out) return Visit::timed_out;
   return stops ? Visit::parks : Visit::goes_on;
+}
+
+void Task::note_taken(const Commit& commit) noexcept {
+  machine_.change_at(commit.instant_ns());
+  taken_ns_.store(commit.instant_ns(), std::memory_order_relaxed);
 }
 
 /// After its own take: the wake-up of an ordinary thread is no part of a component's blackout.
@@ -301,8 +313,8 @@ void Task::skip_lost(Participant& participant, time_ns_t began_ns) noexcept {
 /// posted for a parked component stays, unless the thread ends. Whether it has taken one. The slot of one that was called off
 /// stays busy until release_withdrawn().
 bool Task::settle_slot(bool ends) noexcept {
-  if (!enter_slot()) return false;
-  Participant& participant = *participant_;
+  if (is_abandoned() || !enter_slot()) return false;  // a removed one that hung touches nothing any more
+  Participant& participant = *participant_.load(std::memory_order_relaxed);
   if (participant.in_flight || ends) return end_slot(participant);
   leave_slot(kPosted);
   return false;
@@ -318,7 +330,7 @@ bool Task::end_slot(Participant& participant) noexcept {
   participant.parked_ns = clock().now_ns();
   participant.pending_ns = was_started ? due_ns() : 0;
   commit.take(participant);
-  machine_.change_at(commit.instant_ns());
+  note_taken(commit);
   participant.armed_ns = participant.resumes_ns = machine_.look_at_clock();
   participant.released.store(Participant::kSuperseded,
                              std::memory_order_release);  // it parks, so none follows
@@ -342,7 +354,7 @@ void Task::take_parked(Participant& participant) noexcept {
   Commit& commit = *participant.commit;
   participant.parked_ns = clock().now_ns();
   commit.take(participant);
-  machine_.change_at(commit.instant_ns());
+  note_taken(commit);
   if (participant.epoch_lead_ns != 0) join(later_by(commit.instant_ns() - 1, participant.epoch_lead_ns));
   // A shutdown may have come before the commit held the task.
   const bool can_start = simulated_ || has_thread();
@@ -356,11 +368,6 @@ void Task::take_parked(Participant& participant) noexcept {
 }
 
 // ---- after a commit
-
-void Task::leave_behind(std::shared_ptr<void> used) {
-  const std::lock_guard lock(fault_mutex_);
-  left_behind_.push_back(std::move(used));
-}
 
 bool Task::wait_release(const Participant& participant, time_ns_t until_ns) noexcept {
   while (participant.released.load(std::memory_order_acquire) == 0) {
@@ -377,7 +384,7 @@ void Task::forget_release(Participant& participant) noexcept {
 }
 
 void Task::write_outputs(bool commit, time_ns_t time_ns) noexcept {
-  for (const auto& port : shell_->ports()) {
+  for (const auto& port : shell()->ports()) {
     const OutputOptions output = port->output();
     if ((commit ? output.on_commit : output.on_stop) == OutputPolicy::set_zero) port->write_zero(time_ns);
   }

@@ -34,6 +34,14 @@ void Task::take_up_revert() noexcept {
   });
 }
 
+/// On the way into a park: a request that was to be carried out in the next step is not lost.
+void Task::revert_in_park() noexcept {
+  if ((control_.load(std::memory_order_acquire) & kRevert) == 0) return;
+  probation_.use([](Probation& probation) {
+    if (probation.note_request()) probation.put_back();
+  });
+}
+
 /// As the take of a change within a wait: position and pending instant stay.
 void Task::put_back_in_wait(Probation& probation) noexcept {
   if (leaves_core_to_change()) return;
@@ -55,7 +63,7 @@ void Task::put_back_in_wait(Probation& probation) noexcept {
 /// ends the probation. One that is not made yet is called off.
 bool Task::leaves_core_to_change() noexcept {
   if (!enter_slot()) return false;
-  Participant& participant = *participant_;
+  Participant& participant = *participant_.load(std::memory_order_relaxed);
   if (!participant.has_voted || !participant.replaces_parts) {
     leave_slot(kPosted);
     return false;
@@ -75,6 +83,20 @@ bool Task::note_fault_on_probation() noexcept {
   return is_violation;
 }
 
+bool Task::give_up_on_probation(const StateAge& age) {
+  // First: the thread looks at the bit when its state ends, and where it has not timed out goes on.
+  control_.fetch_or(kGivenUp, std::memory_order_acq_rel);
+  const auto execution = machine_.execution().look_at_any();
+  const std::optional<PresentState::Fact> fact = machine_.present().look();
+  const bool is_same = execution && fact && !fact->is_wait && fact->since_ns != 0 &&
+                       clock().now_ns() - fact->since_ns >= age.age_ns;
+  const bool is_given_up =
+      is_same && time_out(*execution, "hung: state " + age.state + " of the core on probation did not end",
+                          clock().now_ns());
+  if (!is_given_up) control_.fetch_and(~kGivenUp, std::memory_order_acq_rel);
+  return is_given_up;
+}
+
 /// In place of the end in a fault. False when the core is no longer on probation.
 bool Task::put_back_after_fault(bool has_taken_change) noexcept {
   bool is_back = false;
@@ -90,8 +112,9 @@ bool Task::put_back_after_fault(bool has_taken_change) noexcept {
     park(ComponentState::faulted);
     return true;
   }
+  control_.fetch_and(~kGivenUp, std::memory_order_acq_rel);
   release_withdrawn();
-  for (const auto& port : shell_->ports()) port->reopen();
+  for (const auto& port : shell()->ports()) port->reopen();
   if (is_to_stop) {
     write_outputs(false);
     machine_.trace(TraceKind::stop, machine_.state_name(), machine_.clock_ns());

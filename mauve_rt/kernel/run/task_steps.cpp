@@ -60,6 +60,10 @@ void Task::step() {
 void Task::take_up_start() {
   if (!visit_posted() || machine_.is_started()) return;  // the change has started it
   if ((control_.load(std::memory_order_acquire) & kStart) == 0) return;
+  if (removed_.load(std::memory_order_acquire)) {
+    withdraw_start();
+    return;
+  }
   parked_.store(0, std::memory_order_seq_cst);  // before the bit goes: is_parked() sees one of them
   if ((control_.fetch_and(~kStart, std::memory_order_seq_cst) & kStart) == 0) {
     parked_.store(1, std::memory_order_seq_cst);  // a stop has withdrawn it
@@ -96,7 +100,10 @@ void Task::release(time_ns_t actual_ns) noexcept {
 void Task::run_to_next_wait() {
   machine_.leave_wait();
   for (;;) {
-    if ((control_.load(std::memory_order_acquire) & kStop) != 0) return park_stopped();
+    const std::uint32_t control = control_.load(std::memory_order_acquire);
+    if ((control & kStop) != 0) return park_stopped();
+    if ((control & kGivenUp) != 0 && machine_.execution().has_timed_out()) [[unlikely]]
+      return park_timed_out();
     switch (machine_.enter_next()) {
       case Machine::Entered::execution:
         continue;
@@ -197,15 +204,16 @@ void Task::end_in_fault() noexcept {
 void Task::fall_back(CommitAction& fallback) noexcept {
   fallback.take();
   machine_.trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
-  for (const auto& port : shell_->ports()) port->reopen();
+  for (const auto& port : shell()->ports()) port->reopen();
   regain_priority();
   start_machine(next_instant());
 }
 
 void Task::park(ComponentState state) noexcept {
   machine_.park();
+  revert_in_park();
   overlong_ns_ = 0;
-  control_.fetch_and(~(kStop | kEvent | kRevert), std::memory_order_acq_rel);
+  control_.fetch_and(~(kStop | kEvent | kRevert | kGivenUp), std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
   settle_slot();  // last: who is refused finds the state that tells why

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 SHADOW_TYPE = "mauve_msgs/msg/Shadow"
-_VERDICTS = ("running", "ended", "faulted", "promoted")  # by the constants of mauve_msgs/msg/Shadow
+_VERDICTS = ("running", "ended", "faulted", "promoted", "hung")  # by the constants of mauve_msgs/msg/Shadow
 
 
 def verdict_word(number: int) -> str:

@@ -165,11 +165,11 @@ TYPED_TEST(Prepared, ADestroyedOneLetsGoOfEverything) {
   EXPECT_EQ(numbers, this->architecture.numbers());
 }
 
-TYPED_TEST(Prepared, TheNextChangeCompletesIt) {
+TYPED_TEST(Prepared, ItIsListedAtItsDecisionAndTheNextChangeCompletesIt) {
   auto prepared = this->prepare(Transaction().add_component("new", new_parts()));
   const std::size_t before = this->architecture.components().size();
   EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
-  EXPECT_EQ(before, this->architecture.components().size()) << "the lists wait for its completion";
+  EXPECT_EQ(before + 1, this->architecture.components().size());
   this->commit(Transaction().set_property("new", "gain", 2.0));
   EXPECT_EQ(PropertyValue(2.0), this->gain_of("new"));
   EXPECT_EQ(1U, prepared->complete().steps.size());
@@ -234,12 +234,15 @@ TEST_F(PreparedBeside, ItWaitsForNoPreparation) {
   wait_until([&] { return doors->entered.load(); }, "the hook");
   EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
   EXPECT_EQ(PropertyValue(3.0), gain_of("a")) << "while the hook hangs";
-  EXPECT_FALSE(on_the_same->is_current());
-  EXPECT_EQ(PreparedOutcome::stale, on_the_same->commit(kTimeout)) << "at once";
+  EXPECT_TRUE(on_the_same->is_current()) << "a preparation holds nothing";
+  EXPECT_EQ(PreparedOutcome::committed, on_the_same->commit(kTimeout)) << "at once";
+  EXPECT_EQ(PropertyValue(3.0), gain_of("b"));
   EXPECT_FALSE(doors->open) << "and the hook hangs still";
   doors->open = true;
-  EXPECT_NO_THROW(change.get()) << "they touch nothing in common";
+  EXPECT_EQ(ErrorCode::wrong_revision, refusal([&] { change.get(); }).code()) << "the other came first";
+  EXPECT_EQ("t/Core", core_of("b"));
   prepared->complete();
+  on_the_same->complete();
 }
 
 TEST_F(PreparedBeside, AnOrdinaryChangeOfWhatItChangedMeanwhileIsRefused) {

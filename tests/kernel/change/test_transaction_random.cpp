@@ -111,7 +111,7 @@ class Rule10Random : public ::testing::Test {
 
   void mark_outputs() {
     ++mark;
-    for (const auto& [name, data] : outputs) data->write.write({mark}, 0);
+    for (const auto& [name, data] : outputs) data->write.write({mark}, way.host().now_ns());
   }
   /// Written by the kernel for what was stopped, or replaced, and for nobody else; nothing by a change not made.
   void expect_outputs(const RandomDraft& draft, bool made) {

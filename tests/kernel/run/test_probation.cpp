@@ -378,7 +378,7 @@ TYPED_TEST(Probations, APreparedOneIsWatchedFromItsCommitOn) {
   EXPECT_EQ(PreparedOutcome::committed, prepared->commit(s_to_ns(30)));
   this->host.until([&] { return seen->runs == 2 && component.core_implementation() == "t/Old"; },
                    "the way back");
-  EXPECT_TRUE((*this->host).probations().empty()) << "not completed yet";
+  EXPECT_EQ(Verdict::reverted, this->record().verdict) << "it is known before its change is completed";
   prepared->complete();
   EXPECT_EQ(Verdict::reverted, this->record().verdict);
   this->settle();
@@ -704,6 +704,56 @@ TEST_F(ProbationThreads, ManyChangesAtOnceLeaveOneCore) {
   tolerate([&] { (*host).start("c"); });
   const auto& last = component.core_as<TrialCore>().seen;
   EXPECT_FALSE(last->is_cleaned);
+}
+
+TEST_F(ProbationThreads, ACoreThatHangsIsRevertedAndNeverPasses) {
+  Component& component = add_trial("c", {.hung_after_ns = ms_to_ns(100)});
+  deploy();
+  wait_seen(*old_seen, 2);
+  const auto doors = std::make_shared<Doors>();
+  const auto seen = put_in(
+      [doors](TrialCore&, int run) {
+        if (run == 3) doors->pass();
+      },
+      {.duration_ns = ms_to_ns(20)});
+  wait_until([&] { return doors->entered.load(); }, "the long state");
+  const auto is_given_up = [&] {
+    settle();
+    EXPECT_NE(Verdict::passed, record().verdict);
+    EXPECT_NE(Verdict::inconclusive, record().verdict);
+    return component.task().state() == ComponentState::faulted;
+  };
+  wait_until(is_given_up, "the hang to be found");
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  EXPECT_THAT(record().reason, HasSubstr("hung: state Run of the core on probation did not end"));
+  EXPECT_EQ(0.0, newest()) << "its output is safe";
+  doors->open = true;
+  host.until([&] { return component.core_implementation() == "t/Old"; }, "the old core");
+  settle();
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  wait_state(component, ComponentState::running);
+  expect_old_core_runs_on(component);
+  EXPECT_TRUE(seen->is_cleaned);
+}
+
+TEST_F(ProbationThreads, AStateThatOutlastsTheDurationIsWaitedFor) {
+  add_trial();
+  deploy();
+  wait_seen(*old_seen, 2);
+  const auto doors = std::make_shared<Doors>();
+  put_in(
+      [doors](TrialCore&, int run) {
+        if (run != 3) return;
+        doors->pass();
+        throw std::runtime_error("bad");
+      },
+      {.duration_ns = ms_to_ns(20)});
+  wait_until([&] { return doors->entered.load(); }, "the long state");
+  std::this_thread::sleep_for(std::chrono::milliseconds(40));
+  settle();
+  EXPECT_EQ(Verdict::running, record().verdict) << "nothing is known before it ends";
+  doors->open = true;
+  host.until([&] { return record().verdict == Verdict::reverted; }, "the verdict");
 }
 
 }  // namespace mauve::testing::test_probation

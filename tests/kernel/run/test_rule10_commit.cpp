@@ -417,9 +417,8 @@ TEST_F(Rule10Commit, ALateOneTakesTheChangeAtTheEndOfItsState) {
   EXPECT_EQ("slow", refused->detail().component) << refused->what();
   Transaction other;
   other.set_property("fast", "gain", 7.0);
-  const auto also = error_of(std::move(other), {.timeouts = {.commit_ns = ms_to_ns(50)}});
-  ASSERT_TRUE(also) << "the parts that the change has put out of fast are not retired yet";
-  EXPECT_EQ("slow", also->detail().component) << also->what();
+  const auto also = error_of(std::move(other), {.timeouts = {.commit_ns = s_to_ns(2)}});
+  EXPECT_FALSE(also) << "fast has taken the change, and waits for nobody: " << also->what();
   latch.open();
   const auto is_shown = [&] {
     deployer.describe();  // completes it
@@ -478,7 +477,7 @@ TEST_F(Rule10Commit, WhatALateOnesChangeAddsIsNotAddedTwice) {
       .add_resource("data", std::make_unique<SharedData<Number>>());
   make_it_late(std::move(first));
   wait_ended();
-  EXPECT_EQ(nullptr, architecture.find_component("new")) << "the change is not completed";
+  EXPECT_NE(nullptr, architecture.find_component("new")) << "the change is made";
   Transaction component;
   component.add_component("new",
                           {.shell = std::make_unique<TestShell>(),
@@ -492,12 +491,6 @@ TEST_F(Rule10Commit, WhatALateOnesChangeAddsIsNotAddedTwice) {
     ASSERT_TRUE(refused);
     EXPECT_EQ(ErrorCode::duplicate_name, refused->code()) << refused->what();
   }
-  latch.open();
-  const auto is_there = [&] {
-    deployer.describe();  // completes it
-    return architecture.find_component("new") != nullptr;
-  };
-  wait_until(is_there, "the change to be completed");
 }
 
 template <typename Kind>

@@ -643,10 +643,19 @@ TEST_F(ShadowThreads, TheLiveThreadAllocatesNothing) {
   EXPECT_EQ(0U, component.task().counters().allocations());
 }
 
-TEST_F(ShadowThreads, AComponentIsNotKeptWaitingByACandidateThatHangs) {
+TEST_F(ShadowThreads, NobodyIsKeptWaitingByACandidateThatHangs) {
   std::atomic<bool> is_over{false};
+  add("other");
   Component& component = add_live();
   deploy();
+  const auto compared = [&] {
+    for (const ShadowRecord& each : (*host).shadows()) {
+      if (each.component == "other") return each.compared;
+    }
+    return std::int64_t{0};
+  };
+  commit(std::move(Transaction().shadow("other", std::make_unique<TestCore>(), {.budget_ns = s_to_ns(1)},
+                                        std::make_unique<TestShell>())));
   shadow([&](FollowingCore&, double) {
     while (!is_over) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   });
@@ -657,10 +666,14 @@ TEST_F(ShadowThreads, AComponentIsNotKeptWaitingByACandidateThatHangs) {
   change.promote("c");
   EXPECT_EQ(ErrorCode::timeout, code_of([&] { commit(std::move(change)); }));
   EXPECT_EQ(ComponentState::running, component.task().state());
-  Transaction end;
-  end.end_shadow("c");
-  commit(std::move(end));
-  EXPECT_EQ(Verdict::ended, record().verdict);
+  const std::int64_t before = compared();
+  host.until([&] { return compared() > before + 3; }, "the candidate of another component");
+  const auto is_told = [&] {
+    (*host).settle_probations();
+    return record().verdict == Verdict::hung;
+  };
+  host.until(is_told, "the verdict");
+  EXPECT_EQ("hung: state Run of the candidate did not end", record().reason);
   is_over = true;
   host.until([&] { return candidate->is_cleaned.load(); }, "the clean-up");
 }

@@ -24,8 +24,10 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
   } catch (const Error& failure) {
     rethrow_as_of(failure, component.name(), draft.step());
   }
-  component.wires.emplace(port_name,
-                          Wire{.resource = resource_name, .service = &service, .step = draft.step()});
+  component.wires.emplace(port_name, Wire{.resource = resource_name,
+                                          .service = &service,
+                                          .step = draft.step(),
+                                          .use = draft.resource(resource_name).use()});
 }
 
 }  // namespace

@@ -7,8 +7,6 @@ namespace mauve {
 namespace {
 
 /// For a state of the candidate to end, on a thread that gets little time.
-constexpr time_ns_t kStateEnd = s_to_ns(1);
-
 }  // namespace
 
 constexpr StepKind steps::promote{
@@ -24,7 +22,6 @@ constexpr StepKind steps::promote{
                      .found = "none",
                      .remedy = "give it a shadow first, or replace its core"});
       }
-      changed.fresh.core = shadow->suspend(kStateEnd);
       changed.promoted = shadow;
       changed.core_step = draft.step();
       changed.core_unready = false;

@@ -16,6 +16,7 @@
 
 #include "mauve_rt/architecture/authors.hpp"
 #include "mauve_rt/architecture/description.hpp"
+#include "mauve_rt/architecture/keeper.hpp"
 #include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
@@ -42,13 +43,16 @@ struct TraceDrain {
 /// From the instant that all threads are ready at to the epoch, however many they are (rule 5).
 inline constexpr time_ns_t kDeploymentLead = ms_to_ns(20);
 
-/// What a transaction puts on and takes off an architecture's lists, and whose looks it changed.
-struct ListChange {
-  std::vector<std::shared_ptr<Component>> added_components{};
-  std::vector<std::shared_ptr<Component>> removed_components{};
-  std::vector<std::shared_ptr<Resource>> added_resources{};
-  std::vector<std::shared_ptr<Resource>> removed_resources{};
-  std::vector<Component*> changed{};
+/// What an architecture consists of.
+struct Lists {
+  std::vector<std::shared_ptr<Resource>> resources{};
+  std::vector<std::shared_ptr<Component>> components{};  // last: ports go before what they connect to
+};
+
+/// A component, and where its ports lead to as far as it is decided.
+struct Wiring {
+  std::shared_ptr<Component> component;
+  std::shared_ptr<const Wires> wires;
 };
 
 /// What a change finds of those before it.
@@ -70,9 +74,10 @@ struct ArchitectureClaims {
 ///
 /// | member                          | written by            | read by | under                          |
 /// | ------------------------------- | --------------------- | ------- | ------------------------------ |
-/// | components_, resources_, names_ | who changes it        | anyone  | list_mutex_                    |
+/// | lists_                          | changes, as they are made | anyone | the gate's mutex            |
+/// | names_                          | who changes it        | anyone  | list_mutex_                    |
 /// | numbered_                       | who changes it        | changes | list_mutex_                    |
-/// | leaving_                        | who changes it        | anyone  | list_mutex_                    |
+/// | leaving_, retiring_             | who changes it        | anyone  | list_mutex_                    |
 /// | prepared_, open_, claims_       | changes               | changes | change_lock_                   |
 /// | has_open_                       | changes               | anyone  | relaxed: a hint                |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
@@ -153,8 +158,11 @@ class Architecture final : public Configurable {
   std::vector<std::shared_ptr<Component>> components() const;
   std::vector<std::shared_ptr<Resource>> resources() const;
 
-  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. A change that a late
-  /// component has not taken yet is not in it. [non-rt]
+  /// The wiring of all components, as of one moment. [non-rt]
+  std::vector<Wiring> wiring() const;
+
+  /// Components (implementations, wiring, properties, states, grids) and resources, as of one moment. A component that has not
+  /// taken a change yet that is made is described as it runs. [non-rt]
   ArchitectureDescription describe() const;
 
   /// A new, unconfigured core of a registered implementation. Throws Error: unknown_core.
@@ -231,19 +239,16 @@ class Architecture final : public Configurable {
   void settle_probations() noexcept;
   /// The same where no change is being made. [non-rt]
   void settle_probations_if_idle() noexcept;
-  /// Keeps a change that a late component has not taken yet. [non-rt], the change lock held.
+  /// Keeps a change from its draft on, until it is settled or forgotten. [non-rt], the change lock held.
   void keep_open(std::shared_ptr<OpenChange> change);
-  /// Completes what can be completed and lets other threads have the change lock until the look finds nothing to wait for. A
-  /// change under way is waited for without limit, a late component for so long. [non-rt], the change lock held. Throws as
-  /// throw_late().
+  void forget_open(const OpenChange& change) noexcept;
+  /// Settles what can be settled and lets other threads have the change lock until the look finds nothing to wait for, at most so
+  /// long. [non-rt], the change lock held. Throws as throw_earlier().
   void wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look);
   /// What changes under way have claimed beside components. [non-rt], the change lock held.
   ArchitectureClaims& claims() noexcept { return claims_; }
-  /// Whether a change that is made and not completed has added a component or resource of that name. [non-rt], the change lock
-  /// held.
-  bool has_open_addition(const std::string& name) const noexcept;
-  /// Throws Error (timeout) that names a component which has not taken an earlier change. [non-rt], change lock held.
-  [[noreturn]] void throw_late(time_ns_t waited_ns) const;
+  /// Throws Error (timeout): another change lasts, or a component, which is named, has not taken one. [non-rt], change lock held.
+  [[noreturn]] void throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
   Runner* use_host(std::shared_lock<std::shared_mutex>& use) const;
   /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
@@ -259,15 +264,23 @@ class Architecture final : public Configurable {
   /// How many numbers were given out; give_back() forgets those from `numbers` on. [non-rt]
   std::size_t numbers() const;
   void give_back_numbers(std::size_t numbers);
-  /// Puts a change of the lists in force, as one for all who look. [non-rt]
-  void change_lists(const ListChange& change);
-  /// Keeps a component whose thread has not ended, and all it is connected to (`gone`: of resources that were removed
-  /// with it); reap() lets those go that have. [non-rt]
-  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed,
-                        const std::vector<std::shared_ptr<Resource>>& gone);
+  /// What it consists of now, as one. [non-rt]
+  Lists lists() const;
+  /// Exchanges that for what a change makes of it. [rt], within a CommitGate::Look
+  void swap_lists(Lists& lists) MAUVE_RT;
+  /// A change is made that is to be settled. [rt]
+  void note_open() MAUVE_RT { has_open_.store(true, std::memory_order_relaxed); }  // relaxed: a hint
+  /// Has what was put out cleaned up, in user code: beside all changes where threads run, else at once. [non-rt]
+  void dispose(const std::string& what, std::function<void()> work);
+  /// What that does now, and since when. [non-rt]
+  Keeper::Busy disposing() const { return keeper_.busy(); }
+  /// Waits until that is done, a little. [non-rt], without the change lock
+  void wait_disposed() const;
+  /// Keeps a component whose thread has not ended; reap() lets those go that have. [non-rt]
+  void keep_until_ended(std::shared_ptr<Component> component, bool was_listed);
+  /// Cleans up resources that were removed, now or when nobody uses them any more. [non-rt]
+  void retire(std::vector<std::shared_ptr<Resource>> resources);
   void reap();
-  /// Whether a thread that was left behind may still use a resource. [non-rt]
-  bool is_used_by_left_behind(const Resource& resource) const;
   /// Keeps what a removed component's ring holds until the next drain. [non-rt]
   void retire_trace(Task& task);
 
@@ -282,7 +295,6 @@ class Architecture final : public Configurable {
   struct Leaving {
     std::shared_ptr<Component> component;
     bool was_listed;
-    std::vector<std::shared_ptr<Resource>> uses;
   };
   struct Final {  // of a removed component, or of who is none
     std::uint64_t written{0};
@@ -297,7 +309,7 @@ class Architecture final : public Configurable {
 
   PluginRegistry* registry_;
   ChangeLock change_lock_;
-  CommitGate commit_gate_;
+  mutable CommitGate commit_gate_;
   ArchitectureClaims claims_;
   std::vector<OpenChange*> prepared_;
   std::vector<std::shared_ptr<OpenChange>> open_;
@@ -315,10 +327,10 @@ class Architecture final : public Configurable {
   std::mutex trace_mutex_;
   std::deque<TraceRecord> retired_;
   std::vector<Final> finals_;  // by number
-  std::vector<std::shared_ptr<Resource>> resources_;
+  std::vector<std::shared_ptr<Resource>> retiring_;
   std::vector<Leaving> leaving_;
-  std::vector<std::shared_ptr<Component>>
-      components_;  // after the resources: ports go before what they connect to
+  Lists lists_;
+  Keeper keeper_;  // first to end: it cleans up what others had
 };
 
 }  // namespace mauve

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// OpenChange: a change that is prepared and not committed, or committed and not completed, as its architecture sees it.
+// OpenChange: a change from its draft to the end of what it has put out, as its architecture sees it.
 #pragma once
-
-#include <string>
 
 namespace mauve {
 
@@ -12,15 +10,13 @@ class Task;
 class OpenChange {
  public:
   virtual ~OpenChange() = default;
-  /// Completes the change if it was committed, all its components have taken it, and it was not completed yet. Whether it is
-  /// completed. [non-rt]
+  /// Settles the part of each component that has taken the change, or retires one that was called off and that a thread had not
+  /// left by then. Whether nothing is left to be done. [non-rt]
   virtual bool settle() noexcept = 0;
   /// Lets go of all that it has, if what it was prepared against has changed for good. [non-rt]
   virtual void drop_if_stale() noexcept {}
-  /// A component that has not taken it yet; nullptr: there is none. [non-rt]
+  /// A component that has not taken it yet, of those that it was made of; nullptr: there is none. [non-rt]
   virtual const Task* find_late() const noexcept { return nullptr; }
-  /// Whether it has added a component or resource of that name, which is not listed before the change is completed. [non-rt]
-  virtual bool has_added(const std::string& name) const noexcept = 0;
 };
 
 }  // namespace mauve

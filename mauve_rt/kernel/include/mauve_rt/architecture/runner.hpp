@@ -12,7 +12,7 @@
 
 namespace mauve {
 
-class Task;
+class Component;
 class Shadow;
 
 /// A host, as architectures and changes see it. All functions [non-rt].
@@ -38,10 +38,10 @@ class Runner {
   /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
   virtual bool is_simulated() const noexcept = 0;
 
-  /// Gives a parked task what it runs on. [non-rt] Throws Error.
-  virtual void attach(Task& task) = 0;
+  /// Gives a parked component what it runs on. [non-rt] Throws Error.
+  virtual void attach(const std::shared_ptr<Component>& component) = 0;
   /// The reverse; false when its thread would not end in time. [non-rt]
-  virtual bool detach(Task& task) noexcept = 0;
+  virtual bool detach(Component& component) noexcept = 0;
   /// Executes the releases of a shadow, once it has begun, until it has ended. [non-rt] Throws Error.
   virtual void run_shadow(const std::shared_ptr<Shadow>& shadow) = 0;
   /// Held while a change uses the runner, which may end meanwhile where this owns nothing. [non-rt], the architecture's change

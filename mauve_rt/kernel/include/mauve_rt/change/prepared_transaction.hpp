@@ -29,20 +29,21 @@ const char* to_string(PreparedOutcome outcome) MAUVE_RT;
 /// One transaction on a deployed architecture, drafted, built, configured and prefaulted; made by Host::prepare(). The host
 /// and the architecture outlive it. Unless commit() answers `committed` nothing was changed.
 ///
-/// It is stale once another change of a component that it touches was committed, or once one of these was started, stopped
-/// or faulted; where it adds, removes, wires, or replaces a shell or an fsm, once any change did that; once code was loaded
-/// anew; and once the host was shut down. While an ordinary change of a component that it touches is under way, from its draft to its end, it is stale as
-/// well: what hooks read then is not to be exchanged beneath them. It is current again when that one was refused.
+/// It is stale once another change of a component that it touches was committed, unless it only starts and stops; once one of
+/// these was started, stopped or faulted; where it adds, removes, wires, or replaces a shell or an fsm, once any change did that;
+/// once code was loaded anew; and once the host was shut down. An ordinary change that is being prepared, and a dry run, keep it
+/// off nothing: they are refused when this one comes first. Only one that configures a component anew
+/// acts on parts that are in, and keeps it off that component.
 ///
 /// commit() waits for nobody's preparation. It waits, until its time-out, for no more than: an ordinary commit under way,
-/// which it calls off, to end (an adopt or take that has begun ends first); another prepared commit; a start() of a component
-/// that it touches, or the end of such a one's thread; its own components to come to their waits, and to take the change.
-/// Beyond the time-out it waits for its own adopt and take, and for the threads of components that it starts, no longer than
-/// Commit::kPatience. It allocates only where it gives up a component whose adopt or take does not end.
+/// which it calls off, to end (an adopt that has begun ends first); another prepared commit, up to its decision; a start() of a
+/// component that it touches, or the end of such a one's thread; its own components to take an earlier change, to come to their
+/// waits, and to take the change. Beyond the time-out it waits for its own adopt and take, and for the threads of components that
+/// it starts, no longer than Commit::kPatience. It allocates only where it gives up a component whose adopt or take does not end.
 ///
-/// After the commit, lists, described wiring and properties are those of before until complete(), or until the next change of the
-/// architecture, which completes it first; until then a component with a new shell or fsm has no fallback, and one that was
-/// added is not stopped by a shutdown.
+/// With its decision it is in force: lists and wiring are those that it makes. What it has put out is retired, and properties are
+/// described anew, by complete(), by a description, or by the next change of the architecture; until then a component with a new
+/// shell or fsm has no fallback.
 class PreparedTransaction final : private OpenChange {
  public:
   /// By Host::prepare(). [non-rt] Throws as Architecture::make().
@@ -72,7 +73,6 @@ class PreparedTransaction final : private OpenChange {
 
   bool settle() noexcept override;
   void drop_if_stale() noexcept override;
-  bool has_added(const std::string& name) const noexcept override;
   void note_failure() noexcept;
   void let_go() noexcept;
 

@@ -186,8 +186,11 @@ class WritePort final : public PortBase {
       put(zero_, time_ns);
     }
   }
-  TryWrite try_write_zero() noexcept override {
-    return service_ != nullptr ? service_->try_write(zero_, stamp_ns()) : TryWrite::done;
+  TryWrite try_write_zero(ServiceBase& service, time_ns_t time_ns) noexcept override {
+    return static_cast<WriteService<T>&>(service).try_write(zero_, time_ns);
+  }
+  void write_zero_to(ServiceBase& service, time_ns_t time_ns) noexcept override {
+    static_cast<WriteService<T>&>(service).write(zero_, time_ns);
   }
   std::unique_ptr<PortCell> make_cell() const override {
     if constexpr (std::is_trivially_copyable_v<T>) {

@@ -39,7 +39,8 @@ struct OutputOptions {
 struct PortConnection {
   ServiceBase* service{nullptr};
   std::string resource;
-  std::uint32_t trace_id{0};  // of "resource.service", for calls
+  std::uint32_t trace_id{0};          // of "resource.service", for calls
+  std::shared_ptr<const void> use{};  // Resource::use()
 };
 
 /// Where a port leads to, by name; both empty: nowhere.
@@ -125,8 +126,12 @@ class PortBase {
   /// Writes the type's default value, as of now or as of that time; a port that is no write port does nothing. [rt]
   void write_zero() MAUVE_RT { write_zero(stamp_ns()); }
   virtual void write_zero(time_ns_t /*time_ns*/) MAUVE_RT {}
-  /// The same without waiting for a lock. [rt]
-  virtual TryWrite try_write_zero() MAUVE_RT { return TryWrite::done; }
+  /// The same to a service that fits the port, whether it is connected to it or not, without waiting for a lock. [rt]
+  virtual TryWrite try_write_zero(ServiceBase& /*service*/, time_ns_t /*time_ns*/) MAUVE_RT {
+    return TryWrite::done;
+  }
+  /// The same where the service cannot do without waiting. [rt]
+  virtual void write_zero_to(ServiceBase& /*service*/, time_ns_t /*time_ns*/) MAUVE_RT {}
   virtual OutputOptions output() const MAUVE_RT { return {OutputPolicy::hold, OutputPolicy::hold}; }
   /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
   void close() MAUVE_RT { set_special(kClosed | kLeft, kClosed); }
@@ -136,7 +141,9 @@ class PortBase {
   }
   /// Of a closed port: writes what `on_stop` says, once; waits for a lock only where the service cannot do without, and
   /// the caller allows it. [rt] Whether it is written.
-  bool make_safe(bool may_wait) MAUVE_RT;
+  bool make_safe(bool may_wait, time_ns_t time_ns) MAUVE_RT;
+  /// The same to a service that the port is to be connected to. [rt]
+  bool make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) MAUVE_RT;
   /// Its component is removed while a state of it still uses the port: gives up its place at the service, and swallows
   /// writes for good. The connection stays until disconnect(). [rt]
   void leave_behind() MAUVE_RT;

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -104,7 +105,11 @@ class EventListeners {
 enum class TopicBinding : std::uint8_t { none, publish, subscribe };
 
 /// Derive from this to offer services of your own; a service is a member registered by offer().
-class Resource : public ConfigurablePart {
+///
+/// | member | written by       | read by         | under      |
+/// | ------ | ---------------- | --------------- | ---------- |
+/// | use_   | ordinary threads | the same        | use_mutex_ |
+class Resource : public ConfigurablePart, public std::enable_shared_from_this<Resource> {
  public:
   /// `kind` and `type` as the architecture file names them.
   Resource(std::string kind, std::string type) : kind_(std::move(kind)), type_(std::move(type)) {}
@@ -137,6 +142,11 @@ class Resource : public ConfigurablePart {
   void relisten(EventListener& listener, EventListener& by) noexcept { listeners_.replace(listener, by); }
   /// While it is held no listener is called. [rt] Short; nothing is written and nobody listens under it.
   PiMutex& events_mutex() MAUVE_RT { return listeners_.mutex(); }
+  /// What a connection holds: it keeps a resource that is owned by a shared pointer alive, and in use; empty for any other.
+  /// [non-rt]
+  std::shared_ptr<const void> use();
+  /// Whether somebody holds a use: a port that is connected, or will be, or was and is not told yet. [non-rt]
+  bool is_in_use() const;
   /// Counts who calls write_sample(), e.g. an incoming topic, as one port of each service that writes.
   /// [setup] Throws Error (invalid_argument) when one takes no more.
   void bind_input();
@@ -211,6 +221,8 @@ class Resource : public ConfigurablePart {
   Notifier* notifier_{nullptr};
   std::uint64_t handed_out_{0};  // as `seen`, of next_published()
   EventListeners listeners_;
+  mutable std::mutex use_mutex_;
+  std::weak_ptr<const void> use_;
 };
 
 /// A resource that holds one newest value: its serialized face is one look at it.

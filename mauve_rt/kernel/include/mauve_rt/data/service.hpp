@@ -103,7 +103,9 @@ class LatestRegister;
 /// | member    | written by                             | read by         | order                          |
 /// | --------- | -------------------------------------- | --------------- | ------------------------------ |
 /// | resource_ | Resource::offer()                      | any             | - [setup]                      |
-/// | ports_    | connecting threads, commits            | ordinary thread | relaxed: they are serialized   |
+/// | ports_    | connecting threads, commits            | ordinary thread | relaxed: a count that lags behind a change while a component is late |
+/// | inputs_   | who binds topics                       | ordinary thread | relaxed: they are serialized   |
+/// | since_ns_ | changes, under the gate's mutex        | the same        | -                              |
 class ServiceBase {
  public:
   ServiceBase(std::string name, PortKind kind, std::string type)
@@ -149,13 +151,27 @@ class ServiceBase {
 
   /// How many ports may be connected at once; 0: any number. [rt]
   virtual std::uint32_t max_ports() const MAUVE_RT { return 0; }
-  /// How many are connected. [rt]
+  /// How many ports use it now, topics that come in among them. What a change that is made has yet to connect is not. [rt]
   std::uint32_t ports() const MAUVE_RT { return ports_.load(std::memory_order_relaxed); }
+  /// How many of them are topics that come in. [rt]
+  std::uint32_t inputs() const MAUVE_RT { return inputs_.load(std::memory_order_relaxed); }
   /// Refuses more ports than max_ports(). [non-rt] Throws Error (invalid_argument).
   void check_ports(std::uint32_t wanted) const;
   /// A port came or went; kept by PortBase and Resource. [rt]
   void add_port() MAUVE_RT { ports_.fetch_add(1, std::memory_order_relaxed); }
   void remove_port() MAUVE_RT { ports_.fetch_sub(1, std::memory_order_relaxed); }
+  /// Others than ports write to it. [non-rt]
+  void bind_input() noexcept {
+    inputs_.fetch_add(1, std::memory_order_relaxed);
+    add_port();
+  }
+
+  // ---- under the mutex of the architecture's gate
+
+  /// T of the last change that was made and that connected or disconnected a port here; a change that does so again lies later.
+  /// [rt]
+  time_ns_t since_ns() const MAUVE_RT { return since_ns_; }
+  void set_since_ns(time_ns_t instant_ns) MAUVE_RT { since_ns_ = instant_ns; }
 
  private:
   friend class Resource;
@@ -165,6 +181,8 @@ class ServiceBase {
   std::string type_;
   Resource* resource_{nullptr};
   std::atomic<std::uint32_t> ports_{0};
+  std::atomic<std::uint32_t> inputs_{0};
+  time_ns_t since_ns_{0};
 };
 
 template <Described T>

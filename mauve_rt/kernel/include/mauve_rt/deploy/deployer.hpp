@@ -33,10 +33,10 @@ class Deployer final : public Host {
   /// Creates the threads, meets them at a barrier, publishes epoch = now + 20 ms,
   /// starts all. [setup] Throws Error as Host::deploy(); no thread is left then.
   void deploy() override;
-  /// Also ends the threads: those that execute a state for longer than kStopTimeout are left behind. [non-rt]
+  /// Also ends the threads, of all that run on it: those that execute a state for longer than kStopTimeout are given up - their
+  /// outputs are safe on return - and left behind. [non-rt]
   void shutdown() noexcept override;
-  /// The same, for good: it cannot be deployed again. A component whose state does not end within kStopTimeout is given
-  /// up: its outputs are safe on return, too. [non-rt]
+  /// The same, for good: it cannot be deployed again. [non-rt]
   void end() noexcept;
   /// end() of every deployer of the process, those to come included. [non-rt]
   static void end_all() noexcept;
@@ -47,17 +47,19 @@ class Deployer final : public Host {
   const Clock& clock() const noexcept override { return MonotonicClock::instance(); }
   bool is_simulated() const noexcept override { return false; }
 
-  void attach(Task& task) override;
-  bool detach(Task& task) noexcept override;
   void run_shadow(const std::shared_ptr<Shadow>& shadow) override;
   /// What watches the components' executions while it is deployed; nullptr otherwise. [setup]
   const Watchdog* watchdog() const noexcept { return watchdog_.get(); }
+
+ protected:
+  void begin_task(Task& task) override;
+  bool end_task(Task& task) noexcept override;
 
  private:
   class Barrier;
 
   void create_threads();
-  void shut_down(bool for_good) noexcept;
+  void shut_down() noexcept;
 
   DeployerOptions options_;
   RealtimeProcess process_;
@@ -65,7 +67,7 @@ class Deployer final : public Host {
   bool has_ended_{false};
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
-  ShadowThread shadow_thread_;
+  ShadowThreads shadow_threads_;
 };
 
 }  // namespace mauve

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,10 @@ struct StopOptions {
 /// Runs one architecture, which has at most one host at a time. All functions [non-rt] unless told.
 ///
 /// start(), stop(), shutdown() and what only looks take no part in changes: a long preparation keeps nobody from them.
+///
+/// | member  | written by       | read by | under         |
+/// | ------- | ---------------- | ------- | ------------- |
+/// | hosted_ | ordinary threads | same    | hosted_mutex_ |
 class Host : public Runner {
  public:
   explicit Host(Architecture& architecture) : architecture_(architecture) {}
@@ -88,12 +93,22 @@ class Host : public Runner {
   /// Waits until a component changed its state or core after `seen`; returns the word to pass next. [non-rt]
   std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
 
+  void attach(const std::shared_ptr<Component>& component) final;
+  bool detach(Component& component) noexcept final;
+
  protected:
   /// Throws Error: not_configured; already_running when it is deployed. [setup]
   void require_deployable() const;
   void require_deployed() const;
   /// All grids count from the instant, and every component that is stopped starts on it. [setup]
   void start_all(time_ns_t epoch_ns);
+  /// Gives a parked task what it runs on, and takes it away; false when its thread would not end in time. [non-rt]
+  virtual void begin_task(Task& task) = 0;
+  virtual bool end_task(Task& task) noexcept = 0;
+  /// Notes who runs on it from now on. [non-rt]
+  void note_hosted(const std::shared_ptr<Component>& component);
+  /// All that run on it: components of the architecture, and those that leave it or have yet to enter it. [non-rt]
+  std::vector<std::shared_ptr<Component>> hosted() const;
   /// Stops all, the last one first; who does not come to rest soon keeps none of the others running. [non-rt]
   void stop_all(time_ns_t until_ns) noexcept;
   /// After that: makes the outputs of those safe whose state does not end. [non-rt]
@@ -101,8 +116,11 @@ class Host : public Runner {
 
  private:
   void require_own() const;
+  std::shared_ptr<Component> find_leaving(const std::string& name, const Component* present) const;
 
   Architecture& architecture_;
+  mutable std::mutex hosted_mutex_;
+  std::vector<std::weak_ptr<Component>> hosted_;
 };
 
 }  // namespace mauve

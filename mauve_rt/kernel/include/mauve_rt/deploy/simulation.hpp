@@ -66,10 +66,12 @@ class SimulatedHost final : public Host {
   const Clock& clock() const noexcept override { return processor_.clock; }
   bool is_simulated() const noexcept override { return true; }
 
-  void attach(Task& task) override;
-  bool detach(Task& task) noexcept override;
   /// The simulated task itself executes it after each release.
   void run_shadow(const std::shared_ptr<Shadow>& /*shadow*/) override {}
+
+ protected:
+  void begin_task(Task& task) override;
+  bool end_task(Task& task) noexcept override;
 
  private:
   friend class Simulation;

@@ -26,7 +26,8 @@ struct State;
 /// | time_     | writers, if empty; task empties; a  | task    | acq_rel: what was written before is visible      |
 /// |           | commit fills it                     |         |                                                  |
 /// | waiter_   | ordinary threads, the same again    | writers | relaxed: listening publishes it first            |
-/// | is_live_  | before it listens; a commit         | writers | relaxed: the resource's events mutex             |
+/// | is_live_  | before it listens; a commit         | writers | relaxed: the resource's events mutex, or where a |
+/// |           |                                     |         | rewiring mutes it, any order: no event is lost   |
 /// | resource_ | ordinary threads, one at a time,    | commits | the same, and a change of the component at a time|
 /// |           | none in a commit of the component   |         |                                                  |
 class EventInput final : public EventListener {
@@ -45,8 +46,10 @@ class EventInput final : public EventListener {
   const PortBase& port() const MAUVE_RT { return *port_; }
   /// Whom it wakes; before it listens, and nobody else later. [non-rt]
   void set_waiter(Waiter& waiter) noexcept { waiter_.store(&waiter, std::memory_order_relaxed); }
-  /// Ignores events until take_over(). [non-rt], before it listens
-  void mute() noexcept { is_live_.store(false, std::memory_order_relaxed); }
+  /// Ignores events until take_over(), or until it listens anew. [rt]
+  void mute() MAUVE_RT { is_live_.store(false, std::memory_order_relaxed); }
+  /// As on_event(), also of one that ignores events: by who listens in its place. [rt]
+  void heed(time_ns_t time_ns) MAUVE_RT;
   /// Heeds events from now on, in place of the inputs of another fsm. One that came before is taken over when it came at
   /// the same port and resource, and no wait there has consumed it. [rt], a commit
   void take_over(std::span<const std::unique_ptr<State>> before) MAUVE_RT;

@@ -14,6 +14,7 @@
 namespace mauve {
 
 class CommitGate;
+class Publication;
 class Task;
 
 /// One part of a change. Prepared on an ordinary thread; adopt and take run on the thread of the component that the action
@@ -25,6 +26,9 @@ class CommitAction {
   virtual bool adopt() { return true; }
   /// Makes the change; cannot fail. [rt] as far as the part is.
   virtual void take() noexcept = 0;
+  /// Writes the safe value, of that time, through the ends that the action gives its component, whether it has been taken or not;
+  /// false when it must wait for a lock and may not. [rt], the component's thread hangs.
+  virtual bool make_safe(bool /*may_wait*/, time_ns_t /*time_ns*/) MAUVE_RT { return true; }
   /// The time that adopt and take declare to need together; 0: none declared. [rt]
   virtual time_ns_t declared_ns() const MAUVE_RT { return 0; }
   /// The action's name in the trace. [rt]
@@ -95,6 +99,15 @@ struct Participant {
   time_ns_t release_actual_ns{0};
   std::atomic<std::uint32_t> released{0};
 
+  /// What its adopts and takes declare to need together; 0: nothing is declared. [rt]
+  time_ns_t declared_ns() const MAUVE_RT {
+    time_ns_t declared = 0;
+    for (const CommitAction* action : actions) declared += action->declared_ns();
+    return declared;
+  }
+  /// How long its adopts, or its takes, may last before the watchdog gives the component up; kForever: the requester watches them,
+  /// as long as its patience lasts. [rt]
+  time_ns_t limit_ns() const MAUVE_RT;
   /// Whether it has taken the change, and all of the above is there. [rt]
   bool has_passed() const MAUVE_RT { return passed.load(std::memory_order_acquire); }
   /// After it has passed: whether a release follows; none does in a wait that only a stop ends. [non-rt]
@@ -112,8 +125,10 @@ struct Participant {
 /// which fixes T. Each participant executes up to T with old parts, and takes the change before it executes at T or later.
 /// No participant waits for another.
 ///
-/// The requester posts the change to the participants, sleeps until the cut is decided, and then until all have passed. The
-/// change's record and the old parts may be freed once all have passed, or once all slots are empty after it was called off.
+/// The requester posts the change to the participants, and sleeps until the cut is decided. From then on it holds nobody: it
+/// waits for those that have yet to take the change as long as its patience lasts. The decision is also the publication: the
+/// gate puts what the change makes of the architecture into its table (commit_gate.hpp). A participant is settled when it has
+/// passed: what it has put out may be freed then. The change's record may be freed once no thread is to come back to it (is_left()).
 ///
 /// | member          | written by                              | read by     | order                                       |
 /// | --------------- | --------------------------------------- | ----------- | ------------------------------------------- |
@@ -138,6 +153,7 @@ class Commit {
     off,        // it was withdrawn, preempted, or the host is being shut down
     timed_out,  // a participant did not vote in time, or a command of one lasted
     changed,    // a participant is STOPPING or FAULTED
+    stale,      // the architecture is not the one that it was prepared for
   };
   enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, shut_down, preempted };
 
@@ -153,11 +169,19 @@ class Commit {
   /// Gives the participants their actions, and orders them by number. [non-rt] Once, before carry_out().
   void assign_actions();
   /// Whether a component's own thread takes part. [rt], from carry_out() on.
-  bool has_own() const MAUVE_RT { return has_own_; }
+  bool has_own() const MAUVE_RT {
+    return has_own_.load(std::memory_order_relaxed);
+  }  // relaxed: looked at again when it is known
   /// It gives way to a prepared commit. [setup]
   void set_yields() noexcept { yields_ = true; }
   /// [rt]
   bool yields() const MAUVE_RT { return yields_; }
+  /// What it makes of the table. [setup]
+  void set_publication(Publication& publication) noexcept { publication_ = &publication; }
+  /// Puts that into the table. [rt], by the gate, within a Look
+  void publish() MAUVE_RT;
+  /// Whether it may be installed; its cut starts where it may then. [rt], by the gate, within a Look
+  bool prepare_install() MAUVE_RT;
   /// It adds or removes something, or wires ports; who carries it out holds CommitGate::structural. [setup]
   void set_structural() noexcept { is_structural_ = true; }
   /// [rt]
@@ -168,10 +192,12 @@ class Commit {
 
   // ---- the requester
 
-  /// Makes the change, or not, at most until the instant; then waits until all have passed, as long as they are not late
-  /// beyond that instant: has_passed() says whether they have. Where a component's adopt or take does not end the component
-  /// is given up, which allocates. [rt] as far as the actions are. Ordinary threads and rules, which have claimed the components.
-  Outcome carry_out(time_ns_t timeout_ns, CommitGate& gate) noexcept;
+  /// Makes the change, or not, at most until the instant. Where a component's adopt does not end the component is given up, which
+  /// allocates. [rt] as far as the actions are. Ordinary threads and rules.
+  Outcome decide(time_ns_t until_ns, CommitGate& gate) noexcept;
+  /// Of one that is made: waits until all have passed, at most until the instant and a little longer; has_passed() says whether
+  /// they have. A component whose take does not end is given up. [rt] as far as the actions are.
+  void await_passes(time_ns_t until_ns) noexcept;
   /// Throws Error as the outcome demands, or what adopt threw; returns where adopt returned false. [non-rt], not made.
   void rethrow_refusal() const;
   /// [non-rt], after it ended.
@@ -184,8 +210,13 @@ class Commit {
   bool is_answered() const MAUVE_RT { return answered_.load(std::memory_order_relaxed); }
   /// Sleeps until all have passed, at most until the instant. [non-rt]
   bool wait_passed(time_ns_t until_ns) const noexcept;
-  /// Whether a thread may still use the record of a change that was called off. [non-rt], after it ended.
-  Task* kept_by() const noexcept { return kept_by_; }
+  /// Whether the participant's thread comes to its part no more: it has passed, or its component was abandoned. [non-rt], of one
+  /// that is made.
+  static bool is_over(const Participant& participant) noexcept;
+  /// Whether no thread will touch the record any more. [non-rt], after it ended.
+  bool is_left() const noexcept;
+  /// Whether a component was given up whose adopt did not end. [non-rt], after it ended.
+  bool has_given_up() const noexcept { return given_up_ != nullptr; }
   /// The action whose adopt refused, or nullptr. [non-rt], after it ended.
   const CommitAction* refused_by() const noexcept { return refused_by_; }
   /// Why it was called off. [non-rt], after it ended.
@@ -216,6 +247,7 @@ class Commit {
 
  private:
   Participant* find(const Task& task) const MAUVE_RT;
+  bool await_slots(time_ns_t until_ns) noexcept;
   bool lock(time_ns_t until_ns) noexcept;
   void unlock() noexcept;
   const Task* find_unfit() const noexcept;
@@ -228,8 +260,9 @@ class Commit {
   void visit_simulated() noexcept;
   void await_decision(time_ns_t until_ns) noexcept;
   void call_off_if_one_left() noexcept;
-  void retract_all(time_ns_t until_ns) noexcept;
-  void complete(time_ns_t until_ns) noexcept;
+  void retract_posted() noexcept;
+  void await_busy(time_ns_t until_ns) noexcept;
+  void begin_completion() noexcept;
   bool give_up(const Participant& participant, const char* call) noexcept;
   void start_parked(time_ns_t until_ns) noexcept;
   [[noreturn]] void throw_unfit() const;
@@ -241,12 +274,12 @@ class Commit {
   std::vector<CommitAction*> actions_;
   bool yields_{false};
   bool is_structural_{false};
-  bool has_own_{false};
+  std::atomic<bool> has_own_{false};
   time_ns_t timeout_ns_{0};
   const Task* unfit_{nullptr};
-  const Task* locked_out_{nullptr};  // whose command lasted
-  const Task* occupied_{nullptr};    // who has not taken an earlier change yet
-  Task* kept_by_{nullptr};
+  const Task* locked_out_{nullptr};    // whose command lasted
+  const Task* occupied_{nullptr};      // who has not taken an earlier change yet
+  Publication* publication_{nullptr};  // nullptr: of a test
   Task* given_up_{nullptr};
   bool adopt_was_late_{false};
   std::exception_ptr refusal_{};

@@ -35,28 +35,64 @@ struct UrgentCommit {
   UrgentCommit* next{nullptr};  // the gate's
 };
 
-/// Commits under way, and the structure that they change. Commits of different components go on in parallel, unless both are
+/// What a commit makes of the architecture's table, prepared beforehand. Both under the gate's mutex.
+class Publication {
+ public:
+  Publication() = default;
+  virtual ~Publication() = default;
+  Publication(const Publication&) = delete;
+  Publication& operator=(const Publication&) = delete;
+
+  /// The latest T of the changes that this one builds on; the cut starts there, so that T is later. [rt]
+  virtual time_ns_t since_ns() const MAUVE_RT = 0;
+  /// Whether the table is still the one that it was prepared for. [rt]
+  virtual bool is_current() const MAUVE_RT = 0;
+  /// Puts the prepared values into the table, by swaps; once, of a commit that is made. [rt]
+  virtual void publish(time_ns_t instant_ns) MAUVE_RT = 0;
+};
+
+/// The table of an architecture - what it consists of, who is wired to what, how often each changed - and the commits that are
+/// to change it. It changes with the decision of a commit, not when its requester or its components get to run: who takes the
+/// mutex takes in every commit that is decided, first (Look). Commits of different components go on in parallel, unless both are
 /// structural.
 ///
 /// | member     | written by                | read by | order                                               |
 /// | ---------- | ------------------------- | ------- | --------------------------------------------------- |
-/// | mutex      | who looks at marks or the structure to rely on it, or changes them; for a moment | - | - |
-/// | structural | a structural commit while it is carried out; before mutex | - | -                       |
+/// | mutex_     | who looks at the table or changes it, for a moment: no user code, no allocation | - | -    |
+/// | structural | a structural commit from its install to its decision; before mutex_ | - | -                |
 /// | structure_ | commits, under both mutexes | anyone | release/acquire: a hint; to rely on it, hold one of them |
-/// | under_way_ ... | commits, prepared commits, hosts | same | under_way_mutex_                             |
+/// | the rest   | commits, prepared commits, hosts | same | mutex_                                          |
 class CommitGate {
  public:
-  PiMutex mutex;
   PiMutex structural;
+
+  /// While it lives the calling thread has the mutex, and the table is what was decided by then. [rt]
+  class Look {
+   public:
+    explicit Look(CommitGate& gate) MAUVE_RT : gate_(gate) {
+      gate_.mutex_.lock();
+      gate_.take_in();
+    }
+    ~Look() { gate_.mutex_.unlock(); }
+    Look(const Look&) = delete;
+    Look& operator=(const Look&) = delete;
+
+   private:
+    CommitGate& gate_;
+  };
 
   /// How often components or resources were added or removed, ports wired, or shells replaced. [rt]
   std::uint32_t structure() const MAUVE_RT { return structure_.load(std::memory_order_acquire); }
-  /// Under both mutexes. [rt]
+  /// Within a Look, and CommitGate::structural held by who does not commit. [rt]
   void restructured() MAUVE_RT { structure_.fetch_add(1, std::memory_order_release); }
 
-  /// A commit that is carried out: from begin() to end() others may call it off. [rt]
-  void begin(Commit& commit) MAUVE_RT;
-  void end(Commit& commit) MAUVE_RT;
+  /// Installs a commit, which is to be carried out: until it is decided others may call it off. False: the table is not the one
+  /// that it was prepared for. [rt]
+  bool begin(Commit& commit) MAUVE_RT;
+  /// It knows by now who takes part: calls it off where no thread of the architecture may. [rt]
+  void look_again(Commit& commit) MAUVE_RT;
+  /// Whether an open commit is about the task. [rt], within a Look
+  bool has_open_about(const Task& task) const MAUVE_RT;
   /// Calls off the commits under way that give way and are in the urgent one's way, and each such that comes before relax().
   /// [rt]
   void press(UrgentCommit& urgent) MAUVE_RT;
@@ -68,46 +104,54 @@ class CommitGate {
   void close() noexcept;
 
  private:
+  void take_in() MAUVE_RT;
   void call_off_if_unwanted(Commit& commit) MAUVE_RT;
 
+  PiMutex mutex_;
   std::atomic<std::uint32_t> structure_{0};
-  PiMutex under_way_mutex_;
   Commit* under_way_{nullptr};     // a list
   UrgentCommit* urgent_{nullptr};  // a list
   bool is_open_{false};
 };
 
-/// What a component has been through. A change claims it for as long as it looks at its parts, or changes them.
+/// What a component has been through. A change claims it while it prepares parts for it: other changes of the component that
+/// are not urgent wait, and what others put out of it stays as it is. Under the gate's mutex, but for what is told otherwise.
 ///
 /// | member     | written by                                      | read by | order                                     |
 /// | ---------- | ----------------------------------------------- | ------- | ----------------------------------------- |
-/// | count_     | changes, under the gate's mutex                 | anyone  | release/acquire: a hint; as structure_    |
-/// | unsettled_ | changes, and who completes them; gate's mutex   | same    | -                                         |
+/// | changes_   | commits that are made, and who settles          | anyone  | release/acquire: a hint; as structure_    |
+/// | the rest   | changes, and who settles them                   | same    | -                                         |
 class ChangeMark {
  public:
-  /// Grows by two with every change; odd while a change has claimed it. [rt]
-  std::uint32_t count() const MAUVE_RT { return count_.load(std::memory_order_acquire); }
-  /// The same without the claim. [rt]
-  std::uint32_t changes() const MAUVE_RT { return count() & ~1U; }
-  bool is_claimed() const MAUVE_RT { return (count() & 1U) != 0; }
-
-  // ---- under the gate's mutex
-
-  /// Not of one that is claimed or unsettled. [rt]
-  void claim() MAUVE_RT { count_.fetch_add(1, std::memory_order_release); }
-  void release() MAUVE_RT { count_.fetch_sub(1, std::memory_order_release); }
-  /// By who has claimed it. [rt]
-  void set_changed() MAUVE_RT { count_.fetch_add(2, std::memory_order_release); }
-  /// By who has changed it: what was put out is there still until settle(). [rt]
-  void unsettle() MAUVE_RT { unsettled_ = true; }
-  /// [non-rt]
-  void settle() noexcept { unsettled_ = false; }
+  /// Grows with every change but a mere start or stop. [rt], anyone
+  std::uint32_t changes() const MAUVE_RT { return changes_.load(std::memory_order_acquire); }
   /// [rt]
-  bool is_unsettled() const MAUVE_RT { return unsettled_; }
+  void set_changed() MAUVE_RT { changes_.fetch_add(1, std::memory_order_release); }
+
+  /// [rt]
+  bool is_claimed() const MAUVE_RT { return is_claimed_; }
+  void claim() MAUVE_RT { is_claimed_ = true; }
+  void release() MAUVE_RT { is_claimed_ = is_held_ = false; }
+  /// By who has claimed it: not even an urgent change is to be made meanwhile, as this one acts on the parts that are in. [rt]
+  void hold() MAUVE_RT { is_held_ = true; }
+  bool is_held() const MAUVE_RT { return is_held_; }
+
+  /// How many changes are made of which the component's part is not settled: it has not taken it, or what it has put out is
+  /// there still. [rt]
+  bool is_unsettled() const MAUVE_RT { return unsettled_ != 0; }
+  void unsettle() MAUVE_RT { ++unsettled_; }
+  void settle() MAUVE_RT { --unsettled_; }
+
+  /// T of the last change that was made of it. [rt]
+  time_ns_t since_ns() const MAUVE_RT { return since_ns_; }
+  void set_since_ns(time_ns_t instant_ns) MAUVE_RT { since_ns_ = instant_ns; }
 
  private:
-  std::atomic<std::uint32_t> count_{0};
-  bool unsettled_{false};
+  std::atomic<std::uint32_t> changes_{0};
+  std::uint32_t unsettled_{0};
+  bool is_claimed_{false};
+  bool is_held_{false};
+  time_ns_t since_ns_{0};
 };
 
 }  // namespace mauve

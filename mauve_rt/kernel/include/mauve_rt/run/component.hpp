@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -53,6 +54,18 @@ struct Parts {
   std::unique_ptr<CoreBase> core{};
   std::unique_ptr<FsmBase> fsm{};
 };
+
+/// Where a port leads to. The step of a change that connects it counts from 1; 0 stands for what was there before.
+struct Wire {
+  std::string resource;
+  ServiceBase* service{nullptr};
+  int step{0};
+  std::shared_ptr<const void> use{};  // Resource::use()
+};
+/// Whether both lead to the same service. [non-rt]
+inline bool operator==(const Wire& a, const Wire& b) noexcept { return a.service == b.service; }
+/// By port.
+using Wires = std::map<std::string, Wire>;
 
 class Architecture;
 class Component;
@@ -109,6 +122,7 @@ class PartsChange final : public CommitAction {
 
   bool adopt() override;
   void take() noexcept override;
+  bool make_safe(bool may_wait, time_ns_t time_ns) noexcept override;
   time_ns_t declared_ns() const noexcept override;
   std::uint32_t trace_id() const noexcept override { return trace_id_; }
 
@@ -121,6 +135,7 @@ class PartsChange final : public CommitAction {
 
   Component& component_;
   Parts parts_;                // the new ones; after take the old ones
+  Shell* const new_shell_;     // nullptr: the shell stays
   const FsmBase* fsm_before_;  // in force when the change was begun: for which the new parts are made
   CoreBinding binding_;
   time_ns_t period_ns_{0};
@@ -186,8 +201,8 @@ struct ShownParts {
 /// | member           | written by                                | read by             | under            |
 /// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
 /// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
-/// | present_core_    | with parts_.core                          | anyone              | release/acquire: the core's contents |
-/// | present_fsm_     | with parts_.fsm                           | anyone              | release/acquire: the fsm's contents |
+/// | present_shell_, present_core_, present_fsm_ | with parts_    | anyone              | release/acquire: the part's contents |
+/// | wires_           | changes, as they are made                 | ordinary threads    | the gate's mutex |
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
@@ -200,8 +215,10 @@ class Component final : public Configurable {
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Component() override;
 
-  /// The architecture that lists it and hears of its changes; nullptr: none. [non-rt], by the architecture
-  void set_architecture(Architecture* architecture) noexcept;
+  /// This architecture lists it and hears of its changes. [rt], by the change that adds it
+  void enter(Architecture& architecture) MAUVE_RT;
+  /// None does any more. [non-rt]
+  void leave_architecture() noexcept;
 
   /// Both under the architecture's change lock. [non-rt] Throw Error (already_running) unless it is parked.
   void configure() override;
@@ -214,7 +231,8 @@ class Component final : public Configurable {
   void set_fallback(std::unique_ptr<CoreBase> core);
 
   const std::string& name() const noexcept { return name_; }
-  Shell& shell() noexcept { return *parts_.shell; }
+  /// The shell in force. [rt]
+  Shell& shell() const MAUVE_RT { return *present_shell_.load(std::memory_order_acquire); }
   /// The fsm in force; the old fsm of one on probation may take its place at any moment. An fsm that is out stays as it is
   /// until a change, or who settles, has claimed the component. [rt]
   const FsmBase& fsm() const MAUVE_RT { return *present_fsm_.load(std::memory_order_acquire); }
@@ -222,13 +240,17 @@ class Component final : public Configurable {
   CoreBase& core() MAUVE_RT { return *present_core_.load(std::memory_order_acquire); }
   /// What changes it has been through. [rt]
   ChangeMark& change_mark() MAUVE_RT { return change_mark_; }
+  /// Its wiring, as far as it is decided: a component that is late has other connections still. Never nullptr. [rt], within a
+  /// CommitGate::Look
+  const std::shared_ptr<const Wires>& wires() const MAUVE_RT { return wires_; }
+  void swap_wires(std::shared_ptr<const Wires>& wires) MAUVE_RT { wires_.swap(wires); }
   /// [rt]
   Task& task() MAUVE_RT { return task_; }
   const Task& task() const MAUVE_RT { return task_; }
   /// The shell as the type it has. Throws std::bad_cast.
   template <typename ShellType>
   ShellType& shell_as() {
-    return dynamic_cast<ShellType&>(*parts_.shell);
+    return dynamic_cast<ShellType&>(shell());
   }
   template <typename CoreType>
   CoreType& core_as() {
@@ -318,14 +340,19 @@ class Component final : public Configurable {
   std::vector<ProbationRecord> probations() const;
   /// The one that has not been settled; nullptr: none. [non-rt]
   std::shared_ptr<Probation> present_probation() const;
+  /// Its core is in: it is the present one from now on. [rt], in a take; its change keeps it until keep_probation().
+  void set_next_probation(Probation& probation) MAUVE_RT {
+    next_probation_.store(&probation, std::memory_order_release);
+  }
   /// Has the parts that a change has put out, from which the new core may be reverted. [non-rt], by the change.
   void keep_probation(std::unique_ptr<PartsChange> parts);
   /// Ends the present probation if its time is over. Whether there is one that has ended. [non-rt]
   bool is_probation_over() const noexcept;
   /// Whether that has put the old core back. [non-rt]
   bool is_probation_reverted() const noexcept;
-  /// Retires the parts that a probation which has ended has put out. [non-rt], the component claimed.
-  void settle_probation() noexcept;
+  /// Retires the parts that a probation which has ended has put out, beside this thread or at once. [non-rt], the component
+  /// claimed.
+  void settle_probation(bool at_once = false) noexcept;
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 
@@ -352,9 +379,6 @@ class Component final : public Configurable {
   void update_listening() { update_listening(fsm()); }
   /// Its event waits hear of nothing any more, for a component that is removed while a state of it hangs. [non-rt]
   void stop_listening() noexcept;
-  /// Whether one of its ports leads to the resource. [non-rt]
-  bool uses(const Resource& resource) const;
-
   /// Cleans up and configures anew a parked component, whatever its state; STOPPED then. [non-rt]
   /// Throws Error: already_running; what configure throws: it is UNCONFIGURED then.
   void configure_anew();
@@ -378,6 +402,7 @@ class Component final : public Configurable {
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();
+  void dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bool at_once) noexcept;
   /// As a change: another one may look at the core that is in.
   void put_back_parked(Probation& probation);
   /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.
@@ -389,6 +414,8 @@ class Component final : public Configurable {
   Task task_;
   ChangeMark change_mark_;
   Parts parts_;
+  std::shared_ptr<const Wires> wires_{std::make_shared<const Wires>()};
+  std::atomic<Shell*> present_shell_{nullptr};
   std::atomic<CoreBase*> present_core_{nullptr};
   std::atomic<const FsmBase*> present_fsm_{nullptr};
   CoreBinding binding_;
@@ -406,6 +433,8 @@ class Component final : public Configurable {
   std::shared_ptr<const StateTimes> shown_times_;
   std::vector<DescribedState> shown_states_;
   std::shared_ptr<Probation> probation_;
+  std::atomic<Probation*> next_probation_{
+      nullptr};  // of a change that is not settled; cleared under shown_mutex_
   std::optional<ProbationRecord> last_probation_;
   std::shared_ptr<Shadow> shadow_;
 };

@@ -107,6 +107,15 @@ class ExecutionWord {
     }
   }
 
+  /// Until who times it out has told FAULTED and written the outputs; also of one that has ended. [rt]
+  void await_time_out() const MAUVE_RT {
+    for (;;) {
+      const std::uint32_t word = word_.load(std::memory_order_acquire);
+      if ((word & kPhase) != kTimedOut) return;
+      futex_wait_until(word_, word, kForever);
+    }
+  }
+
   // ---- who times it out
 
   /// The watched execution under way, or nothing. [rt]

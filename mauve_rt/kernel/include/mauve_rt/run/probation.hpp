@@ -94,6 +94,9 @@ struct ProbationRecord {
 /// - An overrun, or an output beyond its limit, is looked at when the release enters its wait: the old core goes in within that
 ///   wait, at the same position and pending instant. The next release is the old core's. The value that breaks a limit is not
 ///   written: consumers keep the one before.
+/// - A state that does not end for as long as counts as hung (StateAge::hung_after_ns), when somebody looks
+///   (Host::settle_probations()): the component is FAULTED with safe outputs, and the verdict is reverted. When the state ends after
+///   all, the old core goes in as after a fault. A core that executes when its time is over is not decided upon before that.
 /// - A request, in the wait that it comes in, or in the next one; of a parked component at once.
 /// A new fsm is on probation together with a new core, as an fsm is mostly compiled for the class of its core. "The old core"
 /// above and below is then the old fsm and core, which go back in as one. The place is kept both ways, so these are refused when
@@ -132,7 +135,7 @@ struct ProbationRecord {
 /// | is_requested_     | requesters                                | component's thread  | release/acquire                      |
 /// | request_          | requesters                                | anyone              | request_mutex_                       |
 /// | the rest          | [setup]                                   | anyone              | -                                    |
-class Probation {
+class Probation : public std::enable_shared_from_this<Probation> {
  public:
   /// Throws Error: unknown_port, invalid_argument (no number there, no write port, no duration). [non-rt]
   Probation(Component& component, const std::string& to_core, ProbationOptions options);
@@ -197,6 +200,7 @@ class Probation {
     double number{0.0};
   };
 
+  bool is_executing() noexcept;
   Phase phase() const MAUVE_RT { return static_cast<Phase>(phase_.load(std::memory_order_acquire)); }
   bool is_watched() const MAUVE_RT;
   void find(const Found& found) MAUVE_RT;

@@ -36,6 +36,7 @@ enum class ShadowVerdict : std::uint8_t {
   ended,     // by a request, a change of the component, or the host's shutdown
   faulted,   // the candidate threw an exception
   promoted,  // the candidate is the component's core now
+  hung,      // a state of the candidate did not end
 };
 /// "running", "ended", ... [rt]
 const char* to_string(ShadowVerdict verdict) MAUVE_RT;
@@ -48,6 +49,7 @@ enum class ShadowCause : std::uint8_t {
   closed,     // the component was cleaned up or removed, or its host was shut down
   promotion,  // a step promote
   lost,       // a step promote was refused, and the candidate was cleaned up with it
+  hung,       // a state of the candidate did not end
 };
 
 /// One shadow as anyone may see it.
@@ -78,7 +80,7 @@ struct ShadowParts {
 };
 
 /// A candidate next to the live core. The component's thread copies what the live core reads and writes (shadow_capture.hpp). The
-/// host's shadow thread (shadow_thread.hpp) then executes the candidate's fsm at the same nominal instant, on these inputs; what the
+/// shadow's thread (shadow_thread.hpp) then executes the candidate's fsm at the same nominal instant, on these inputs; what the
 /// candidate writes goes to cells, and is compared with what the live core wrote in that release. In virtual time the simulation
 /// does this right after the release, at the same instant, and no virtual time passes.
 ///
@@ -86,7 +88,7 @@ struct ShadowParts {
 /// when the component is started. Of each captured release it executes one chain of states, where its own wait has ended by that
 /// instant; instants that were skipped are left out, as after an overrun. Events that it raises have no effect.
 ///
-/// The shadow ends with a fault of the candidate, by a step end_shadow or promote, when the component's parts or wiring change, when
+/// The shadow ends with a fault of the candidate, when a state of it hangs (its thread is left behind then, until the state ends), by a step end_shadow or promote, when the component's parts or wiring change, when
 /// the component is cleaned up or removed, and at the host's shutdown. A stop of the component pauses it. Properties that are set
 /// while it runs are set in the candidate's shell, too, soon after.
 ///
@@ -99,6 +101,7 @@ struct ShadowParts {
 /// | parts_ ... debt_  | who executes, prepares, suspends, retires   | same                   | run_mutex_                           |
 /// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
 /// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
+/// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
 ///
 /// The component's thread takes neither mutex, but in virtual time, where there is one thread.
@@ -129,6 +132,8 @@ class Shadow {
   void detach() MAUVE_RT { capture_.detach(); }
   bool has_ended() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kEnded; }
 
+  /// Ends it when a release of the candidate executes for longer than this. [non-rt]
+  void conclude_if_hung(time_ns_t longest_ns) noexcept;
   /// It has ended, and the component's ports still refer to it. [rt], any thread
   bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached(); }
 
@@ -185,6 +190,7 @@ class Shadow {
   std::shared_ptr<ShadowSignal> signal_{};
 
   std::atomic<std::uint32_t> phase_{kPrepared};
+  std::atomic<time_ns_t> executing_since_ns_{0};
   time_ns_t begin_ns_{0};
   time_ns_t ended_ns_{0};
   ShadowCause cause_{ShadowCause::none};

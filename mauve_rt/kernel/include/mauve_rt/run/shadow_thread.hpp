@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// ShadowThread: one ordinary thread, below all components, that executes the shadows of a host.
+// ShadowThreads: ordinary threads, below all components, that execute the shadows of a host.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
+#include <vector>
 
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
@@ -32,29 +32,26 @@ struct ShadowSignal {
   }
 };
 
-/// The thread is SCHED_OTHER at nice 19. It is not SCHED_IDLE: such a thread gets nearly no time on a busy machine, and may hold a
-/// shadow's mutex meanwhile. All functions [non-rt], one thread at a time.
-class ShadowThread {
+/// One for each shadow: a candidate that hangs keeps no other from executing. They are SCHED_OTHER at nice 19, not SCHED_IDLE: such a
+/// thread gets nearly no time on a busy machine, and may hold a shadow's mutex meanwhile. All functions [non-rt], one thread at a
+/// time.
+class ShadowThreads {
  public:
-  ShadowThread();
-  ~ShadowThread();
-  ShadowThread(const ShadowThread&) = delete;
-  ShadowThread& operator=(const ShadowThread&) = delete;
+  ShadowThreads();
+  ~ShadowThreads();
+  ShadowThreads(const ShadowThreads&) = delete;
+  ShadowThreads& operator=(const ShadowThreads&) = delete;
 
-  /// Executes the shadow's releases until it has ended; creates the thread for the first one. Throws Error (internal): no thread.
+  /// Executes the shadow's releases until it has ended. Throws Error (internal): no thread.
   void add(const std::shared_ptr<Shadow>& shadow);
-  /// Ends the thread, after its shadows have ended. A candidate whose state does not end by the instant keeps the thread, which then
-  /// ends with the state.
+  /// Ends the threads, after their shadows have ended. A candidate whose state does not end by the instant keeps its thread, which
+  /// then ends with the state.
   void end(time_ns_t until_ns) noexcept;
 
  private:
-  struct Work;
+  class One;
 
-  static void* run(void* work) noexcept;
-
-  std::shared_ptr<Work> work_;
-  Thread thread_;
-  bool has_thread_{false};
+  std::vector<std::unique_ptr<One>> threads_;
 };
 
 }  // namespace mauve

@@ -45,6 +45,7 @@ struct Fault {
 struct FaultNote {
   std::shared_ptr<const std::string> what{};  // nullptr: an execution over its bound
   time_ns_t bound_ns{0};
+  bool is_visit{false};    // the bound was that of an adopt or a take
   std::uint32_t where{0};  // the state's name in the trace
   time_ns_t when_ns{0};
 };
@@ -77,14 +78,17 @@ struct ChangeSignal {
 /// | state_ (futex)         | machine; watchdog: faulted            | anyone       | release/acquire: publishes a park  |
 /// | slot_ (futex)          | requester: empty -> posted -> empty;  | both         | acq_rel: hands over the participant; seq_cst with  |
 /// |                        | machine: posted -> busy -> any        |              | parked_, ended_: one sees the other |
-/// | participant_           | requester, slot empty                 | machine      | slot_                              |
+/// | participant_           | requester, slot empty                 | machine; requesters, relaxed: whose it is | slot_ |
+/// | removed_               | machine, in a take                    | anyone       | release/acquire: it never starts again |
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | outputs_ (futex)       | who times it out, writer, machine     | all of these | acq_rel: one at a time writes them |
 /// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
-/// | shell_, core_          | commanders, machine parked; its takes | machine      | parking                            |
+/// | shell_                 | commanders, machine parked; its takes | machine, who times it out | release/acquire       |
+/// | core_                  | commanders, machine parked; its takes | machine      | parking                            |
+/// | taken_ns_              | machine, or who takes for it          | who times it out | relaxed: a lone number         |
 /// | fault_                 | machine; who timed it out                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | times out    |                                    |
@@ -96,7 +100,6 @@ struct ChangeSignal {
 /// | machine_               | machine                               | machine      | its own: machine.hpp               |
 /// | queue_place_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
-/// | left_behind_           | who gave up a commit                  | -            | under fault_mutex_                 |
 /// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task final : public Waiter {
@@ -131,6 +134,13 @@ class Task final : public Waiter {
 
   // ---- a core on probation (probation.hpp)
 
+  /// Gives up a component whose core on probation hangs: it is FAULTED, its outputs are safe, and when the state ends after all the
+  /// old core goes in. False when it is in a wait by now. [non-rt]
+  bool give_up_on_probation(const StateAge& age);
+  /// Whether that was done, and its thread has not come back. [rt]
+  bool is_given_up_on_probation() const MAUVE_RT {
+    return is_left_behind() && (control_.load(std::memory_order_acquire) & kGivenUp) != 0;
+  }
   /// Its core is on probation from now on. [rt], in a take.
   void set_probation(Probation& probation) MAUVE_RT { probation_.set(probation); }
   /// The core is replaced by another one: it is on probation no more. [rt], in a take.
@@ -213,8 +223,9 @@ class Task final : public Waiter {
 
   // ---- the task's side of a commit (commit.hpp)
 
-  /// Posts a commit: the component votes in its next wait. Waits for an earlier change that it has not taken yet; false when
-  /// it has not at the instant. [rt], command mutex held.
+  /// Waits for an earlier change that it has not taken yet; false when it has not at the instant. [rt]
+  bool wait_slot(time_ns_t until_ns) MAUVE_RT;
+  /// Posts a commit: the component votes in its next wait. As wait_slot() first. [rt], command mutex held.
   bool post(Participant& participant, time_ns_t until_ns) MAUVE_RT;
   /// Lets it look at its slot: the commit is decided. [rt]
   void notify_commit() MAUVE_RT;
@@ -227,8 +238,8 @@ class Task final : public Waiter {
   void take_parked(Participant& participant) noexcept;
   /// Machine::entered_ns() [rt], parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return machine_.entered_ns(); }
-  /// Keeps what the thread that was given up may come back to, as long as the task. [non-rt]
-  void leave_behind(std::shared_ptr<void> used);
+  /// It has left the architecture: it starts no more. [rt], in a take.
+  void set_removed() MAUVE_RT { removed_.store(true, std::memory_order_release); }
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
   void write_outputs(bool commit) MAUVE_RT { write_outputs(commit, machine_.clock_ns()); }
   void write_outputs(bool commit, time_ns_t time_ns) MAUVE_RT;
@@ -335,7 +346,7 @@ class Task final : public Waiter {
 
  private:
   static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16, kAwaited = 32,
-                                 kRevert = 64;                         // of control_
+                                 kRevert = 64, kGivenUp = 128;         // of control_
   enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
 
   // commands
@@ -392,13 +403,18 @@ class Task final : public Waiter {
   bool time_out(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns);
   bool time_out_unless_waiting();
   void carry_out_time_out() MAUVE_RT;
+  void await_time_out() noexcept;
   void take_back_outputs() noexcept;
+  bool make_safe(bool may_wait) MAUVE_RT;
+  Shell* shell() const MAUVE_RT { return shell_.load(std::memory_order_acquire); }
+  void note_taken(const Commit& commit) MAUVE_RT;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;
   void start_shadow() noexcept;
   void capture_release() noexcept;
   void take_up_revert() noexcept;
+  void revert_in_park() noexcept;
   void put_back_in_wait(Probation& probation) noexcept;
   bool leaves_core_to_change() noexcept;
   bool note_fault_on_probation() noexcept;
@@ -416,7 +432,7 @@ class Task final : public Waiter {
   std::mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
 
-  Shell* shell_{nullptr};
+  std::atomic<Shell*> shell_{nullptr};
   CoreBinding* core_{nullptr};
 
   PiMutex command_mutex_;
@@ -429,7 +445,6 @@ class Task final : public Waiter {
   mutable PiMutex fault_mutex_;
   FaultNote fault_;
   FaultNote time_out_note_;  // of an execution that timed out, then the fault before it; empty while none has
-  std::vector<std::shared_ptr<void>> left_behind_;
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
   const std::atomic<int>* locks_held_{nullptr};
   bool demoted_{false};
@@ -442,7 +457,9 @@ class Task final : public Waiter {
   std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   std::atomic<std::uint32_t> slot_{kEmpty};
-  Participant* participant_{nullptr};
+  std::atomic<Participant*> participant_{nullptr};
+  std::atomic<bool> removed_{false};
+  std::atomic<time_ns_t> taken_ns_{0};  // T of the last change that it has taken
   time_ns_t start_at_ns_{0};
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
   std::atomic<std::uint32_t> outputs_{kAllWritten};
