@@ -295,6 +295,31 @@ Raises MauveError with the number of the failed step (`step`); nothing was chang
           "shadows", [](PyHost& self) { return self.host().shadows(); }, Unlocked(),
           "Of each component the shadow that runs, or the last one that has ended.")
       .def(
+          "open_changes", [](PyHost& self) { return self.host().open_changes(); }, Unlocked(),
+          "The changes that are under way, or that a component has not taken. Waits for no change and for no "
+          "hook.")
+      .def(
+          "disposing",
+          [](PyHost& self) {
+            const Keeper::Busy busy = self.host().architecture().disposing();
+            return std::pair(busy.what, busy.since_ns == 0 ? 0 : monotonic_now_ns() - busy.since_ns);
+          },
+          Unlocked(),
+          "The cleanup of old parts that runs now, and how long it has lasted (ns); empty: none runs.")
+      .def(
+          "abandon",
+          [](PyHost& self, const std::string& component) {
+            return std::string(to_string(self.host().abandon(component)));
+          },
+          py::arg("component"), Unlocked(),
+          R"(Ends what a change waits for. Waits for no change and for no hook.
+
+Calls off the change of the component that is not decided: `called_off`. Else, where a change that is made
+waits for the component, or its state hangs, stops the component by force at once: `faulted`, or `stopped`
+where its state had ended that moment.
+
+Raises MauveError: unknown_component; not_running where neither is so; faulted where it was given up before.)")
+      .def(
           "revert_probation",
           [](PyHost& self, const std::string& component, const std::string& reason, time_ns_t timeout_ns) {
             return self.host().revert_probation(component, reason, timeout_ns);

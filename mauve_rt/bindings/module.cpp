@@ -24,6 +24,7 @@ Attributes:
   bind_reports(module);
   bind_probation(module);
   bind_shadow(module);
+  bind_open_change(module);
   bind_transaction(module);
   bind_architecture(module);
   bind_value_log(module);

@@ -38,6 +38,7 @@ void bind_value_log(py::module_& module);
 void bind_transaction(py::module_& module);
 void bind_probation(py::module_& module);
 void bind_shadow(py::module_& module);
+void bind_open_change(py::module_& module);
 /// Registers what parts written in Python see of their shell, and what they declare themselves with.
 void bind_python_shell(py::module_& module);
 void bind_python_fsm(py::module_& module);

@@ -118,8 +118,9 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
 }
 
 void Architecture::settle_changes() noexcept {
-  has_open_.store(!open_.empty(),
-                  std::memory_order_relaxed);  // relaxed: a hint; first: one may be made meanwhile
+  has_open_.store(false, std::memory_order_relaxed);  // relaxed: a hint; first: one may be made meanwhile
+  if (std::any_of(open_.begin(), open_.end(), [](const auto& change) { return change->is_under_way(); }))
+    note_open();
   for (OpenChange* prepared : prepared_) prepared->settle();
   const auto open = open_;  // a hook may ask for a change of its own
   for (const auto& change : open) {
@@ -164,10 +165,34 @@ void Architecture::settle_probations_if_idle() noexcept {
   wait_disposed();
 }
 
-void Architecture::keep_open(std::shared_ptr<OpenChange> change) { open_.push_back(std::move(change)); }
+void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
+  const std::lock_guard lock(open_mutex_);
+  open_.push_back(std::move(change));
+}
 
 void Architecture::forget_open(const OpenChange& change) noexcept {
-  std::erase_if(open_, [&change](const auto& each) { return each.get() == &change; });
+  std::shared_ptr<OpenChange> forgotten;  // ends without the mutex: its parts are user code
+  const std::lock_guard lock(open_mutex_);
+  const auto place =
+      std::find_if(open_.begin(), open_.end(), [&](const auto& each) { return each.get() == &change; });
+  if (place == open_.end()) return;
+  forgotten = std::move(*place);
+  open_.erase(place);
+}
+
+std::vector<OpenChangeFacts> Architecture::open_changes() const {
+  std::vector<OpenChangeFacts> all;
+  const std::lock_guard lock(open_mutex_);
+  for (const auto& change : open_) change->tell(all);
+  return all;
+}
+
+std::shared_ptr<Component> Architecture::find_awaited(const std::string& name) const {
+  const std::lock_guard lock(open_mutex_);
+  for (const auto& change : open_) {
+    if (auto component = change->find_awaited(name)) return component;
+  }
+  return nullptr;
 }
 
 void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look) {

@@ -307,6 +307,7 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
 
 /// Of one that is not made.
 void TransactionCommit::Work::discard() noexcept {
+  is_prepared_ = false;
   if (commit_ == nullptr || commit_->is_left()) {
     discard_rest();
     architecture_.forget_open(*this);

@@ -162,12 +162,8 @@ PreparedTransaction::PreparedTransaction(Architecture& architecture, Runner& hos
 PreparedTransaction::~PreparedTransaction() {
   const auto change = state_->architecture.change_lock().join();
   state_->architecture.delist(*this);
-  if (settle()) return;
-  if (state_->phase.load(std::memory_order_acquire) == State::kCommitted) {
-    state_->architecture.keep_open(state_->work);
-  } else {
-    let_go();
-  }
+  // One that is made and that a component has not taken is kept by the architecture.
+  if (!settle() && state_->phase.load(std::memory_order_acquire) != State::kCommitted) let_go();
 }
 
 bool PreparedTransaction::is_current() const noexcept {
@@ -203,7 +199,10 @@ bool PreparedTransaction::settle() noexcept {
   if (phase != State::kCommitted) return phase == State::kSettled;
   const bool is_settled = state.work->settle();
   state.failure = state.work->failure();
-  if (is_settled) state.phase.store(State::kSettled, std::memory_order_release);
+  if (is_settled) {
+    state.architecture.forget_open(*state.work);
+    state.phase.store(State::kSettled, std::memory_order_release);
+  }
   return is_settled;
 }
 

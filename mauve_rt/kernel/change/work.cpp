@@ -22,10 +22,12 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
       host_(host),
       deployed_(host != nullptr && host->is_deployed()),
       is_simulated_(host != nullptr && host->is_simulated()),
-      options_(options) {}
+      options_(options),
+      begun_ns_(host != nullptr ? host->clock().now_ns() : monotonic_now_ns()) {}
 
 void TransactionCommit::Work::begin(Transaction transaction) {
   transaction_ = std::move(transaction);
+  for (const auto& step : transaction_.steps()) step_texts_.push_back(step->text());
   const time_ns_t patience_ns = is_simulated_ ? 0 : options_.timeouts.commit_ns;
   architecture_.wait_for_earlier(patience_ns, [this] { return look_at_earlier(); });
   claim_whole();
@@ -111,6 +113,8 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
                 {.remedy = "deploy it first; for a dry run ask for a commit"});
   }
   begin(std::move(transaction));
+  is_prepared_ = true;
+  architecture_.keep_open(shared_from_this());
   Basis basis;
   if (const PluginRegistry* registry = architecture_.registry()) basis.code = registry->version();
   try {
@@ -144,11 +148,14 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     discard();
     throw;
   }
+  is_armed_.store(true, std::memory_order_release);
   prepare_ns_ = monotonic_now_ns() - began;
   return basis;
 }
 
 Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {
+  begun_ns_.store(host_->clock().now_ns(), std::memory_order_relaxed);  // relaxed: is_armed_ publishes it
+  is_armed_.store(false, std::memory_order_release);
   Commit::Outcome outcome = commit_->decide(until_ns, architecture_.commit_gate());
   committed_ = outcome == Commit::Outcome::made;
   if (!committed_) phase_.store(Phase::off, std::memory_order_release);
@@ -211,8 +218,9 @@ void TransactionCommit::Work::gather() {
     if (change.parts != nullptr) actions.push_back(change.parts.get());
   }
   for (const auto& repair : repairs_) actions.push_back(repair.get());
-  commit_ = std::make_unique<Commit>(changes_.size(), std::move(actions));
-  auto place = commit_->participants().begin();
+  std::vector<std::shared_ptr<Component>> touched;  // first: outlives the commit
+  auto commit = std::make_unique<Commit>(changes_.size(), std::move(actions));
+  auto place = commit->participants().begin();
   for (Change& change : changes_) {
     change.place = &*place;
     place->task = &change.draft->component->task();
@@ -227,12 +235,14 @@ void TransactionCommit::Work::gather() {
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
-  touched_.clear();
-  for (const Change& change : changes_) touched_.push_back(change.draft->component);
-  commit_->assign_actions();
+  for (const Change& change : changes_) touched.push_back(change.draft->component);
+  commit->assign_actions();
   prepare_publication();
-  commit_->set_publication(*this);
-  if (is_structural_) commit_->set_structural();
+  commit->set_publication(*this);
+  if (is_structural_) commit->set_structural();
+  const std::lock_guard lock(facts_mutex_);
+  commit_.swap(commit);
+  touched_.swap(touched);
 }
 
 void TransactionCommit::Work::commit_by_force_if_asked() {

@@ -26,6 +26,10 @@ namespace mauve {
 /// | phase_                | who publishes, who asked       | anyone  | release/acquire: the decision, and all before it |
 /// | lists_ ... services_  | who asked, before the commit   | who publishes, once | the gate's mutex                   |
 /// | reports_              | who asked, then who settles    | who asked | reports_mutex_, from the commit on           |
+/// | commit_, touched_     | who asked, before the commit   | who tells of it | facts_mutex_                           |
+/// | step_texts_, author   | who asked                      | who tells of it | before the architecture keeps it       |
+/// | begun_ns_             | who asked, who commits a prepared one | who tells of it | relaxed: a lone number          |
+/// | is_armed_             | who prepared, who commits      | who tells of it | release/acquire: begun_ns_             |
 class TransactionCommit::Work final : public std::enable_shared_from_this<TransactionCommit::Work>,
                                       public OpenChange,
                                       private Publication {
@@ -65,6 +69,9 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   /// What went wrong when what it has put out was retired, first; the change is in. [non-rt]
   const std::exception_ptr& failure() const noexcept { return failure_; }
   const Task* find_late() const noexcept override;
+  bool is_under_way() const noexcept override;
+  void tell(std::vector<OpenChangeFacts>& all) const override;
+  std::shared_ptr<Component> find_awaited(const std::string& component) const override;
   /// Throws why it was not made. [non-rt]
   [[noreturn]] void throw_not_made();
   /// [non-rt], the change lock held.
@@ -177,6 +184,11 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::vector<std::unique_ptr<CommitAction>>
       actions_;  // in the order they are taken in; the new parts come after
   StateGuard guard_;
+  std::vector<std::string> step_texts_;
+  std::atomic<time_ns_t> begun_ns_{0};
+  std::atomic<bool> is_armed_{false};  // prepared, and not being committed
+  bool is_prepared_{false};            // for a prepared transaction, which lets go of it if it is not made
+  mutable std::mutex facts_mutex_;     // for a moment: no hook, and no other lock
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component

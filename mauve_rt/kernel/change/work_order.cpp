@@ -144,8 +144,8 @@ void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
   }
   for (Component* component : added_) component->enter(architecture_);
   if (is_structural_) architecture_.commit_gate().restructured();
-  architecture_.note_open();
   phase_.store(Phase::made, std::memory_order_release);
+  architecture_.note_open();  // last: who settles takes the hint back, then looks at the phase
   architecture_.changes().bump();
 }
 
@@ -157,7 +157,7 @@ bool TransactionCommit::Work::settle() noexcept {
   host_ = architecture_.host();  // the one that it was made by may be gone
   deployed_ = host_ != nullptr && host_->is_deployed();
   if (phase == Phase::off) {
-    if (!commit_->is_left()) return false;
+    if (is_prepared_ || !commit_->is_left()) return false;
     discard_rest();
   }
   if (phase == Phase::made) {
@@ -263,6 +263,58 @@ const Task* TransactionCommit::Work::find_late() const noexcept {
     if (!change.is_settled && !change.place->has_passed()) return change.place->task;
   }
   return nullptr;
+}
+
+// ---- what is told of it to anyone
+
+bool TransactionCommit::Work::is_under_way() const noexcept {
+  if (is_armed_.load(std::memory_order_acquire)) return false;
+  return !is_prepared_ || phase_.load(std::memory_order_acquire) != Phase::off;
+}
+
+void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
+  if (is_armed_.load(std::memory_order_acquire)) return;
+  const Phase phase = phase_.load(std::memory_order_acquire);
+  if (phase == Phase::off || phase == Phase::settled) return;
+  OpenChangeFacts facts{.author = transaction_.author(),
+                        .steps = step_texts_,
+                        .begun_ns = begun_ns_.load(std::memory_order_relaxed)};  // relaxed: is_armed_
+  const std::lock_guard lock(facts_mutex_);
+  const CutWord cut = commit_ != nullptr ? commit_->look() : CutWord{};
+  if (commit_ != nullptr && !cut.is_off()) {
+    const bool is_made = cut.is_closed();
+    facts.phase = is_made ? OpenChangePhase::made : OpenChangePhase::waiting;
+    if (is_made) facts.instant_ns = cut.instant_ns();
+    for (const Participant& place : commit_->participants()) {
+      // relaxed: of interest by itself
+      if (is_made ? place.has_passed() : place.has_agreed.load(std::memory_order_relaxed)) continue;
+      const Task& task = *place.task;
+      facts.late.push_back(
+          {.name = task.name(), .state = task.state_age(), .left_behind = task.is_left_behind()});
+    }
+  }
+  all.push_back(std::move(facts));
+}
+
+std::shared_ptr<Component> TransactionCommit::Work::find_awaited(const std::string& component) const {
+  const std::lock_guard lock(facts_mutex_);
+  if (commit_ == nullptr || !commit_->look().is_closed()) return nullptr;
+  for (std::size_t i = 0; i < touched_.size(); ++i) {
+    if (touched_[i]->name() == component && !commit_->participants()[i].has_passed()) return touched_[i];
+  }
+  return nullptr;
+}
+
+const char* to_string(OpenChangePhase phase) noexcept {
+  switch (phase) {
+    case OpenChangePhase::preparing:
+      return "preparing";
+    case OpenChangePhase::waiting:
+      return "waiting";
+    case OpenChangePhase::made:
+      return "made";
+  }
+  return "unknown";
 }
 
 }  // namespace mauve

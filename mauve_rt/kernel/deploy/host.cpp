@@ -15,6 +15,18 @@ constexpr time_ns_t kInOrder = ms_to_ns(50);
 
 }  // namespace
 
+const char* to_string(Abandoned abandoned) noexcept {
+  switch (abandoned) {
+    case Abandoned::called_off:
+      return "called_off";
+    case Abandoned::faulted:
+      return "faulted";
+    case Abandoned::stopped:
+      return "stopped";
+  }
+  return "unknown";
+}
+
 void Host::require_deployable() const {
   if (is_deployed()) {
     throw Error(ErrorCode::already_running, "the architecture is deployed already",
@@ -62,6 +74,28 @@ std::shared_ptr<Component> Host::find_leaving(const std::string& name, const Com
       return each;
   }
   return nullptr;
+}
+
+Abandoned Host::abandon(const std::string& component) {
+  require_deployed();
+  const auto awaited = architecture_.find_awaited(component);
+  const auto held = awaited != nullptr ? awaited : architecture_.hold_component(component);
+  Task& task = held->task();
+  if (architecture_.commit_gate().abandon(task)) return Abandoned::called_off;
+  if (task.is_left_behind()) {
+    throw Error(ErrorCode::faulted, "the component was given up before: " + task.fault().what,
+                {.component = component, .remedy = Task::kLeftBehindRemedy});
+  }
+  const StateAge age = task.state_age();
+  if (awaited == nullptr && (age.is_wait || !age.is_hung())) {
+    throw Error(
+        ErrorCode::not_running, "no decided change waits for the component, and no state of it hangs",
+        {.component = component,
+         .element = age.state,
+         .remedy = "look at the open changes: one that is being prepared cannot be abandoned; to stop the "
+                   "component whatever it does, stop it by force"});
+  }
+  return task.stop(0, true) ? Abandoned::faulted : Abandoned::stopped;
 }
 
 time_ns_t Host::get_time(const std::string& component) const {

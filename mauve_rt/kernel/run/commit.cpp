@@ -332,7 +332,8 @@ void Commit::retract_posted() noexcept {
 void Commit::await_busy(time_ns_t until_ns) noexcept {
   const bool is_timed_out = off() == Off::timed_out;
   if (!is_timed_out) until_ns = std::min(until_ns, monotonic_now_ns() + kPatience);
-  const bool gives_up = is_timed_out || off() == Off::shut_down || off() == Off::preempted;
+  const bool gives_up =
+      is_timed_out || off() == Off::shut_down || off() == Off::preempted || off() == Off::abandoned;
   for (Participant* participant : order_) {
     if (!participant->is_own) continue;
     while (!participant->task->retract(*participant, monotonic_now_ns() + kLook)) {
@@ -459,6 +460,11 @@ void Commit::throw_off() const {
     case Off::preempted:
       throw Error(ErrorCode::wrong_revision, "a prepared change came before this one; nothing was changed",
                   {.remedy = "read the architecture, then ask again"});
+    case Off::abandoned:
+      throw Error(ErrorCode::wrong_revision,
+                  "the change was abandoned by another request; nothing was changed",
+                  {.component = off_by_.load(std::memory_order_relaxed)->name(),
+                   .remedy = "find out why the component did not agree, then ask again"});
     case Off::withdrawn: {
       const Task* by = off_by_.load(std::memory_order_relaxed);
       ErrorDetail detail{.element = "state", .remedy = "read the architecture, then ask again"};

@@ -60,6 +60,16 @@ bool CommitGate::has_open_about(const Task& task) const noexcept {
   return false;
 }
 
+bool CommitGate::abandon(const Task& task) noexcept {
+  const Look look(*this);
+  bool is_one_off = false;
+  for (Commit* commit = under_way_; commit != nullptr; commit = commit->next) {
+    if (commit->look().is_open() && commit->is_about(task))
+      is_one_off |= commit->call_off(Commit::Off::abandoned, &task);
+  }
+  return is_one_off;
+}
+
 void CommitGate::press(UrgentCommit& urgent) noexcept {
   const Look look(*this);
   urgent.next = urgent_;

@@ -127,3 +127,42 @@ def test_waits_return_when_woken(running: Running):
     assert running.host.wait_change(60_000 * MS)
     running.host.wake()
     assert running.host.wait_published(60_000 * MS) == []
+
+
+def test_an_open_change_is_told_in_each_of_its_phases(running: Running):
+    seen = {}
+
+    def look(when: str) -> None:
+        seen[when] = running.host.open_changes()
+
+    class LookingCore(CountCore):
+        """Asks for the open changes in each hook of a change."""
+
+        def configure(self) -> None:
+            super().configure()
+            look("configure")
+
+        def adopt(self, old: object) -> None:
+            super().adopt(old)
+            look("adopt")
+
+        def take(self, old: object) -> None:
+            super().take(old)
+            look("take")
+
+    running.deploy()
+    running.run_for(20 * MS)
+    assert running.host.open_changes() == []
+    change = Transaction().replace_core("second", LookingCore).by("the operator")
+    running.host.commit(change, commit_timeout_ns=10_000 * MS)
+    running.run_until(lambda: "take" in seen)
+    phases = {when: [each.phase for each in found] for when, found in seen.items()}
+    assert phases == {"configure": ["preparing"], "adopt": ["waiting"], "take": ["made"]}
+    told = seen["take"][0]
+    assert (told.author, [step.split()[0] for step in told.steps]) == ("the operator", ["replace_core"])
+    assert told.instant_ns > 0
+    assert told.begun_ns > 0
+    assert [late.name for late in told.late] == ["second"]
+    running.run_until(lambda: running.host.describe() and running.host.open_changes() == [])
+    running.run_until(lambda: running.host.disposing() == ("", 0))
+    assert refusal(lambda: running.host.abandon("second")) == "not_running"

@@ -78,7 +78,8 @@ struct ArchitectureClaims {
 /// | names_                          | who changes it        | anyone  | list_mutex_                    |
 /// | numbered_                       | who changes it        | changes | list_mutex_                    |
 /// | leaving_, retiring_             | who changes it        | anyone  | list_mutex_                    |
-/// | prepared_, open_, claims_       | changes               | changes | change_lock_                   |
+/// | prepared_, claims_              | changes               | changes | change_lock_                   |
+/// | open_                           | changes               | anyone  | change_lock_ and open_mutex_ to write, one of them to read |
 /// | has_open_                       | changes               | anyone  | relaxed: a hint                |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
 /// | retired_, finals_               | who removes, drains, records | same | trace_mutex_             |
@@ -173,6 +174,13 @@ class Architecture final : public Configurable {
 
   /// Threads of removed components that still run a timed-out execution. [non-rt]
   std::size_t threads_left_behind() const;
+
+  /// The changes that are under way, or made and not settled: that a late component has not taken, or whose parts are there
+  /// still. Waits for no change and for no hook. [non-rt]
+  std::vector<OpenChangeFacts> open_changes() const;
+  /// The component for which a change that is made waits, also one that the change removes; nullptr: no change waits for a
+  /// component of that name. Waits as open_changes(). [non-rt]
+  std::shared_ptr<Component> find_awaited(const std::string& name) const;
 
   ChangeSignal& changes() noexcept { return changes_; }
   /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback",
@@ -312,6 +320,7 @@ class Architecture final : public Configurable {
   mutable CommitGate commit_gate_;
   ArchitectureClaims claims_;
   std::vector<OpenChange*> prepared_;
+  mutable std::mutex open_mutex_;  // for a moment: no hook, and no other lock of a change but Work's facts
   std::vector<std::shared_ptr<OpenChange>> open_;
   std::atomic<bool> has_open_{false};
   mutable std::mutex host_mutex_;

@@ -2,11 +2,48 @@
 // OpenChange: a change from its draft to the end of what it has put out, as its architecture sees it.
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/present_state.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
+
 namespace mauve {
 
+class Component;
 class Task;
 
-/// All with the architecture's change lock held.
+/// How far an open change is.
+enum class OpenChangePhase : std::uint8_t {
+  preparing,  // its parts are being prepared
+  waiting,    // its components have not all agreed yet: it can still be called off
+  made,       // it is decided, and a component has not taken it, or what it has put out is there still
+};
+/// "preparing", "waiting", "made". [rt]
+const char* to_string(OpenChangePhase phase) MAUVE_RT;
+
+/// A component for which an open change waits.
+struct LateComponent {
+  std::string name{};
+  StateAge state{};
+  bool left_behind{false};  // its execution was given up, and its thread has not come back
+};
+
+/// An open change, as of one moment.
+struct OpenChangeFacts {
+  std::string author{};              // empty: unknown
+  std::vector<std::string> steps{};  // in words
+  time_ns_t begun_ns{0};             // when it was asked for, on the host's clock
+  OpenChangePhase phase{OpenChangePhase::preparing};
+  time_ns_t instant_ns{0};  // T; 0: it is not decided
+  std::vector<LateComponent>
+      late{};  // made: the components that have not taken it; waiting: those that have not agreed
+};
+
+/// All with the architecture's change lock held, but for what is told of it to anyone.
 class OpenChange {
  public:
   virtual ~OpenChange() = default;
@@ -17,6 +54,15 @@ class OpenChange {
   virtual void drop_if_stale() noexcept {}
   /// A component that has not taken it yet, of those that it was made of; nullptr: there is none. [non-rt]
   virtual const Task* find_late() const noexcept { return nullptr; }
+  /// Whether it is more than prepared and watching. [non-rt]
+  virtual bool is_under_way() const noexcept { return true; }
+
+  // ---- for anyone, while the architecture's list of open changes is locked
+
+  /// Appends what is known of it, if it is open. [non-rt]
+  virtual void tell(std::vector<OpenChangeFacts>& /*all*/) const {}
+  /// The component of that name if it is made, and that component has not taken it. [non-rt]
+  virtual std::shared_ptr<Component> find_awaited(const std::string& /*component*/) const { return nullptr; }
 };
 
 }  // namespace mauve

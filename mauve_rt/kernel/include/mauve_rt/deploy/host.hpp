@@ -21,6 +21,15 @@ struct StopOptions {
   bool force{false};  // a component whose state does not end by then is given up, as Task::stop() says
 };
 
+/// What came of an abandon().
+enum class Abandoned : std::uint8_t {
+  called_off,  // the change was not decided, and is not made
+  faulted,     // the component was given up: it is FAULTED, its outputs are safe, its thread is left behind
+  stopped,     // its state had ended that moment: it is STOPPED
+};
+/// "called_off", "faulted", "stopped". [rt]
+const char* to_string(Abandoned abandoned) MAUVE_RT;
+
 /// Runs one architecture, which has at most one host at a time. All functions [non-rt] unless told.
 ///
 /// start(), stop(), shutdown() and what only looks take no part in changes: a long preparation keeps nobody from them.
@@ -48,6 +57,13 @@ class Host : public Runner {
   /// As Task::stop(); true when the component was given up: it is FAULTED then, and its thread left behind.
   bool stop(const std::string& component, const StopOptions& options);
   time_ns_t get_time(const std::string& component) const;
+
+  /// As Architecture::open_changes().
+  std::vector<OpenChangeFacts> open_changes() const { return architecture_.open_changes(); }
+  /// The way out of a change that waits for a component: calls the change off if that is not decided; else, where a change that is
+  /// made waits for the component, or its state hangs, stops the component by force at once. Waits for no change and for no hook.
+  /// Throws Error: unknown_component; not_running where neither is so; faulted where it was given up before; as Task::stop().
+  Abandoned abandon(const std::string& component);
 
   /// Carries out a transaction, deployed or not; one at a time. [non-rt]
   /// Throws Error naming the step (ErrorDetail::step); nothing was changed then.

@@ -155,7 +155,7 @@ class Commit {
     changed,    // a participant is STOPPING or FAULTED
     stale,      // the architecture is not the one that it was prepared for
   };
-  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, shut_down, preempted };
+  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, shut_down, preempted, abandoned };
 
   /// Actions without a task are checks: their adopt runs on the requester, before it posts.
   Commit(std::size_t participants, std::vector<CommitAction*> actions);
@@ -166,6 +166,7 @@ class Commit {
 
   /// The participants; fill in task and what is to become of it. [non-rt]
   std::vector<Participant>& participants() noexcept { return participants_; }
+  const std::vector<Participant>& participants() const noexcept { return participants_; }
   /// Gives the participants their actions, and orders them by number. [non-rt] Once, before carry_out().
   void assign_actions();
   /// Whether a component's own thread takes part. [rt], from carry_out() on.

@@ -93,6 +93,8 @@ class CommitGate {
   void look_again(Commit& commit) MAUVE_RT;
   /// Whether an open commit is about the task. [rt], within a Look
   bool has_open_about(const Task& task) const MAUVE_RT;
+  /// Calls off the open commits that are about the task; whether there was one. [rt]
+  bool abandon(const Task& task) MAUVE_RT;
   /// Calls off the commits under way that give way and are in the urgent one's way, and each such that comes before relax().
   /// [rt]
   void press(UrgentCommit& urgent) MAUVE_RT;
