@@ -7,6 +7,7 @@ from typing import Any
 
 from mauve_rt.cli import (
     analyze_verb,
+    changes_verb,
     check_verb,
     dev_verb,
     echo_verb,
@@ -448,6 +449,12 @@ VERBS = (
         dev_verb.main,
     ),
     Verb("events", "show the reconfigurations of an executor as they happen", add_executor_and_json, _events),
+    Verb(
+        "changes",
+        "show the changes of an executor that are not complete, or end one",
+        changes_verb.add_arguments,
+        changes_verb.main,
+    ),
     Verb("nodes", "list the executors that can be reached", _add_json, _nodes),
     Verb(
         "check",

@@ -162,3 +162,14 @@ class PyKeeping(PyCounter):
             awaited.write_text("over", encoding="utf-8")
             time.sleep(0.8)  # its state goes on for longer than a stop of all waits
         super().act()
+
+
+class PyPausing(PyCounter):
+    """Stays in its state while there is a file that its label names."""
+
+    def act(self) -> None:
+        """Wait for the file's end, then count."""
+        until_s = time.monotonic() + 200.0
+        while Path(self.shell.label.value).exists() and time.monotonic() < until_s:
+            time.sleep(0.002)
+        super().act()

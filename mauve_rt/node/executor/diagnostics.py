@@ -10,6 +10,7 @@ from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import CallReport, TopicReport
 from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, ShadowRecord, allocation_counting
+from mauve_rt.control.open_changes import long_ones, open_changes
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
@@ -55,6 +56,8 @@ class Diagnostics:
         array.status += [self._rule(facts) for facts in self._rules.facts()]
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
+        if late := self._late():
+            array.status.append(late)
         array.status.append(self._process(error))
         self._publisher.publish(array)
 
@@ -210,6 +213,14 @@ class Diagnostics:
             "memory_bytes": facts.memory_bytes,
         }
         return self._status(f"rule {facts.name}", level, message, values)
+
+    def _late(self) -> Any:
+        """The changes that are open for long; None: there is none."""
+        changes = open_changes(self._runtime)
+        lines = list(long_ones(changes, self._runtime.host.now_ns())) if changes else []
+        if not lines:
+            return None
+        return self._status("changes", DiagnosticStatus.WARN, "; ".join(lines), {"open": len(changes)})
 
     def _bag(self, status: RecordingStatus) -> Any:
         remarks = self._grown("recording", {"messages dropped": status.dropped})

@@ -9,6 +9,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
 
 from mauve_msgs.srv import (
+    AbandonChange,
+    ListChanges,
     ListComponents,
     ListRules,
     LoadRules,
@@ -23,10 +25,12 @@ from mauve_msgs.srv import (
     StopRecording,
 )
 from mauve_rt.control.control import Control
+from mauve_rt.control.open_changes import abandon, open_changes
 from mauve_rt.control.requests import Code, Outcome, RecordingOrder, ReloadOrder, Report, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values
 from mauve_rt.errors import MauveError
+from mauve_rt.interfaces.changes import open_change_messages
 from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
 from mauve_rt.interfaces.values import value_message
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ
@@ -47,7 +51,8 @@ class Services:
     """The services of a node.
 
     Requests for changes wait for each other (`is_change`); those to stop or start wait for nobody. They are
-    in `control_group`, lists in `query_group`. Who asked is answered first; then another thread tells of it
+    in `control_group`, lists in `query_group`. `~/list_changes` and `~/abandon_change` wait for nobody,
+    either. Who asked is answered first; then another thread tells of it
     on ~/state and ~/events.
 
     | member    | written by                | guarded by                      |
@@ -91,6 +96,11 @@ class Services:
         node.create_service(ReadValues, "~/read_values", self._read_values, callback_group=query_group)
         node.create_service(Mirror, "~/mirror", self._mirror, callback_group=query_group)
         node.create_service(LoadRules, "~/load_rules", self._on_load_rules, callback_group=control_group)
+        for service, name, answer in (
+            (ListChanges, "~/list_changes", self._list_changes),
+            (AbandonChange, "~/abandon_change", self._abandon_change),
+        ):
+            node.create_service(service, name, answer, callback_group=control_group)
         for service, name, translate in (
             (Stop, "~/stop", _stop),
             (Start, "~/start", _start),
@@ -168,6 +178,21 @@ class Services:
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         response.warnings = self._warnings()
+        return response
+
+    def _list_changes(self, _request: Any, response: Any) -> Any:
+        response.changes = open_change_messages(open_changes(self._runtime), self._runtime)
+        if self._runtime.configured:
+            response.cleanup, response.cleanup_age_ns = self._runtime.host.disposing()
+        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+        return response
+
+    def _abandon_change(self, request: Any, response: Any) -> Any:
+        code, response.message = abandon(self._runtime, request.component)
+        response.success, response.code = code is Code.OK, int(code)
+        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+        text = f"abandon_change {request.component}: {response.message}"
+        (self._logger.warning if response.success else self._logger.error)(text)
         return response
 
     def _read_values(self, request: Any, response: Any) -> Any:
@@ -255,10 +280,10 @@ class _Untold(threading.local):
 
 
 def is_change(ros: Any) -> bool:
-    """Whether a request waits for those before it: all but a stop or a start by itself."""
+    """Whether a request waits for those before it: all but a stop or a start by itself, and the way out."""
     if isinstance(ros, Reconfigure.Request):
         return not _reconfigure(ros).is_direct
-    return not isinstance(ros, Stop.Request | Start.Request)
+    return not isinstance(ros, Stop.Request | Start.Request | ListChanges.Request | AbandonChange.Request)
 
 
 def _stop(ros: Any) -> Request:

@@ -115,6 +115,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
             "python/node/test_arguments.py::test_parameters_of_one_file_for_several_robots",
         ),
         "executor: {diagnostics:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "mauve changes /robot_1/executor": (
+            f"{README}every_command_is_one_that_mauve_takes",
+            "ros/executor/test_open_changes.py::test_a_late_component_is_listed_abandoned_and_removed",
+        ),
         "printf 'force: true": ("ros/executor/test_force.py::test_a_hung_component_is_removed_by_force",),
     },
     "docs/howto/pin_and_isolate_cpus.md": {
