@@ -77,10 +77,11 @@ void Architecture::cleanup() {
 std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
                                                       const TransactionOptions& options) {
   struct Disposed {
-    ~Disposed() { architecture.wait_disposed(); }
+    ~Disposed() { architecture.wait_disposed(first); }
     const Architecture& architecture;
+    std::uint64_t first;
   };
-  const Disposed last{*this};
+  const Disposed last{*this, disposed()};
   const std::lock_guard change(change_lock_);
   std::shared_lock<std::shared_mutex> use;
   Runner* const host = use_host(use);
@@ -95,7 +96,9 @@ void Architecture::dispose(const std::string& what, std::function<void()> work) 
   keeper_.take(what, std::move(work));
 }
 
-void Architecture::wait_disposed() const { keeper_.wait(later_by(monotonic_now_ns(), s_to_ns(1))); }
+void Architecture::wait_disposed(std::uint64_t first) const {
+  keeper_.wait(first, later_by(monotonic_now_ns(), s_to_ns(1)));
+}
 
 TransactionReport Architecture::commit(Transaction transaction, const TransactionOptions& options) {
   return make(std::move(transaction), options)->report(options.timeouts.phase_ns);
@@ -155,6 +158,7 @@ void Architecture::settle_probations() noexcept {
 
 void Architecture::settle_probations_if_idle() noexcept {
   if (!change_lock_.try_lock()) return;
+  const std::uint64_t first = disposed();
   {
     const std::lock_guard change(change_lock_, std::adopt_lock);
     std::shared_lock<std::shared_mutex> use;
@@ -162,7 +166,7 @@ void Architecture::settle_probations_if_idle() noexcept {
     settle_changes();
     settle_probations();
   }
-  wait_disposed();
+  wait_disposed(first);
 }
 
 void Architecture::keep_open(std::shared_ptr<OpenChange> change) {

@@ -8,8 +8,8 @@ namespace mauve {
 
 namespace {
 
-/// Whoever has worked for so long is not waited for.
-constexpr time_ns_t kHung = s_to_ns(1);
+/// What is another's and has lasted for so long is not waited for.
+constexpr time_ns_t kAnothers = ms_to_ns(50);
 constexpr time_ns_t kEnd = ms_to_ns(500);
 
 }  // namespace
@@ -33,7 +33,7 @@ Keeper::Keeper() : state_(std::make_shared<State>()) {}
 Keeper::~Keeper() {
   if (!thread_.joinable()) return;
   const time_ns_t until_ns = monotonic_now_ns() + kEnd;
-  wait(until_ns);
+  wait(0, until_ns);
   bool is_over = false;
   {
     const std::lock_guard lock(state_->mutex);
@@ -58,14 +58,20 @@ void Keeper::take(std::string what, std::function<void()> work) {
   state_->changed.notify_all();
 }
 
-void Keeper::wait(time_ns_t until_ns) const {
+std::uint64_t Keeper::taken() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->taken;
+}
+
+void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   std::unique_lock lock(state_->mutex);
   const std::uint64_t taken = state_->taken;
   if (thread_.get_id() == std::this_thread::get_id()) return;
   while (state_->done < taken) {
     const time_ns_t now_ns = monotonic_now_ns();
     const time_ns_t since_ns = state_->busy.since_ns;
-    if (now_ns >= until_ns || (since_ns != 0 && now_ns - since_ns > kHung)) return;
+    const bool is_anothers = state_->done < first && since_ns != 0 && now_ns - since_ns > kAnothers;
+    if (now_ns >= until_ns || is_anothers) return;
     state_->changed.wait_for(lock, std::chrono::milliseconds(20));
   }
 }

@@ -247,6 +247,7 @@ TransactionReport PreparedTransaction::complete() {
     throw Error(ErrorCode::invalid_argument, "the prepared change was not committed",
                 {.remedy = "commit it first"});
   }
+  const std::uint64_t first = state.architecture.disposed();
   const PreparedOutcome outcome = state.outcome.load(std::memory_order_relaxed);
   if (outcome == PreparedOutcome::committed)
     state.work->wait_passed(later_by(monotonic_now_ns(), state.phase_ns));
@@ -255,7 +256,7 @@ TransactionReport PreparedTransaction::complete() {
     settle();
     note_failure();
   }
-  state.architecture.wait_disposed();
+  state.architecture.wait_disposed(first);
   if (outcome == PreparedOutcome::stale) {
     throw Error(ErrorCode::wrong_revision,
                 "what the change was prepared against has changed, or is being changed; nothing was changed",

@@ -142,6 +142,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     };
     found(draft_->components());
     found(draft_->removed_components());
+    if (is_run_only_) forget_wires();
     draft_->release();
     release_whole();
   } catch (...) {
@@ -151,6 +152,14 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
   is_armed_.store(true, std::memory_order_release);
   prepare_ns_ = monotonic_now_ns() - began;
   return basis;
+}
+
+/// Other changes do not make it stale: it is to keep no resource in use that they remove.
+void TransactionCommit::Work::forget_wires() {
+  for (DraftComponent& component : draft_->components()) {
+    component.wires.clear();
+    component.wires_before.clear();
+  }
 }
 
 Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noexcept {

@@ -95,6 +95,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void publish(time_ns_t instant_ns) noexcept override;
   void prepare_publication();
   void prepare_lists();
+  void forget_wires();
 
   // draft
   void begin(Transaction transaction);

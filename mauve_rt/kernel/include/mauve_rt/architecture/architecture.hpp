@@ -282,8 +282,10 @@ class Architecture final : public Configurable {
   void dispose(const std::string& what, std::function<void()> work);
   /// What that does now, and since when. [non-rt]
   Keeper::Busy disposing() const { return keeper_.busy(); }
-  /// Waits until that is done, a little. [non-rt], without the change lock
-  void wait_disposed() const;
+  /// How much was given to that by now. [non-rt]
+  std::uint64_t disposed() const { return keeper_.taken(); }
+  /// Waits until what came after the first ones is done, a little. [non-rt], without the change lock
+  void wait_disposed(std::uint64_t first) const;
   /// Keeps a component whose thread has not ended; reap() lets those go that have. [non-rt]
   void keep_until_ended(std::shared_ptr<Component> component, bool was_listed);
   /// Cleans up resources that were removed, now or when nobody uses them any more. [non-rt]

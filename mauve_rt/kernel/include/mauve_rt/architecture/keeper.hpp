@@ -35,9 +35,11 @@ class Keeper {
 
   /// Has this done, after all that came before. `what` tells what hangs.
   void take(std::string what, std::function<void()> work);
-  /// Waits until all is done that came before, at most until the instant, and not at all where something has hung for long. Not
-  /// from its own thread.
-  void wait(time_ns_t until_ns) const;
+  /// How much has come by now.
+  std::uint64_t taken() const;
+  /// Waits until all is done that came before, at most until the instant; hardly, where it is at something that came before the
+  /// caller's own, of which `first` had come before. Not from its own thread.
+  void wait(std::uint64_t first, time_ns_t until_ns) const;
   Busy busy() const;
 
  private:
