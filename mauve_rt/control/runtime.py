@@ -53,6 +53,11 @@ class Observed(NamedTuple):
     components: list[ComponentDescription]
 
 
+def _is_executing(part: ComponentDescription) -> bool:
+    """Whether its thread is in a state, also of one that was given up, which is FAULTED by then."""
+    return part.state in ("RUNNING", "STOPPING") or (part.state == "FAULTED" and part.state_age_ns > 0)
+
+
 class Runtime:
     """One architecture from configure() to cleanup().
 
@@ -212,11 +217,7 @@ class Runtime:
 
     def busy(self) -> list[ComponentDescription]:
         """After deactivate(): the components whose present state has not come to its end yet."""
-        return (
-            []
-            if self.active
-            else [part for part in self.components() if part.state in ("RUNNING", "STOPPING")]
-        )
+        return [] if self.active else [part for part in self.components() if _is_executing(part)]
 
     @property
     def configured(self) -> bool:
