@@ -165,7 +165,7 @@ bool TransactionCommit::Work::settle() noexcept {
     architecture_.drop_stale_prepared();  // they refer to what goes now
     bool is_all = true;
     for (Change& change : changes_) is_all &= settle_if_over(change);
-    if (!is_all) return false;
+    if (!is_all || !commit_->is_left()) return false;
     end_settlement();
   }
   phase_.store(Phase::settled, std::memory_order_release);

@@ -97,8 +97,14 @@ void PortBase::swap(PortConnection& connection) noexcept {
 }
 
 bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
-  if (is_safe_ || connection_.service == nullptr) return true;
-  return is_safe_ = make_safe(*connection_.service, may_wait, time_ns);
+  if (is_safe_) return true;
+  ServiceBase* service = nullptr;
+  {
+    const std::lock_guard lock(shown_mutex_);  // a take that does not end may have come through here just now
+    service = connection_.service;
+  }
+  if (service == nullptr) return true;
+  return is_safe_ = make_safe(*service, may_wait, time_ns);
 }
 
 bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {

@@ -341,10 +341,11 @@ TEST_F(OpenChangeBeside, AShutdownEndsWhatAChangeHasAddedAndWhatItHasRemoved) {
 
 TEST_F(OpenChangeBeside, ARevertThatALateOneIsStoppedBeforeIsCarriedOut) {
   deploy();
-  commit(Transaction().replace_core("late", "t/Counting", ProbationOptions{.duration_ns = kLong}));
-  core(*late).work = [held = held] {
+  auto trial = std::make_unique<TestCore>();
+  trial->work = [held = held] {
     if (held->is_armed.exchange(false)) held->doors.pass();
   };
+  commit(Transaction().replace_core("late", std::move(trial), ProbationOptions{.duration_ns = kLong}));
   Transaction change;
   change.add("revert_core", "late").set_property("late", "gain", 2.0);
   make_late(std::move(change));
