@@ -169,7 +169,8 @@ void Commit::publish() noexcept {
 }
 
 Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
-  timeout_ns_ = std::max<time_ns_t>(0, until_ns - monotonic_now_ns());
+  const time_ns_t now_ns = monotonic_now_ns();
+  timeout_ns_ = until_ns > now_ns ? until_ns - now_ns : 0;  // a timeout below 0 has passed long ago
   if (!await_slots(until_ns)) return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
   // Before it waits for a lock: an urgent commit that needs the same calls it off there, too.
   if (!gate.begin(*this)) return Outcome::stale;
