@@ -198,7 +198,7 @@ std::vector<std::string> Draft::ports_of(const Resource& resource) const {
   std::vector<std::string> ports;
   const auto look = [&](const std::string& component, const Wires& wires) {
     for (const auto& [port, wire] : wires) {
-      if (leads_to(wire, resource)) ports.push_back(component + "." + port);
+      if (leads_to(wire, resource)) ports.emplace_back(component).append(".").append(port);
     }
   };
   for (const DraftComponent& component : components_) look(component.name(), component.wires);

@@ -244,6 +244,7 @@ void TransactionCommit::Work::gather() {
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
+  touched.reserve(changes_.size());
   for (const Change& change : changes_) touched.push_back(change.draft->component);
   commit->assign_actions();
   prepare_publication();
