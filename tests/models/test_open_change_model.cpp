@@ -36,7 +36,8 @@ TEST_P(OpenChangeModel, HoldsInEveryInterleaving) {
   const Scenario* const scenario = find_scenario(GetParam().scenario);
   ASSERT_NE(nullptr, scenario);
 #ifdef __SANITIZE_ADDRESS__
-  constexpr long kSmall = 300'000;  // the same code in each: a sanitizer finds in millions of states what it finds in these
+  constexpr long kSmall =
+      300'000;  // the same code in each: a sanitizer finds in millions of states what it finds in these
   if (GetParam().least_states > kSmall) GTEST_SKIP() << "explored without a sanitizer";
 #endif
   const Report report = explore({.scenario = *scenario});

@@ -168,7 +168,8 @@ void Deployer::shut_down() noexcept {
   give_up_hung();
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   const auto all = hosted();
-  for (const auto& component : all) component->task().end_thread(0);  // told all at once: one that hangs delays no other
+  for (const auto& component : all)
+    component->task().end_thread(0);  // told all at once: one that hangs delays no other
   for (const auto& component : all) component->task().end_thread(until);
   shadow_threads_.end(until);  // stop_all() has ended its shadows
   watchdog_->stop();           // last: stopping is watched too

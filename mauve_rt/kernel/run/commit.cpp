@@ -384,7 +384,8 @@ bool Commit::is_over(const Participant& participant) noexcept {
 bool Commit::is_left() const noexcept {
   if (is_made()) {
     // Whoever passes counts itself off last: its flag alone does not say that it has left.
-    const auto missing = std::count_if(order_.begin(), order_.end(), [](auto* each) { return !each->has_passed(); });
+    const auto missing =
+        std::count_if(order_.begin(), order_.end(), [](auto* each) { return !each->has_passed(); });
     return to_pass_.load(std::memory_order_acquire) == static_cast<std::uint32_t>(missing) &&
            std::all_of(order_.begin(), order_.end(), [](auto* each) { return is_over(*each); });
   }
