@@ -357,52 +357,56 @@ void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
 
 namespace {
 
-/// A copy of what the gate's mutex guards, into room that was made before: nothing is allocated under it.
-template <typename Item>
-std::vector<Item> copy_within(CommitGate& gate, const std::vector<Item>& items) {
-  std::vector<Item> copy;
+/// Copies from lists that the gate's mutex guards, into room that is made before: nothing is allocated under it.
+template <typename MakeRoom, typename Copy>
+void copy_within(CommitGate& gate, const Lists& lists, MakeRoom&& make_room, Copy&& copy) {
   for (std::size_t room = 16;; room *= 2) {
-    copy.reserve(room);
+    make_room(room);
     const CommitGate::Look table(gate);
-    if (items.size() > copy.capacity()) continue;
-    copy.assign(items.begin(), items.end());
-    return copy;
+    if (std::max(lists.components.size(), lists.resources.size()) <= room) return copy();
   }
 }
 
 }  // namespace
 
 std::vector<std::shared_ptr<Component>> Architecture::components() const {
-  return copy_within(commit_gate_, lists_.components);
+  std::vector<std::shared_ptr<Component>> copy;
+  copy_within(
+      commit_gate_, lists_, [&](std::size_t room) { copy.reserve(room); },
+      [&] { copy.assign(lists_.components.begin(), lists_.components.end()); });
+  return copy;
 }
 
 std::vector<std::shared_ptr<Resource>> Architecture::resources() const {
-  return copy_within(commit_gate_, lists_.resources);
+  std::vector<std::shared_ptr<Resource>> copy;
+  copy_within(
+      commit_gate_, lists_, [&](std::size_t room) { copy.reserve(room); },
+      [&] { copy.assign(lists_.resources.begin(), lists_.resources.end()); });
+  return copy;
 }
 
 Lists Architecture::lists() const {
   Lists copy;
-  for (std::size_t room = 16;; room *= 2) {
+  const auto make_room = [&](std::size_t room) {
     copy.components.reserve(room);
     copy.resources.reserve(room);
-    const CommitGate::Look table(commit_gate_);
-    if (std::max(lists_.components.size(), lists_.resources.size()) > room) continue;
+  };
+  copy_within(commit_gate_, lists_, make_room, [&] {
     copy.components.assign(lists_.components.begin(), lists_.components.end());
     copy.resources.assign(lists_.resources.begin(), lists_.resources.end());
-    return copy;
-  }
+  });
+  return copy;
 }
 
 std::vector<Wiring> Architecture::wiring() const {
   std::vector<Wiring> copy;
-  for (std::size_t room = 16;; room *= 2) {
-    copy.reserve(room);
-    const CommitGate::Look table(commit_gate_);
-    if (lists_.components.size() > copy.capacity()) continue;
-    for (const auto& component : lists_.components)
-      copy.push_back({.component = component, .wires = component->wires()});
-    return copy;
-  }
+  copy_within(
+      commit_gate_, lists_, [&](std::size_t room) { copy.reserve(room); },
+      [&] {
+        for (const auto& component : lists_.components)
+          copy.push_back({.component = component, .wires = component->wires()});
+      });
+  return copy;
 }
 
 void Architecture::swap_lists(Lists& lists) noexcept {

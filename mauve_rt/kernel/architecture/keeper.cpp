@@ -92,7 +92,7 @@ void Keeper::run(const std::shared_ptr<State>& state) {
     lock.unlock();
     try {
       work.call();
-    } catch (...) {  // what a hook throws when nobody is left to hear it
+    } catch (...) {  // a hook has thrown, and no caller is left to report it to
     }
     work.call = nullptr;  // what it held goes here, not under the mutex
     lock.lock();

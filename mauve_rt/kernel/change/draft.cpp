@@ -44,8 +44,7 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
   return found != by_name_.end() ? found->second : nullptr;
 }
 
-/// What an unlisted one has is nobody else's: a thread that was left behind takes no change any more, and what comes now removes
-/// its component.
+/// A component whose thread was left behind takes no change any more: the change that claims it removes it.
 DraftComponent Draft::claim(std::shared_ptr<Component> component) {
   DraftComponent draft;
   claimed_.reserve(claimed_.size() + 1);

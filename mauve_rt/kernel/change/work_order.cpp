@@ -265,7 +265,7 @@ const Task* TransactionCommit::Work::find_late() const noexcept {
   return nullptr;
 }
 
-// ---- what is told of it to anyone
+// ---- what it reports
 
 bool TransactionCommit::Work::is_under_way() const noexcept {
   if (is_armed_.load(std::memory_order_acquire)) return false;

@@ -161,15 +161,14 @@ void Deployer::end_all() noexcept {
 void Deployer::shut_down() noexcept {
   if (!is_deployed()) return;
   set_deployed(false);
-  architecture()
-      .commit_gate()
-      .close();  // from here on each change is made or not, and hosted() is all that can run
+  // From here on each change is made or not, and hosted() is all that can run.
+  architecture().commit_gate().close();
   stop_all(monotonic_now_ns() + kStopTimeout);
   give_up_hung();
   const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
   const auto all = hosted();
-  for (const auto& component : all)
-    component->task().end_thread(0);  // told all at once: one that hangs delays no other
+  // The order to end goes to all at once: one that hangs delays no other.
+  for (const auto& component : all) component->task().end_thread(0);
   for (const auto& component : all) component->task().end_thread(until);
   shadow_threads_.end(until);  // stop_all() has ended its shadows
   watchdog_->stop();           // last: stopping is watched too

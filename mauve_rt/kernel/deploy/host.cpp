@@ -62,7 +62,7 @@ bool Host::stop(const std::string& component, const StopOptions& options) {
   if (leaving != nullptr) {
     try {
       leaving->task().stop(timeout_ns, options.force);
-    } catch (const Error&) {  // what is told is told of the one that is listed
+    } catch (const Error&) {  // the error that is reported is that of the listed component
     }
   }
   return architecture_.hold_component(component)->task().stop(timeout_ns, options.force);
@@ -70,8 +70,9 @@ bool Host::stop(const std::string& component, const StopOptions& options) {
 
 std::shared_ptr<Component> Host::find_leaving(const std::string& name, const Component* present) const {
   for (const auto& each : hosted()) {
-    if (each.get() != present && each->name() == name && each->task().state() == ComponentState::running)
-      return each;
+    const ComponentState state = each->task().state();
+    const bool runs = state == ComponentState::running || state == ComponentState::stopping;
+    if (runs && each.get() != present && each->name() == name) return each;
   }
   return nullptr;
 }
