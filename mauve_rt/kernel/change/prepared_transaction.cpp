@@ -251,10 +251,12 @@ TransactionReport PreparedTransaction::complete() {
   const PreparedOutcome outcome = state.outcome.load(std::memory_order_relaxed);
   if (outcome == PreparedOutcome::committed)
     state.work->wait_passed(later_by(monotonic_now_ns(), state.phase_ns));
+  std::exception_ptr failure;
   {
     const std::lock_guard change(state.architecture.change_lock());
     settle();
     note_failure();
+    failure = state.failure;  // whoever settles all changes writes it again, as long as one component is late
   }
   state.architecture.wait_disposed(first);
   if (outcome == PreparedOutcome::stale) {
@@ -262,7 +264,7 @@ TransactionReport PreparedTransaction::complete() {
                 "what the change was prepared against has changed, or is being changed; nothing was changed",
                 {.remedy = "prepare it again"});
   }
-  if (state.failure) std::rethrow_exception(state.failure);
+  if (failure) std::rethrow_exception(failure);
   if (outcome == PreparedOutcome::committed) return state.work->report(state.phase_ns);
   if (outcome == PreparedOutcome::withdrawn && state.host.is_deployed()) {
     throw Error(ErrorCode::wrong_revision, "the change was called off before it began; nothing was changed",
