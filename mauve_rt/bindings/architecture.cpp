@@ -82,7 +82,7 @@ void bind_architecture(py::module_& module) {
                                       Parts{.shell = make_shell(shell, registry),
                                             .core = make_core(core, registry),
                                             .fsm = make_fsm(fsm, registry)},
-                                      rest, fsm_factory(fsm, registry), std::move(fallback_core));
+                                      rest, std::move(fallback_core));
             commit_one(self, std::move(transaction));
             return PyComponent(object, name);
           },

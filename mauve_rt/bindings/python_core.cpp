@@ -144,6 +144,7 @@ py::object PythonCore::object_of(const CoreBase& core) {
 std::unique_ptr<CoreBase> make_python_core(const PartFactory& factory) {
   auto core = std::make_unique<PythonCore>(factory.make);
   core->set_implementation(factory.name);
+  core->set_factory([factory] { return make_python_core(factory); });
   return core;
 }
 

@@ -104,6 +104,7 @@ class PythonFsm final : public FsmBase {
 std::unique_ptr<FsmBase> make_python_fsm(const PartFactory& factory) {
   auto fsm = std::make_unique<PythonFsm>(factory.make);
   fsm->set_implementation(factory.name);
+  fsm->set_factory([factory] { return make_python_fsm(factory); });
   return fsm;
 }
 

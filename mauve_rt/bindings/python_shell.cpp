@@ -183,7 +183,9 @@ Typed<"mauve_rt.parts.shells.Shell | None"> ShellView::python() const {
 }
 
 std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const PluginRegistry& registry) {
-  return std::make_unique<PythonShell>(factory, registry);
+  auto shell = std::make_unique<PythonShell>(factory, registry);
+  shell->set_factory([factory, &registry] { return make_python_shell(factory, registry); });
+  return shell;
 }
 
 void bind_python_shell(py::module_& module) {

@@ -79,14 +79,6 @@ std::unique_ptr<Resource> make_resource(const py::object& part, const PluginRegi
   return make_python_resource(made.cast<PartFactory>());
 }
 
-Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry) {
-  const auto kept = std::make_shared<PythonObject>(part);
-  return [kept, &registry] {
-    const InterpreterLocked lock;
-    return make_fsm(kept->get(), registry);
-  };
-}
-
 void bind_resource_kinds(py::module_& module) {
   py::class_<ResourceParameter>(module, "ResourceParameter", "What one resource of a kind can be told.")
       .def(py::init([](const std::string& name, const PropertyValue& initial, const std::string& unit,

@@ -21,7 +21,7 @@ PyTransaction& add_component(Self self, const std::string& name, const AnyShell&
                               Parts{.shell = make_shell(shell, registry),
                                     .core = make_core(core, registry),
                                     .fsm = make_fsm(fsm, registry)},
-                              rest, fsm_factory(fsm, registry));
+                              rest);
   });
 }
 

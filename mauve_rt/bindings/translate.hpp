@@ -80,8 +80,6 @@ ResourceParameters parameters_of(const py::dict& keywords);
 /// A property's value as Python has it.
 py::object to_python(const PropertyValue& value);
 
-/// Makes another instance of an fsm; may be called, and ends, on any thread.
-Component::FsmFactory fsm_factory(const py::object& part, const PluginRegistry& registry);
 /// Settings as keyword arguments; those not given have their defaults. Throws Error, py::type_error.
 TaskSettings task_settings(const std::string& component, const py::kwargs& given);
 

@@ -32,9 +32,9 @@ class FreeFsm : public Fsm<TestShell, TestCore> {
 /// Adds a component of test parts with a machine of its own.
 inline Component& add_free(Architecture& architecture, const std::string& name, const Define& how,
                            const TaskSettings& settings = {}) {
-  Component& component = architecture.add_component(
-      name, std::make_unique<TestShell>(), std::make_unique<TestCore>(), std::make_unique<FreeFsm>(how),
-      settings, [how] { return std::make_unique<FreeFsm>(how); });
+  Component& component =
+      architecture.add_component(name, std::make_unique<TestShell>(), std::make_unique<TestCore>(),
+                                 new_part<FsmBase, FreeFsm>(how), settings);
   component.core_as<TestCore>().instants.reserve(20'000);
   return component;
 }

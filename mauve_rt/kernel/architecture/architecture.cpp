@@ -11,6 +11,7 @@
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/prefault.hpp"
+#include "change/steps/step_kind.hpp"
 #include "parts/lookup.hpp"
 
 namespace mauve {
@@ -43,6 +44,7 @@ Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
 }
 
 Architecture::~Architecture() {
+  comebacks_.wait(0, kForever);  // it is a change of this architecture
   const bool have_ended = end_threads();
   std::erase_if(open_, [](const auto& change) { return change->settle(); });
   if (!have_ended || !open_.empty()) {
@@ -131,8 +133,24 @@ void Architecture::settle_changes() noexcept {
   }
 }
 
+void Architecture::bring_back(Component& hung) {
+  constexpr time_ns_t kEarlierChanges = s_to_ns(5);
+  const auto probation = hung.present_probation();
+  Transaction change;
+  change.add(steps::bring_back, hung.name()).by("probation");
+  try {
+    make(std::move(change), {.timeouts = {.commit_ns = kEarlierChanges}});
+  } catch (const Error& failure) {
+    if (probation != nullptr) probation->note_left_out(failure.what());
+  }
+}
+
 void Architecture::settle_probations() noexcept {
   for (const auto& component : components()) {
+    const auto probation = component->present_probation();
+    if (probation != nullptr && probation->claim_comeback())
+      comebacks_.take("the comeback of the old core of " + component->description(),
+                      [this, component] { bring_back(*component); });
     const auto shadow = component->last_shadow();
     if (shadow != nullptr) shadow->conclude_if_hung(component->task().state_age().hung_after_ns);
     const bool has_shadow_ended = shadow != nullptr && shadow->is_to_settle();
@@ -297,10 +315,9 @@ PluginRegistry& Architecture::require_registry() const {
 
 Component& Architecture::add_component(const std::string& name, std::unique_ptr<Shell> shell,
                                        std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                                       const TaskSettings& settings, const Component::FsmFactory& make_fsm) {
+                                       const TaskSettings& settings) {
   Parts parts{.shell = std::move(shell), .core = std::move(core), .fsm = std::move(fsm)};
-  commit_one(
-      std::move(Transaction().add_component(name, std::move(parts), {.settings = settings}, make_fsm)));
+  commit_one(std::move(Transaction().add_component(name, std::move(parts), {.settings = settings})));
   return component(name);
 }
 

@@ -321,26 +321,34 @@ std::vector<MessageShape> PluginRegistry::type_shapes() const {
 
 namespace {
 
-/// By a copy of its entry: the factory is user code, and others may load meanwhile.
+/// By a copy of its entry: the factory is user code, and others may load meanwhile. Other instances are of the same build.
 template <typename Entry>
-auto make_part(const Entry& entry, const std::string& kind, const std::string& name) {
-  auto part = made(kind + " " + name, entry.make);
+auto make_part(const std::shared_ptr<const Entry>& entry, const std::string& kind, const std::string& name)
+    -> decltype(entry->make()) {
+  auto part = made(kind + " " + name, entry->make);
+  part->set_factory([entry, kind, name] { return make_part(entry, kind, name); });
   part->set_implementation(name);
-  part->set_generation(entry.generation);
-  part->set_class_builds(entry.builds);
+  part->set_generation(entry->generation);
+  part->set_class_builds(entry->builds);
   return part;
 }
 
 }  // namespace
 
 std::unique_ptr<Shell> PluginRegistry::make_shell(const std::string& name) const {
-  return make_part(entry_of(shells_, name, ErrorCode::unknown_shell, "shell"), "shell", name);
+  return make_part(
+      std::make_shared<const Entry<Shell>>(entry_of(shells_, name, ErrorCode::unknown_shell, "shell")),
+      "shell", name);
 }
 std::unique_ptr<CoreBase> PluginRegistry::make_core(const std::string& name) const {
-  return make_part(entry_of(cores_, name, ErrorCode::unknown_core, "core"), "core", name);
+  return make_part(
+      std::make_shared<const Entry<CoreBase>>(entry_of(cores_, name, ErrorCode::unknown_core, "core")),
+      "core", name);
 }
 std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const {
-  return make_part(entry_of(fsms_, name, ErrorCode::unknown_fsm, "fsm"), "fsm", name);
+  return make_part(
+      std::make_shared<const Entry<FsmBase>>(entry_of(fsms_, name, ErrorCode::unknown_fsm, "fsm")), "fsm",
+      name);
 }
 
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,

@@ -29,8 +29,7 @@ struct DraftComponent {
   bool runs{false};      // afterwards
   bool restarts{false};  // because it was stopped and started
   std::optional<time_ns_t> clock_ns{};
-  Parts fresh{};  // of an added one: all its parts
-  Component::FsmFactory make_fsm{};
+  Parts fresh{};             // of an added one: all its parts
   std::uint32_t changes{0};  // of one that was there: ChangeMark, as the draft found it
   Wires wires_before{};
   Wires wires{};
@@ -46,6 +45,7 @@ struct DraftComponent {
   int shadow_step{0};
   bool core_unready{false};  // the new core is put in as it is
   int configure_step{0};     // the last that configures it anew
+  bool is_made_anew{false};  // by new instances of its parts
   int first_step{0};
   std::vector<std::unique_ptr<CommitAction>>
       actions{};  // taken in by the commit beside all this; not of an added one

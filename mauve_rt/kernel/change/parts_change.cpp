@@ -45,7 +45,7 @@ ErrorDetail preparation_detail(const Error& failure, const std::string& componen
 
 }  // namespace
 
-PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory make_fsm)
+PartsChange::PartsChange(Component& component, Parts fresh)
     : component_(component),
       parts_(std::move(fresh)),
       new_shell_(parts_.shell.get()),
@@ -54,29 +54,18 @@ PartsChange::PartsChange(Component& component, Parts fresh, FsmBase::Factory mak
       trace_id_(TraceNames::intern(change_name(parts_))) {
   task = &component.task();
   if (parts_.core != nullptr) core_name_ = TraceNames::intern(parts_.core->implementation());
-  if (parts_.fsm != nullptr) parts_.fsm->set_factory(std::move(make_fsm));
   if (parts_.shell == nullptr) return;
   parts_.shell->set_context(&component_.task().context());
   copy_properties(component_.shown().properties, *parts_.shell);
   if (parts_.fsm != nullptr) return;
-  if (!fsm_before_->factory()) {
+  parts_.fsm = fsm_before_->another();
+  if (parts_.fsm == nullptr) {
     throw Error(ErrorCode::prepare_failed,
                 "a new shell needs a new instance of the fsm, and none can be made",
                 {.component = component_.name(),
                  .element = fsm_before_->description(),
                  .remedy = "replace the fsm in the same transaction"});
   }
-  parts_.fsm = fsm_before_->factory()();
-  if (parts_.fsm == nullptr) {
-    throw Error(ErrorCode::prepare_failed, "the fsm's factory returned no object",
-                {.component = component_.name(),
-                 .element = fsm_before_->description(),
-                 .expected = "another instance of the fsm",
-                 .found = "nullptr",
-                 .remedy = "correct the factory that was given with the fsm"});
-  }
-  parts_.fsm->set_implementation(fsm_before_->implementation());
-  parts_.fsm->set_factory(fsm_before_->factory());
 }
 
 PartsChange::~PartsChange() { retire(); }

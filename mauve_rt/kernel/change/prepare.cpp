@@ -119,7 +119,7 @@ void TransactionCommit::Work::prepare_resource(DraftResource& added) {
 void TransactionCommit::Work::prepare_added(DraftComponent& added) {
   Component& component = *added.component;
   prepared_added_.push_back(&added);
-  component.set_parts(std::move(added.fresh), added.make_fsm);
+  component.set_parts(std::move(added.fresh));
   set_all(component.shell(), added.properties);
   connect_all(component.shell(), added.wires);
   for (const auto& [name, wire] : added.wires) prepare_floor(component, *wire.service);
@@ -138,10 +138,30 @@ void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
   changes_.push_back({.draft = &removed, .retreat = &retreat});
 }
 
+/// New instances of its parts are configured in the place of those that are in: nothing that is in is touched. Whether they can be
+/// made.
+bool TransactionCommit::Work::make_anew(DraftComponent& changed) {
+  if (!changed.component->is_configured()) return false;
+  Parts others = changed.component->another();
+  Parts& fresh = changed.fresh;
+  const bool has_core = fresh.core != nullptr || changed.promoted != nullptr;
+  changed.is_made_anew = (fresh.shell != nullptr || others.shell != nullptr) &&
+                         (has_core || others.core != nullptr) &&
+                         (fresh.fsm != nullptr || others.fsm != nullptr);
+  if (!changed.is_made_anew) return false;
+  if (fresh.shell == nullptr) {
+    fresh.shell = std::move(others.shell);
+    changed.shell_step = changed.configure_step;
+  }
+  if (!has_core) fresh.core = std::move(others.core);
+  if (fresh.fsm == nullptr) fresh.fsm = std::move(others.fsm);
+  return true;
+}
+
 /// The one thing that is done before the commit: what hooks do cannot be taken back, but the state can.
 void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
   Component& component = *changed.component;
-  if (!architecture_.is_configured() || options_.dry_run) return;
+  if (!architecture_.is_configured() || make_anew(changed) || options_.dry_run) return;
   draft_->hold(changed);
   ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
   component.task().swap_fault(before.fault);
@@ -186,7 +206,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     draft.fresh.core = draft.promoted->suspend(kStateEnd);
     draft.is_candidate_out = true;
   }
-  change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh), std::move(draft.make_fsm));
+  change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh));
   if (draft.core_unready) change.parts->leave_unready();
   if (draft.shell_step != 0) {
     set_all(change.parts->shell(), draft.properties);
@@ -196,7 +216,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
     for (const auto& [name, wire] : draft.wires_before)
       keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
   }
-  if (draft.is_repaired()) change.parts->start_afresh();
+  if (draft.is_repaired() || draft.is_made_anew) change.parts->start_afresh();
   if (draft.promoted != nullptr) change.parts->promote();
   if (draft.probation) {
     change.parts->set_probation(std::make_shared<Probation>(component, change.parts->core()->implementation(),

@@ -64,14 +64,10 @@ Transaction& Transaction::add_component(const std::string& name, const Component
   return add(steps::add_component, name, {}, NewComponent{.rest = parts});
 }
 Transaction& Transaction::add_component(const std::string& name, Parts parts, const ComponentParts& rest,
-                                        const Component::FsmFactory& make_fsm,
                                         std::unique_ptr<CoreBase> fallback) {
   return add(steps::add_component, name, {},
-             NewComponent{.rest = rest,
-                          .by_name = false,
-                          .parts = std::move(parts),
-                          .make_fsm = make_fsm,
-                          .fallback = std::move(fallback)});
+             NewComponent{
+                 .rest = rest, .by_name = false, .parts = std::move(parts), .fallback = std::move(fallback)});
 }
 Transaction& Transaction::remove_component(const std::string& name) {
   return add(steps::remove_component, name);

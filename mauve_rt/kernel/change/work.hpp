@@ -115,6 +115,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void prepare_removed(DraftComponent& removed);
   void prepare_parts(Change& change);
   void prepare_shadow(const DraftComponent& changed);
+  bool make_anew(DraftComponent& changed);
   void configure_anew(DraftComponent& changed);
   void prepare_repair(const DraftComponent& changed);
   void prepare_wiring(Change& change);

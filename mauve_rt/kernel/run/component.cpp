@@ -108,9 +108,8 @@ void Component::cleanup() {
   Configurable::cleanup();
 }
 
-void Component::set_parts(Parts parts, FsmFactory make_fsm) {
+void Component::set_parts(Parts parts) {
   parts_ = std::move(parts);
-  parts_.fsm->set_factory(std::move(make_fsm));
   parts_.shell->set_context(&task_.context());
   present_shell_.store(parts_.shell.get(), std::memory_order_release);
   present_core_.store(parts_.core.get(), std::memory_order_release);
@@ -143,8 +142,8 @@ std::vector<DescribedState> Component::described_states() const {
 }
 
 std::vector<DescribedState> Component::previewed_states() const {
-  if (!fsm_factory()) return described_states();
-  const std::unique_ptr<FsmBase> fsm = fsm_factory()();
+  const std::unique_ptr<FsmBase> fsm = this->fsm().another();
+  if (fsm == nullptr) return described_states();
   bind_fsm(*fsm, *parts_.shell);
   fsm->configure();
   std::vector<DescribedState> states = fsm->describe_states();
@@ -532,6 +531,16 @@ void Component::stop_listening() noexcept {
   for (const auto& state : fsm().states()) {
     if (state->event != nullptr) state->event->stop_listening();
   }
+}
+
+Parts Component::another() const {
+  const bool has_fallen_back = fallback_ != nullptr && fallback_->was_taken();
+  const CoreBase& declared = has_fallen_back ? *fallback_->core() : *parts_.core;
+  return {.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
+}
+
+std::unique_ptr<CoreBase> Component::another_fallback() const {
+  return spare_ != nullptr ? spare_->another() : nullptr;
 }
 
 void Component::configure_anew() {

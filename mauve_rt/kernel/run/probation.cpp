@@ -298,6 +298,35 @@ bool Probation::conclude_if_over() noexcept {
   return has_ended();
 }
 
+std::unique_ptr<CoreBase> Probation::take_over() noexcept {
+  if (!begin_end()) return nullptr;
+  auto core = parts_->give_back_core();
+  hung_for_ns_ = component_.task().state_age().age_ns;
+  end(kReverted, ProbationCause::hung);
+  return core;
+}
+
+/// While one that hangs is on probation nobody else has it end, but a shutdown.
+bool Probation::is_taken_over() const noexcept {
+  const Phase now = phase();
+  return now == kEnding || (now == kReverted && cause_ == ProbationCause::hung);
+}
+
+bool Probation::claim_comeback() noexcept {
+  return phase() == kRunning && reverts_hang() && component_.task().is_given_up_on_probation() &&
+         !is_comeback_claimed_.exchange(true, std::memory_order_relaxed);  // relaxed: a lone flag
+}
+
+void Probation::note_left_out(const std::string& why) {
+  const std::lock_guard lock(request_mutex_);
+  left_out_ = why;
+}
+
+const FsmBase& Probation::old_fsm() const noexcept {
+  const FsmBase* const out = parts_->fsm_out();
+  return out != nullptr ? *out : component_.fsm();
+}
+
 void Probation::keep(std::unique_ptr<PartsChange> parts) noexcept { kept_ = std::move(parts); }
 
 std::unique_ptr<PartsChange> Probation::release_parts() noexcept { return std::move(kept_); }
@@ -310,8 +339,7 @@ ProbationRecord Probation::record() const {
                          .releases = releases_.load(std::memory_order_relaxed),
                          .begin_ns = begin_ns_,
                          .end_ns = end_ns_};
-  const bool reverts_hang = options_.on_fault || options_.on_overrun;
-  if (now == kRunning && reverts_hang && component_.task().is_given_up_on_probation()) {
+  if (now == kRunning && reverts_hang() && component_.task().is_given_up_on_probation()) {
     record.verdict = ProbationVerdict::reverted;
     record.cause = ProbationCause::fault;
     record.reason = component_.task().fault().what + "; the old core goes in when it ends";
@@ -357,6 +385,14 @@ std::string Probation::reason() const {
       return "another change replaced parts of the component";
     case ProbationCause::fell_back:
       return "the core faulted, which on_fault did not watch, and the fallback core took over";
+    case ProbationCause::hung: {
+      const std::lock_guard lock(request_mutex_);
+      const std::string what = component_.task().fault().what;
+      if (left_out_.empty())
+        return what + "; the old core goes on by another thread, " +
+               std::to_string(hung_for_ns_ / ms_to_ns(1)) + " ms after the state began";
+      return what + "; the old core does not go on: " + left_out_;
+    }
     case ProbationCause::ended:
       return "the component was cleaned up or removed, or its host was shut down";
   }

@@ -97,6 +97,13 @@ bool Task::give_up_on_probation(const StateAge& age) {
   return is_given_up;
 }
 
+/// The old core goes on elsewhere: nothing goes on here.
+bool Task::is_taken_over() noexcept {
+  bool is_it = false;
+  probation_.use([&](const Probation& probation) { is_it = probation.is_taken_over(); });
+  return is_it;
+}
+
 /// In place of the end in a fault. False when the core is no longer on probation.
 bool Task::put_back_after_fault(bool has_taken_change) noexcept {
   bool is_back = false;
@@ -105,7 +112,7 @@ bool Task::put_back_after_fault(bool has_taken_change) noexcept {
     if (is_back) machine_.trace(TraceKind::reconfiguration, probation.trace_id(), kTake, 0);
   });
   if (!is_back) return false;
-  const bool is_to_stop = (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  const bool is_to_stop = this->is_to_stop();
   const bool was_reported = state() == ComponentState::faulted;  // by who timed it out
   if (has_taken_change || !machine_.is_started() || (is_to_stop && was_reported)) {
     write_outputs(false);

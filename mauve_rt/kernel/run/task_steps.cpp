@@ -189,8 +189,7 @@ void Task::end_in_fault() noexcept {
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   if (is_violation && put_back_after_fault(has_new_parts)) return;
   write_outputs(false);
-  const bool stays = has_new_parts || !machine_.is_started() ||
-                     (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
+  const bool stays = has_new_parts || !machine_.is_started() || is_to_stop() || is_taken_over();
   CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
   // One that was renewed while an fsm on probation went out was made ready for that fsm.
   if (fallback == nullptr || !fallback->adopt()) return park(ComponentState::faulted);

@@ -97,7 +97,7 @@ class Storm : public ::testing::Test {
       names_.push_back(name);
       architecture_
           .add_component(name, std::make_unique<TestShell>(), std::make_unique<WritingCore>(),
-                         std::make_unique<TestFsm>(), {}, [] { return std::make_unique<TestFsm>(); })
+                         new_part<FsmBase, TestFsm>(), {})
           .set_property("period_ms", std::int64_t{1 + i});
       architecture_.connect(name, "output", i % 2 == 0 ? "one" : "other", "write");
     }

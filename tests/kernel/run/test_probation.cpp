@@ -706,21 +706,92 @@ TEST_F(ProbationThreads, ManyChangesAtOnceLeaveOneCore) {
   EXPECT_FALSE(last->is_cleaned);
 }
 
-TEST_F(ProbationThreads, ACoreThatHangsIsRevertedAndNeverPasses) {
-  Component& component = add_trial("c", {.hung_after_ns = ms_to_ns(100)});
-  deploy();
-  wait_seen(*old_seen, 2);
-  const auto doors = std::make_shared<Doors>();
-  const auto seen = put_in(
-      [doors](TrialCore&, int run) {
-        if (run == 3) doors->pass();
-      },
-      {.duration_ns = ms_to_ns(20)});
-  wait_until([&] { return doors->entered.load(); }, "the long state");
+/// A core on probation whose third execution hangs until the doors open.
+class ProbationHangs : public ProbationThreads {
+ protected:
+  static constexpr TaskSettings kSettings{.hung_after_ns = ms_to_ns(100)};
+
+  /// The component as it is by then: not the one that is in the list at last.
+  std::shared_ptr<Component> put_in_one_that_hangs(ProbationOptions options = {.duration_ns = ms_to_ns(20)}) {
+    deploy();
+    wait_seen(*old_seen, 2);
+    seen = put_in(
+        [doors = doors](TrialCore&, int run) {
+          if (run == 3) doors->pass();
+        },
+        std::move(options));
+    wait_until([&] { return doors->entered.load(); }, "the long state");
+    return architecture.hold_component("c");
+  }
+  std::shared_ptr<Component> await_successor(const std::shared_ptr<Component>& hung) {
+    wait_until(
+        [&] {
+          settle();
+          EXPECT_NE(Verdict::passed, record().verdict);
+          EXPECT_NE(Verdict::inconclusive, record().verdict);
+          return architecture.hold_component("c") != hung;
+        },
+        "another component");
+    return architecture.hold_component("c");
+  }
+
+  const std::shared_ptr<Doors> doors{std::make_shared<Doors>()};
+  std::shared_ptr<Seen> seen;
+};
+
+TEST_F(ProbationHangs, TheOldCoreGoesOnByAnotherThread) {
+  add_trial("c", kSettings).set_property("gain", 3.0);
+  const auto hung = put_in_one_that_hangs();
+  const auto component = await_successor(hung);
+  wait_state(*component, ComponentState::running);
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  EXPECT_THAT(record().reason,
+              HasSubstr("hung: state Run of the core on probation did not end; the old core goes on"));
+  expect_old_core_runs_on(*component);
+  EXPECT_THAT(record().reason, HasSubstr(" ms after the state began")) << "how long it lasted";
+  EXPECT_EQ(3.0, component->shell_as<TestShell>().gain.value());
+  EXPECT_EQ(1.0, newest()) << "what the old core writes";
+  EXPECT_EQ(ComponentState::faulted, hung->task().state());
+  EXPECT_FALSE(doors->open) << "it hangs still";
+  doors->open = true;
+  wait_until([&] { return hung->task().has_ended(); }, "the end of the thread that hung");
+  expect_old_core_runs_on(*component);
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  (*host).stop("c");
+  EXPECT_EQ(0, (old->instants.back() - (*host).epoch_ns()) % kPeriod) << "on the grid of the deployment";
+}
+
+TEST_F(ProbationHangs, ItIsOnProbationAgainAndStopped) {
+  add_trial("c", kSettings);
+  const auto component = await_successor(put_in_one_that_hangs());
+  wait_state(*component, ComponentState::running);
+  const auto again = put_in([](TrialCore&, int) {});
+  wait_seen(*again, 3);
+  EXPECT_TRUE((*host).revert_probation("c", "enough", kLong));
+  expect_old_core_runs_on(*component);
+  (*host).stop("c");
+  EXPECT_EQ(ComponentState::stopped, component->task().state());
+  doors->open = true;
+}
+
+TEST_F(ProbationHangs, AStopThatIsPendingIsCarriedOut) {
+  Component& first = add_trial("c", kSettings);
+  const auto hung = put_in_one_that_hangs();
+  EXPECT_THROW(first.task().stop(0), Error);
+  const auto component = await_successor(hung);
+  EXPECT_EQ(ComponentState::stopped, component->task().state());
+  (*host).start("c");
+  expect_old_core_runs_on(*component);
+  doors->open = true;
+}
+
+TEST_F(ProbationHangs, TheOldCoreGoesInAtTheEndOfTheStateWhereNoOtherShellCanBeMade) {
+  Component& component = add_trial("c", kSettings);
+  component.shell().set_factory({});
+  put_in_one_that_hangs();
   const auto is_given_up = [&] {
     settle();
     EXPECT_NE(Verdict::passed, record().verdict);
-    EXPECT_NE(Verdict::inconclusive, record().verdict);
     return component.task().state() == ComponentState::faulted;
   };
   wait_until(is_given_up, "the hang to be found");
@@ -734,6 +805,51 @@ TEST_F(ProbationThreads, ACoreThatHangsIsRevertedAndNeverPasses) {
   wait_state(component, ComponentState::running);
   expect_old_core_runs_on(component);
   EXPECT_TRUE(seen->is_cleaned);
+}
+
+TEST_F(ProbationHangs, AStateThatEndsAsItIsGivenUpLeavesOneOldCore) {
+  add_trial("c", {.hung_after_ns = ms_to_ns(10)});
+  const auto inside = std::make_shared<std::atomic<int>>(0);
+  old->work = [inside] {
+    EXPECT_EQ(1, ++*inside) << "two threads execute the old core";
+    --*inside;
+  };
+  deploy();
+  for (int round = 0; round < 20; ++round) {
+    const auto hanging = std::make_shared<Doors>();
+    put_in(
+        [hanging](TrialCore&, int run) {
+          if (run == 2) hanging->pass();
+        },
+        {.duration_ns = s_to_ns(10)});
+    wait_until([&] { return hanging->entered.load(); }, "the long state");
+    std::this_thread::sleep_for(std::chrono::milliseconds(9));
+    std::thread opens([&] {
+      std::this_thread::sleep_for(std::chrono::microseconds(round * 300));
+      hanging->open = true;
+    });
+    wait_until(
+        [&] {
+          settle();
+          if (round % 4 == 0) hanging->open = true;
+          const auto records = (*host).probations();
+          const bool is_over = !records.empty() && records.back().verdict != Verdict::running;
+          const bool is_on_trial = architecture.hold_component("c")->core_implementation() == "t/New";
+          return is_over || (is_on_trial && hanging->open && records.back().releases > 5);
+        },
+        "the end of the state, or the old core");
+    opens.join();
+    const auto component = architecture.hold_component("c");
+    if (component->core_implementation() == "t/New") (*host).revert_probation("c", "next round", kLong);
+    const int runs = old_seen->runs;
+    wait_until(
+        [&] {
+          settle();
+          return old_seen->runs > runs + 2;
+        },
+        "the old core");
+    EXPECT_EQ(old, &architecture.hold_component("c")->core());
+  }
 }
 
 TEST_F(ProbationThreads, AStateThatOutlastsTheDurationIsWaitedFor) {

@@ -439,9 +439,9 @@ TYPED_TEST(FsmProbations, AFactoryGoesBackWithItsFsm) {
   Component& component = this->add_noted();
   this->deploy();
   const auto seen = this->put_in_both([](TrialCore&, int) {});
-  EXPECT_FALSE(component.fsm_factory()) << "an instance was given";
+  EXPECT_EQ(nullptr, component.fsm().another()) << "an instance was given";
   EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
-  EXPECT_TRUE(component.fsm_factory());
+  EXPECT_NE(nullptr, component.fsm().another());
   Transaction change;
   change.replace_shell("c", std::make_unique<TestShell>());
   this->host.commit(std::move(change), 0);

@@ -44,8 +44,7 @@ class Rule11Repaired : public ::testing::Test {
  protected:
   void SetUp() override {
     component = &architecture.add_component("c", std::make_unique<TestShell>(), std::make_unique<Broken>(),
-                                            std::make_unique<TestFsm>(), {},
-                                            [] { return std::make_unique<TestFsm>(); });
+                                            new_part<FsmBase, TestFsm>(), {});
     host.deploy(architecture);
     until([&] {
       return component->task().state() == ComponentState::faulted && component->task().is_parked();
@@ -116,6 +115,44 @@ TYPED_TEST(Rule11Repaired, OrRefusedWhereAnotherStepIsAndFaultedAsBefore) {
   EXPECT_THROW(this->commit(std::move(transaction)), Error);
   EXPECT_EQ(ComponentState::faulted, this->component->task().state());
   EXPECT_EQ("broken", this->component->task().fault().what);
+}
+
+struct Picky : TestCore {
+  static inline std::atomic<bool> fails{false};
+  static inline std::atomic<bool> breaks{false};
+  bool configure_hook() override { return !fails; }
+  void act() override {
+    TestCore::act();
+    if (breaks) throw std::runtime_error("broken");
+  }
+};
+
+TYPED_TEST(Rule11Repaired, OrAsItWasWhereItsPartsCannotBeConfiguredAnew) {
+  Picky::breaks = false;
+  Component& picky = this->architecture.template add_component<TestShell, Picky, TestFsm>("picky");
+  const Shell* const shell = &picky.shell();
+  const auto refused = [&] {
+    Picky::fails = true;
+    EXPECT_THROW(this->commit(std::move(
+                     Transaction().set_property("picky", "period_ms", std::int64_t{2}).configure("picky"))),
+                 Error);
+    Picky::fails = false;
+    EXPECT_EQ(shell, &picky.shell());
+    EXPECT_EQ(ms_to_ns(1), picky.task().grid().period_ns);
+  };
+  refused();
+  EXPECT_EQ(ComponentState::stopped, picky.task().state());
+  this->commit(std::move(Transaction().start("picky")));
+  this->until([&] { return picky.core_as<TestCore>().runs >= 3; });
+  Picky::breaks = true;
+  this->until([&] { return picky.task().state() == ComponentState::faulted && picky.task().is_parked(); });
+  Picky::breaks = false;
+  refused();
+  EXPECT_EQ(ComponentState::faulted, picky.task().state());
+  EXPECT_EQ("broken", picky.task().fault().what);
+  this->commit(std::move(Transaction().configure("picky").start("picky")));
+  EXPECT_NE(shell, &picky.shell());
+  this->until([&] { return picky.core_as<TestCore>().runs >= 3; });
 }
 
 TYPED_TEST(Rule11Repaired, NotByAPropertyNorByAStart) {

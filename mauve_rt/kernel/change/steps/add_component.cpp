@@ -36,7 +36,6 @@ constexpr StepKind steps::add_component{
           std::unique_ptr<CoreBase> fallback = std::move(wanted.fallback);
           DraftComponent& added = draft.add_component(step.target, rest.settings);
           added.fresh = std::move(parts);
-          added.make_fsm = wanted.by_name ? factory_of(draft, rest.fsm) : wanted.make_fsm;
           added.component->allow(rest.alternatives, rest.reconfigurable);
           if (fallback == nullptr && !rest.fallback.empty())
             fallback = draft.registry().make_core(rest.fallback);

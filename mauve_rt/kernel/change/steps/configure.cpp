@@ -22,8 +22,9 @@ void configure_component(Draft& draft, const std::string& name) {
 }  // namespace
 
 constexpr StepKind steps::configure{
-    .name = "configure", .element = "state", .draft = [](Draft& draft, TransactionStep& step) {
-      configure_component(draft, step.target);
-    }};
+    .name = "configure",
+    .element = "state",
+    .is_structural = true,
+    .draft = [](Draft& draft, TransactionStep& step) { configure_component(draft, step.target); }};
 
 }  // namespace mauve

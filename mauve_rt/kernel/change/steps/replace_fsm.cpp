@@ -4,18 +4,17 @@
 
 namespace mauve {
 
-constexpr StepKind steps::replace_fsm{
-    .name = "replace_fsm",
-    .element = "fsm",
-    .words = part_words<FsmBase>,
-    .draft = [](Draft& draft, TransactionStep& step) {
-      const bool by_name = !brings<FsmBase>(step);
-      std::unique_ptr<FsmBase> fsm =
-          by_name ? draft.registry().make_fsm(step.name) : take(value_of<std::unique_ptr<FsmBase>>(step));
-      DraftComponent& changed = replacing(draft, step.target);
-      changed.fresh.fsm = std::move(fsm);
-      changed.make_fsm = by_name ? factory_of(draft, step.name) : Component::FsmFactory{};
-      changed.fsm_step = draft.step();
-    }};
+constexpr StepKind steps::replace_fsm{.name = "replace_fsm",
+                                      .element = "fsm",
+                                      .words = part_words<FsmBase>,
+                                      .draft = [](Draft& draft, TransactionStep& step) {
+                                        const bool by_name = !brings<FsmBase>(step);
+                                        std::unique_ptr<FsmBase> fsm =
+                                            by_name ? draft.registry().make_fsm(step.name)
+                                                    : take(value_of<std::unique_ptr<FsmBase>>(step));
+                                        DraftComponent& changed = replacing(draft, step.target);
+                                        changed.fresh.fsm = std::move(fsm);
+                                        changed.fsm_step = draft.step();
+                                      }};
 
 }  // namespace mauve

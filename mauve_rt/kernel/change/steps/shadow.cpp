@@ -26,19 +26,17 @@ void require_free(const Draft& draft, const DraftComponent& changed) {
                .remedy = "end the other shadow in a transaction before"});
 }
 
-std::unique_ptr<Shell> make_shell(const Draft& draft, Component& component) {
-  const std::string& name = component.shell().implementation();
-  if (!name.empty()) return draft.registry().make_shell(name);
+std::unique_ptr<Shell> make_shell(const Component& component) {
+  std::unique_ptr<Shell> shell = component.shell().another();
+  if (shell != nullptr) return shell;
   throw Error(ErrorCode::prepare_failed, "a shadow needs another instance of the component's shell",
               {.component = component.name(),
                .element = component.shell().description(),
-               .expected = "a shell that the registry can make",
-               .found = "a shell without a registered name",
                .remedy = "give the step a shell as an object"});
 }
 
 std::unique_ptr<FsmBase> make_fsm(const Component& component) {
-  std::unique_ptr<FsmBase> fsm = component.fsm_factory() ? component.fsm_factory()() : nullptr;
+  std::unique_ptr<FsmBase> fsm = component.fsm().another();
   if (fsm != nullptr) return fsm;
   throw Error(ErrorCode::prepare_failed, "a shadow needs another instance of the fsm, and none can be made",
               {.component = component.name(),
@@ -67,7 +65,7 @@ constexpr StepKind steps::shadow{
       ShadowParts parts{.shell = std::move(wanted.shell)};
       parts.core = step.name.empty() ? take(wanted.core) : draft.registry().make_core(step.name);
       if (!step.name.empty()) component.check_allowed(parts.core->implementation());
-      if (parts.shell == nullptr) parts.shell = make_shell(draft, component);
+      if (parts.shell == nullptr) parts.shell = make_shell(component);
       parts.fsm = make_fsm(component);
       changed.shadow = std::make_shared<Shadow>(component, std::move(parts), wanted.options);
       changed.shadow_step = draft.step();

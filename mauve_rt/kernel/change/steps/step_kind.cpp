@@ -94,9 +94,4 @@ void require_not_promoted(const DraftComponent& component) {
                .remedy = "leave one of the two steps out, or make two transactions"});
 }
 
-Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm) {
-  const PluginRegistry* registry = &draft.registry();
-  return [registry, fsm] { return registry->make_fsm(fsm); };
-}
-
 }  // namespace mauve

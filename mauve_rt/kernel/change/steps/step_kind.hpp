@@ -59,6 +59,7 @@ namespace steps {
 #define MAUVE_DECLARE_STEP_KIND(name) extern const StepKind name;
 MAUVE_STEP_KINDS(MAUVE_DECLARE_STEP_KIND)
 #undef MAUVE_DECLARE_STEP_KIND
+extern const StepKind bring_back;  // in no table
 }  // namespace steps
 
 [[noreturn]] void throw_other_value(const TransactionStep& step);
@@ -112,7 +113,5 @@ std::string part_words(const TransactionStep& step) {
 DraftComponent& replacing(Draft& draft, const std::string& component);
 /// Throws Error (invalid_argument) when a step before has promoted the candidate of its shadow.
 void require_not_promoted(const DraftComponent& component);
-/// Makes a registered fsm, as often as asked.
-Component::FsmFactory factory_of(const Draft& draft, const std::string& fsm);
 
 }  // namespace mauve

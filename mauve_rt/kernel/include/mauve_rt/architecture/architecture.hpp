@@ -110,13 +110,12 @@ class Architecture final : public Configurable {
   /// deployed it arrives STOPPED. [non-rt] Throws Error: duplicate_name, out_of_range (settings); as configure() then.
   template <typename ShellType, typename CoreType, typename FsmType>
   Component& add_component(const std::string& name, const TaskSettings& settings = {}) {
-    return add_component(name, std::make_unique<ShellType>(), std::make_unique<CoreType>(),
-                         std::make_unique<FsmType>(), settings, [] { return std::make_unique<FsmType>(); });
+    return add_component(name, new_part<Shell, ShellType>(), new_part<CoreBase, CoreType>(),
+                         new_part<FsmBase, FsmType>(), settings);
   }
-  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone.
   Component& add_component(const std::string& name, std::unique_ptr<Shell> shell,
                            std::unique_ptr<CoreBase> core, std::unique_ptr<FsmBase> fsm,
-                           const TaskSettings& settings, const Component::FsmFactory& make_fsm = {});
+                           const TaskSettings& settings);
   /// Adds a component of registered parts. [non-rt] Throws Error: unknown_shell, unknown_core, unknown_fsm
   /// besides.
   Component& add_component(const std::string& name, const std::string& shell, const std::string& core,
@@ -247,6 +246,8 @@ class Architecture final : public Configurable {
   void settle_probations() noexcept;
   /// The same where no change is being made. [non-rt]
   void settle_probations_if_idle() noexcept;
+  /// The old core of one whose core on probation hangs goes on in a component that takes its place. [non-rt]
+  void bring_back(Component& hung);
   /// Keeps a change from its draft on, until it is settled or forgotten. [non-rt], the change lock held.
   void keep_open(std::shared_ptr<OpenChange> change);
   void forget_open(const OpenChange& change) noexcept;
@@ -341,7 +342,8 @@ class Architecture final : public Configurable {
   std::vector<std::shared_ptr<Resource>> retiring_;
   std::vector<Leaving> leaving_;
   Lists lists_;
-  Keeper keeper_;  // first to end: it cleans up what others had
+  Keeper keeper_;  // first to end but for the one that changes: it cleans up what others had
+  Keeper comebacks_;
 };
 
 }  // namespace mauve

@@ -35,7 +35,6 @@ struct NewComponent {
   ComponentParts rest{};
   bool by_name{true};
   Parts parts{};
-  Component::FsmFactory make_fsm{};
   std::unique_ptr<CoreBase> fallback{};
 };
 
@@ -149,15 +148,14 @@ class Transaction {
   Transaction& add_component(const std::string& name, const ComponentParts& parts);
   /// With its parts as objects; the names in `rest` stay unused, but for the fallback's where none is given.
   Transaction& add_component(const std::string& name, Parts parts, const ComponentParts& rest = {},
-                             const Component::FsmFactory& make_fsm = {},
                              std::unique_ptr<CoreBase> fallback = nullptr);
   template <typename ShellType, typename CoreType, typename FsmType>
   Transaction& add_component(const std::string& name, const ComponentParts& rest = {}) {
     return add_component(std::move(name),
-                         Parts{.shell = std::make_unique<ShellType>(),
-                               .core = std::make_unique<CoreType>(),
-                               .fsm = std::make_unique<FsmType>()},
-                         std::move(rest), [] { return std::make_unique<FsmType>(); });
+                         Parts{.shell = new_part<Shell, ShellType>(),
+                               .core = new_part<CoreBase, CoreType>(),
+                               .fsm = new_part<FsmBase, FsmType>()},
+                         std::move(rest));
   }
   /// It is parked, its outputs written as on a stop, its ports disconnected.
   Transaction& remove_component(const std::string& name);

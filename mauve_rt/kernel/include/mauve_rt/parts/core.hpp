@@ -6,16 +6,16 @@
 #include <string_view>
 #include <vector>
 
-#include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/parts/component_part.hpp"
 #include "mauve_rt/parts/shell.hpp"
 #include "mauve_rt/parts/state_fields.hpp"
 
 namespace mauve {
 
 /// A core seen without its shell's type.
-class CoreBase : public ConfigurablePart {
+class CoreBase : public ComponentPart<CoreBase> {
  public:
   /// Binds the core to a shell; false when the shell is not of the type the core was written for. [setup]
   virtual bool bind_shell(Shell& shell) noexcept = 0;
@@ -49,10 +49,7 @@ class CoreBase : public ConfigurablePart {
 
   /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }
-  void set_implementation(std::string name) { implementation_ = std::move(name); }
-  /// package/Class [rt]
-  const std::string& implementation() const MAUVE_RT { return implementation_; }
-  std::string description() const override { return "core " + implementation_; }
+  std::string description() const override { return "core " + implementation(); }
 
  protected:
   /// The component's logical clock: the nominal instant it acts at. [rt]
@@ -66,7 +63,6 @@ class CoreBase : public ConfigurablePart {
 
  private:
   const Context* context_{nullptr};
-  std::string implementation_;
 };
 
 /// Derive from this with the shell the core was written for (Listing 2 of the paper).

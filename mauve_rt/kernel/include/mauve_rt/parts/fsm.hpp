@@ -15,6 +15,7 @@
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/statistics.hpp"
+#include "mauve_rt/parts/component_part.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/declared_state.hpp"
 #include "mauve_rt/parts/event_input.hpp"
@@ -136,7 +137,7 @@ struct DescribedState {
 };
 
 /// An fsm seen without its types.
-class FsmBase : public ConfigurablePart {
+class FsmBase : public ComponentPart<FsmBase> {
  public:
   /// Binds to a shell; false when it is not of the fsm's type. [setup]
   virtual bool bind_shell(Shell& shell) noexcept = 0;
@@ -165,17 +166,7 @@ class FsmBase : public ConfigurablePart {
   /// Times of execution states that stand in the place of its own, as far as it has states of these names. Before configure.
   /// [setup]
   void declare_states(std::vector<DeclaredState> states) { declared_states_ = std::move(states); }
-  /// [setup]
-  void set_implementation(std::string name) { implementation_ = std::move(name); }
-  /// [rt]
-  const std::string& implementation() const MAUVE_RT { return implementation_; }
-  std::string description() const override { return "fsm " + implementation_; }
-
-  using Factory = std::function<std::unique_ptr<FsmBase>()>;
-  /// Makes another instance of the same fsm. It is part of the fsm, so that both are exchanged as one. [setup]
-  void set_factory(Factory make) { make_ = std::move(make); }
-  /// Empty: no other instance can be made. [non-rt]
-  const Factory& factory() const noexcept { return make_; }
+  std::string description() const override { return "fsm " + implementation(); }
 
  protected:
   /// Throws Error (type_mismatch): fsm and core are of two builds. [non-rt]
@@ -217,8 +208,6 @@ class FsmBase : public ConfigurablePart {
   time_ns_t smallest_bound_ns_{0};
   time_ns_t divisor_ns_{0};  // 0: none
   std::vector<DeclaredState> declared_states_;
-  std::string implementation_;
-  Factory make_{};
 };
 
 /// Derive from this with the shell and core types, and declare the machine in define().

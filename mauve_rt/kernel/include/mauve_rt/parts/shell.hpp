@@ -8,10 +8,10 @@
 #include <typeinfo>
 #include <vector>
 
-#include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/port.hpp"
+#include "mauve_rt/parts/component_part.hpp"
 #include "mauve_rt/parts/property.hpp"
 
 namespace mauve {
@@ -24,7 +24,7 @@ namespace mauve {
 ///   };
 ///
 /// Every port is to be connected before configure, unless declared so: read_port<Point>("goal").optional().
-class Shell : public ConfigurablePart {
+class Shell : public ComponentPart<Shell> {
  public:
   /// [rt]
   const std::vector<std::unique_ptr<PortBase>>& ports() const MAUVE_RT { return ports_; }
@@ -35,13 +35,10 @@ class Shell : public ConfigurablePart {
 
   /// Given by the component, before configure. [setup]
   void set_context(const Context* context) noexcept;
-  void set_implementation(std::string name) { implementation_ = std::move(name); }
-  /// package/Class [rt]
-  const std::string& implementation() const MAUVE_RT { return implementation_; }
   /// The size of its class, where a registry made it; 0: not known. [setup]
   void set_bytes(std::size_t bytes) noexcept { bytes_ = bytes; }
   std::size_t bytes() const noexcept { return bytes_; }
-  std::string description() const override { return "shell " + implementation_; }
+  std::string description() const override { return "shell " + implementation(); }
 
  protected:
   template <typename T>
@@ -105,7 +102,6 @@ class Shell : public ConfigurablePart {
   std::vector<std::unique_ptr<PortBase>> ports_;
   std::vector<std::unique_ptr<PropertyBase>> properties_;
   std::size_t bytes_{0};
-  std::string implementation_;
 };
 
 /// The port with the largest message; default: no port carries one.

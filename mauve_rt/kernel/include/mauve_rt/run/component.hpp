@@ -75,8 +75,7 @@ class PartsChange final : public CommitAction {
  public:
   /// A new shell takes the property values of the old one where name, type and range fit. With a new shell and no new
   /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
-  /// `make_fsm` makes another instance of a new fsm.
-  PartsChange(Component& component, Parts fresh, FsmBase::Factory make_fsm = {});
+  PartsChange(Component& component, Parts fresh);
   ~PartsChange() override;
 
   /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]
@@ -116,6 +115,8 @@ class PartsChange final : public CommitAction {
   const Handover* handover() const noexcept { return handover_.get(); }
   /// The core that is not in force now. [setup]
   CoreBase* core() noexcept { return parts_.core.get(); }
+  /// The fsm that is not in force now; nullptr: it replaces none. [non-rt]
+  const FsmBase* fsm_out() const noexcept { return parts_.fsm.get(); }
   /// Gives away the core that is not in force now. [non-rt]
   std::unique_ptr<CoreBase> give_back_core() noexcept { return std::move(parts_.core); }
   bool was_taken() const noexcept { return taken_; }
@@ -210,8 +211,6 @@ struct ShownParts {
 /// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
  public:
-  using FsmFactory = FsmBase::Factory;
-
   Component(std::string name, std::uint16_t number, ChangeSignal& changes);
   ~Component() override;
 
@@ -224,8 +223,8 @@ class Component final : public Configurable {
   void configure() override;
   void cleanup() override;
 
-  /// `make_fsm` makes another instance of the same fsm, for when the shell is replaced alone. [setup]
-  void set_parts(Parts parts, FsmFactory make_fsm = {});
+  /// [setup]
+  void set_parts(Parts parts);
   void set_settings(const TaskSettings& settings);
   /// The core that takes over after a fault, without a word from anybody. [setup]
   void set_fallback(std::unique_ptr<CoreBase> core);
@@ -294,7 +293,6 @@ class Component final : public Configurable {
   /// Throws Error: unknown_port.
   PortBase& require_port(const std::string& name) const;
   /// Whether an fsm of the present kind can be made once more. [non-rt]
-  const FsmFactory& fsm_factory() const noexcept { return fsm().factory(); }
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
   /// Throws Error: unknown_property, type_mismatch, out_of_range; once configured structural_property,
@@ -353,6 +351,8 @@ class Component final : public Configurable {
   /// Retires the parts that a probation which has ended has put out, beside this thread or at once. [non-rt], the component
   /// claimed.
   void settle_probation(bool at_once = false) noexcept;
+  /// It takes the place of one whose core on probation hangs: that was its last probation. [setup]
+  void begin_with(ProbationRecord last) { last_probation_ = std::move(last); }
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 
@@ -382,6 +382,11 @@ class Component final : public Configurable {
   /// Cleans up and configures anew a parked component, whatever its state; STOPPED then. [non-rt]
   /// Throws Error: already_running; what configure throws: it is UNCONFIGURED then.
   void configure_anew();
+  /// New instances of its parts, of the declared core where the fallback is in force; nullptr: another one cannot be made. [non-rt],
+  /// by who has claimed it; parked
+  Parts another() const;
+  /// Another instance of its fallback core; nullptr: none was declared, or it cannot be made. [non-rt], claimed
+  std::unique_ptr<CoreBase> another_fallback() const;
 
  private:
   friend class PartsChange;

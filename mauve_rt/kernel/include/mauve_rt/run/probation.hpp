@@ -19,6 +19,8 @@
 namespace mauve {
 
 class Component;
+class CoreBase;
+class FsmBase;
 class PartsChange;
 class PortBase;
 struct FaultNote;
@@ -66,6 +68,7 @@ enum class ProbationCause : std::uint8_t {
   replaced,       // inconclusive: another change of the component's parts was taken
   fell_back,  // inconclusive: the new core faulted, which on_fault did not watch, and the fallback core took over
   ended,      // inconclusive: the component was cleaned up or removed, or its host was shut down
+  hung,       // reverted: a state of the new core does not end, and the old core goes on by another thread
 };
 
 /// One probation as anyone may see it.
@@ -95,8 +98,11 @@ struct ProbationRecord {
 ///   wait, at the same position and pending instant. The next release is the old core's. The value that breaks a limit is not
 ///   written: consumers keep the one before.
 /// - A state that does not end for as long as counts as hung (StateAge::hung_after_ns), when somebody looks
-///   (Host::settle_probations()): the component is FAULTED with safe outputs, and the verdict is reverted. When the state ends after
-///   all, the old core goes in as after a fault. A core that executes when its time is over is not decided upon before that.
+///   (Host::settle_probations()): the component is FAULTED with safe outputs, and the verdict is reverted. The old core then goes on
+///   by another thread, from the next instant of the grid on: in a component of the same name, with new instances of shell and
+///   fsm, which replaces the one that hangs. Its thread is left behind, its ports closed. Where no other instance can be made, the
+///   old core goes in when the state ends after all, as after a fault. A core that executes when its time is over is not decided
+///   upon before that.
 /// - A request, in the wait that it comes in, or in the next one; of a parked component at once.
 /// A new fsm is on probation together with a new core, as an fsm is mostly compiled for the class of its core. "The old core"
 /// above and below is then the old fsm and core, which go back in as one. The place is kept both ways, so these are refused when
@@ -129,11 +135,12 @@ struct ProbationRecord {
 /// | fsms in parts_    | [setup]; who settles, the component claimed | anyone, by Component::fsm() | present_fsm_: component.hpp |
 /// | kept_             | the change that made it, then who settles | same                | the component's claim                |
 /// | begin_ns_, end_ns_| who takes                                 | anyone              | phase_                               |
-/// | ended_ns_, cause_ | who ends it                               | anyone              | phase_                               |
+/// | ended_ns_, cause_, hung_for_ns_ | who ends it                 | anyone              | phase_                               |
 /// | found_ ...        | the component's thread, or who is parked for it | anyone, once ended | phase_                          |
 /// | releases_         | the component's thread                    | anyone              | relaxed: a lone number               |
 /// | is_requested_     | requesters                                | component's thread  | release/acquire                      |
-/// | request_          | requesters                                | anyone              | request_mutex_                       |
+/// | request_, left_out_ | requesters; who brings the old core back | anyone             | request_mutex_                       |
+/// | is_comeback_claimed_ | who settles                            | who settles         | relaxed: a lone flag                 |
 /// | the rest          | [setup]                                   | anyone              | -                                    |
 class Probation : public std::enable_shared_from_this<Probation> {
  public:
@@ -175,6 +182,17 @@ class Probation : public std::enable_shared_from_this<Probation> {
   bool is_reverted() const MAUVE_RT { return phase() == kReverted; }
   /// Ends it when its time is over. Whether it has ended. [non-rt]
   bool conclude_if_over() noexcept;
+  /// Where a state of the new core does not end: takes the old core out, and ends it as reverted; the thread that hangs puts nothing
+  /// back any more. nullptr: it has done so before, or the probation has ended. [non-rt]
+  std::unique_ptr<CoreBase> take_over() noexcept;
+  /// Whether that is done, or about to be. [rt]
+  bool is_taken_over() const MAUVE_RT;
+  /// The first caller is to bring the old core back of one that hangs. [non-rt]
+  bool claim_comeback() noexcept;
+  /// That failed. [non-rt]
+  void note_left_out(const std::string& why);
+  /// The fsm that is to run with the old core. [non-rt], while it has not ended
+  const FsmBase& old_fsm() const noexcept;
   /// Has the parts that are out from now on. [non-rt], once the change is completed.
   void keep(std::unique_ptr<PartsChange> parts) noexcept;
   /// Lets go of what refers to it and gives away the parts that are out. [non-rt], once it has ended.
@@ -201,6 +219,7 @@ class Probation : public std::enable_shared_from_this<Probation> {
   };
 
   bool is_executing() noexcept;
+  bool reverts_hang() const noexcept { return options_.on_fault || options_.on_overrun; }
   Phase phase() const MAUVE_RT { return static_cast<Phase>(phase_.load(std::memory_order_acquire)); }
   bool is_watched() const MAUVE_RT;
   void find(const Found& found) MAUVE_RT;
@@ -231,8 +250,11 @@ class Probation : public std::enable_shared_from_this<Probation> {
   std::uint32_t fault_where_{0};
   std::atomic<std::int64_t> releases_{0};
   std::atomic<bool> is_requested_{false};
+  std::atomic<bool> is_comeback_claimed_{false};
   mutable std::mutex request_mutex_;
   std::string request_{};
+  std::string left_out_{};  // why the old core does not go on
+  time_ns_t hung_for_ns_{0};
 };
 
 }  // namespace mauve

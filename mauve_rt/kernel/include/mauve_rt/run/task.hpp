@@ -418,6 +418,7 @@ class Task final : public Waiter {
   void put_back_in_wait(Probation& probation) noexcept;
   bool leaves_core_to_change() noexcept;
   bool note_fault_on_probation() noexcept;
+  bool is_taken_over() noexcept;
   bool put_back_after_fault(bool has_taken_change) noexcept;
   void publish_state(ComponentState state) MAUVE_RT;
   void tell_over_declared() MAUVE_RT;

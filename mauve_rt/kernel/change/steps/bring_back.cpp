@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The old core of one whose core on probation hangs goes on: the component that hangs leaves with its thread, and another one of its
+// name comes, with that core, and with new instances of shell and fsm. In no table: nobody asks for it by name.
+#include "change/steps/step_kind.hpp"
+
+namespace mauve {
+
+namespace {
+
+template <typename Part>
+std::unique_ptr<Part> another(const std::string& component, const Part& part) {
+  std::unique_ptr<Part> made = part.another();
+  if (made != nullptr) return made;
+  throw Error(ErrorCode::prepare_failed, "no other instance of the part can be made",
+              {.component = component, .element = part.description()});
+}
+
+}  // namespace
+
+constexpr StepKind steps::bring_back{
+    .name = "bring_back",
+    .element = "core",
+    .is_structural = true,
+    .draft = [](Draft& draft, TransactionStep& step) {
+      const auto hung = draft.architecture().hold_component(step.target);
+      const auto probation = hung->present_probation();
+      if (probation == nullptr || !hung->task().is_given_up_on_probation()) {
+        throw Error(ErrorCode::wrong_revision, "no core of the component hangs on probation",
+                    {.component = step.target});
+      }
+      const Wires wires = draft.touch(step.target).wires;
+      draft.remove_component(step.target);
+      DraftComponent& added = draft.add_component(step.target, hung->task().settings());
+      Component& component = *added.component;
+      component.allow(hung->alternatives(), hung->is_reconfigurable());
+      if (auto fallback = hung->another_fallback()) component.set_fallback(std::move(fallback));
+      added.fresh.shell = another(step.target, hung->shell());
+      added.fresh.fsm = another(step.target, probation->old_fsm());
+      added.wires = wires;
+      for (const ShownProperty& property : hung->shown().properties)
+        draft.set_property(added, property.name, property.value);
+      added.runs = !hung->task().is_to_stop();
+      added.clock_ns = hung->task().grid().reference_ns;
+      added.fresh.core = probation->take_over();
+      if (added.fresh.core == nullptr) {
+        throw Error(ErrorCode::wrong_revision, "the state has ended meanwhile, and the old core is back",
+                    {.component = step.target});
+      }
+      component.begin_with(probation->record());
+    }};
+
+}  // namespace mauve
