@@ -214,8 +214,7 @@ void TransactionCommit::Work::settle_place(Change& change) {
     if (change.parts->has_probation()) {
       renew_fallback(change);
       component.keep_probation(std::move(change.parts));
-    } else if (!component.fallback_implementation().empty()) {  // the core that is out may be the next spare
-      change.parts->retire();
+    } else if (!component.fallback_implementation().empty()) {
       renew_fallback(change);
     }
   }

@@ -98,6 +98,12 @@ void Component::dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bo
       [own = architecture->find_component(name_), parts = std::move(parts)]() mutable { parts.reset(); });
 }
 
+void Component::dispose(const std::string& what, std::function<void()> work) {
+  Architecture* const architecture = architecture_.load(std::memory_order_acquire);
+  if (architecture == nullptr) return work();
+  architecture->dispose(what + " of " + description(), std::move(work));
+}
+
 void Component::configure() {
   const auto change = join_change();
   Configurable::configure();

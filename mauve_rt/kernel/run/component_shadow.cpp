@@ -23,7 +23,7 @@ void Component::settle_shadow() noexcept {
   if (shadow == nullptr || !shadow->has_ended()) return;
   task_.forget_shadow(*shadow);
   shadow->detach();
-  shadow->retire();
+  if (shadow->begin_retirement()) dispose("cleanup of the shadow", [shadow] { shadow->retire(); });
 }
 
 }  // namespace mauve

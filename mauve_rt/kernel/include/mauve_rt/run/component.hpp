@@ -408,6 +408,8 @@ class Component final : public Configurable {
   void update_listening(const FsmBase& fsm);
   void prepare_fallback();
   void dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bool at_once) noexcept;
+  /// Runs hooks of parts that are out, which no change waits for; `what` is "cleanup of the shadow".
+  void dispose(const std::string& what, std::function<void()> work);
   /// As a change: another one may look at the core that is in.
   void put_back_parked(Probation& probation);
   /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.

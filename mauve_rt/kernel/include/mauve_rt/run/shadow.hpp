@@ -102,6 +102,7 @@ struct ShadowParts {
 /// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
 /// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
+/// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
 ///
 /// The component's thread takes neither mutex, but in virtual time, where there is one thread.
@@ -143,6 +144,8 @@ class Shadow {
   bool run_pending() noexcept;
   /// Cleans the candidate's parts up once it has ended, unless a state of it executes. May be called again. [non-rt]
   void retire() noexcept;
+  /// Whether nobody settles it by now: one who settles it has it retired, the shadow's own thread does so besides. [rt], any thread
+  bool begin_retirement() MAUVE_RT { return !is_settled_.exchange(true, std::memory_order_relaxed); }
 
   // ---- changes
 
@@ -191,6 +194,7 @@ class Shadow {
 
   std::atomic<std::uint32_t> phase_{kPrepared};
   std::atomic<time_ns_t> executing_since_ns_{0};
+  std::atomic<bool> is_settled_{false};
   time_ns_t begin_ns_{0};
   time_ns_t ended_ns_{0};
   ShadowCause cause_{ShadowCause::none};
