@@ -19,6 +19,14 @@ if(MAUVE_SANITIZE)
   target_compile_options(mauve_sanitizers INTERFACE
     ${_level} -g1 -fsanitize=${MAUVE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(mauve_sanitizers INTERFACE -fsanitize=${MAUVE_SANITIZE})
+  # GCC collects its garbage from 128 MB on, which is a tenth of the time of a sanitized unit. With 4 GB of memory for each
+  # processor it need not: a unit then takes 1.7 GB instead of 1.2 GB.
+  cmake_host_system_information(RESULT _memory_mib QUERY TOTAL_PHYSICAL_MEMORY)
+  cmake_host_system_information(RESULT _processors QUERY NUMBER_OF_LOGICAL_CORES)
+  math(EXPR _needed_mib "4096 * ${_processors}")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND _memory_mib GREATER_EQUAL _needed_mib)
+    target_compile_options(mauve_sanitizers INTERFACE --param=ggc-min-expand=1000 --param=ggc-min-heapsize=800000)
+  endif()
 endif()
 
 # mauve_write_units(<variable> <name> <batch> <sources>...): write units of at most <batch> sources; <variable> is their list.
