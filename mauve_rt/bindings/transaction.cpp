@@ -147,10 +147,11 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
            "Refused while a port is connected to it.")
       .def("start", collected(&Transaction::start), py::arg("component"), py::arg("clock_ns") = std::nullopt)
       .def("stop", collected(&Transaction::stop), py::arg("component"))
-      .def("configure", collected(&Transaction::configure), py::arg("component"),
-           R"(Cleans up and configures anew one that is not running; it is STOPPED then, a fault is forgotten.
+      .def(
+          "configure", collected(&Transaction::configure), py::arg("component"),
+          R"(Gives one that is not running new instances of its parts; it is STOPPED then, a fault is forgotten.
 
-Its hooks run before the commit; where they refuse, it is UNCONFIGURED.)")
+They take nothing over from the present parts.)")
       .def("resynchronise", collected(&Transaction::resynchronise),
            R"(A new common epoch, 20 ms after the commit.
 

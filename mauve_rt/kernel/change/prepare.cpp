@@ -141,7 +141,7 @@ void TransactionCommit::Work::prepare_removed(DraftComponent& removed) {
 /// New instances of its parts are configured in the place of those that are in: nothing that is in is touched. Whether they can be
 /// made.
 bool TransactionCommit::Work::make_anew(DraftComponent& changed) {
-  if (!changed.component->is_configured()) return false;
+  if (!changed.component->is_configured() || changed.core_unready) return false;
   Parts others = changed.component->another();
   Parts& fresh = changed.fresh;
   const bool has_core = fresh.core != nullptr || changed.promoted != nullptr;

@@ -51,8 +51,10 @@ TEST_F(FactoriesInFlight, OfTheRegistryChangeNothing) {
 }
 
 TEST_F(FactoriesInFlight, OfAProgramsFsmChangeNothing) {
-  architecture.add_component("c", std::make_unique<TestShell>(), std::make_unique<TestCore>(),
-                             std::make_unique<TestFsm>(), {}, [] { return std::unique_ptr<FsmBase>{}; });
+  auto fsm = std::make_unique<TestFsm>();
+  fsm->set_factory([] { return std::unique_ptr<FsmBase>{}; });
+  architecture.add_component("c", std::make_unique<TestShell>(), std::make_unique<TestCore>(), std::move(fsm),
+                             {});
   deploy();
   expect_refused(
       [&] { deployer.commit(std::move(Transaction().replace_shell("c", std::make_unique<TestShell>()))); },

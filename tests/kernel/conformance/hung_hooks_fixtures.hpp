@@ -203,8 +203,7 @@ class HookCase : public Hosted<Way>, public ::testing::WithParamInterface<Hook> 
     settings.cpus = {kComponentsCpu};
     settings.hung_after_ns = s_to_ns(600);
     Component& added = this->architecture.add_component(
-        name, make_shell(), std::make_unique<TrapCore>(its_trap), std::make_unique<TrapFsm>(), settings,
-        [] { return std::make_unique<TrapFsm>(); });
+        name, make_shell(), std::make_unique<TrapCore>(its_trap), new_part<FsmBase, TrapFsm>(), settings);
     added.set_property("period_ms", std::int64_t{2});
     return added;
   }

@@ -134,6 +134,33 @@ def test_a_dry_run_prepares_and_changes_nothing(counting: Stage):
         counting.deployer.commit(steps, expected_revision=revision)
 
 
+def test_a_configure_that_fails_changes_nothing(counting: Stage):
+    class Picky(CountCore):
+        fails = False
+
+        def configure(self) -> None:
+            if Picky.fails:
+                raise RuntimeError("the calibration file is gone")
+            super().configure()
+
+    counting.deployer.commit(Transaction().replace_core("count", Picky))
+    counting.deployer.stop("count")
+    component = counting.architecture.component("count")
+    core = component.core
+    Picky.fails = True
+    with pytest.raises(MauveError, match="the calibration file is gone"):
+        counting.deployer.commit(Transaction().configure("count").start("count"))
+    assert (component.state, component.core) == ("STOPPED", core)
+    counting.deployer.start("count")
+    count = core.count
+    counting.until(lambda: core.count > count)
+    counting.deployer.stop("count")
+    Picky.fails = False
+    counting.deployer.commit(Transaction().configure("count").start("count"))
+    assert component.core is not core
+    counting.until(lambda: component.core.count > 1)
+
+
 def test_a_resource_in_python_comes_and_goes(counting: Stage):
     class Bell(Resource):
         rung = 0

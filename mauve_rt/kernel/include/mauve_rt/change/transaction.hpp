@@ -171,9 +171,9 @@ class Transaction {
   /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.
   Transaction& start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
   Transaction& stop(const std::string& component);
-  /// Cleans up and configures anew a component that is not running; it is STOPPED then, a fault is forgotten. Its hooks
-  /// run before the commit, on its present parts, with the properties that the transaction sets. Where another step is
-  /// refused it is in its state of before; where its own hooks refuse, it is UNCONFIGURED.
+  /// Gives a component that is not running new instances of its parts (ComponentPart::another()), configured with the properties
+  /// that the transaction sets; it is STOPPED then, a fault is forgotten. They take nothing over from the present parts. Where
+  /// another instance cannot be made, the hooks run on the present parts before the commit: where these refuse, it is UNCONFIGURED.
   Transaction& configure(const std::string& component);
   /// A new common epoch: the commit's instant + 20 ms. Every running component goes on in its place, all its instants
   /// later by the same, less than a period, so that they lie on the new epoch's grid; one that has no period is left
