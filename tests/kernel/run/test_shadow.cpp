@@ -496,6 +496,7 @@ TYPED_TEST(Shadows, WhatCannotBeShadowedIsRefused) {
   EXPECT_EQ(ErrorCode::invalid_argument, this->code_of([&] { shadowed(0, std::make_unique<TestShell>()); }));
   EXPECT_EQ(ErrorCode::type_mismatch,
             this->code_of([&] { shadowed(kBudget, std::make_unique<OtherShell>()); }));
+  this->architecture.component("c").shell().set_factory({});
   EXPECT_EQ(ErrorCode::prepare_failed, this->code_of([&] { shadowed(kBudget, nullptr); }));
   EXPECT_EQ(ErrorCode::not_running,
             this->code_of([&] { asked([](Transaction& change) { change.promote("c"); }); }));
