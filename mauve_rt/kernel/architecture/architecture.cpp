@@ -147,6 +147,7 @@ void Architecture::bring_back(Component& hung) {
 
 void Architecture::settle_probations() noexcept {
   for (const auto& component : components()) {
+    const bool is_probation_over = component->is_probation_over();  // it gives up one that hangs
     const auto probation = component->present_probation();
     if (probation != nullptr && probation->claim_comeback())
       comebacks_.take("the comeback of the old core of " + component->description(),
@@ -154,7 +155,7 @@ void Architecture::settle_probations() noexcept {
     const auto shadow = component->last_shadow();
     if (shadow != nullptr) shadow->conclude_if_hung(component->task().state_age().hung_after_ns);
     const bool has_shadow_ended = shadow != nullptr && shadow->is_to_settle();
-    if (!component->is_probation_over() && !has_shadow_ended) continue;
+    if (!is_probation_over && !has_shadow_ended) continue;
     ChangeMark& mark = component->change_mark();
     const bool is_reverted = component->is_probation_reverted();
     {
