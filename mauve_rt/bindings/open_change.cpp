@@ -23,6 +23,9 @@ void bind_open_change(py::module_& module) {
       .def_property_readonly(
           "phase", [](const OpenChangeFacts& self) { return std::string(to_string(self.phase)); },
           "preparing, waiting (for its components to agree) or made.")
+      .def_readonly("hook", &OpenChangeFacts::hook,
+                    "The hook of a part that it is at: `configure of core my_robot/Pid`; empty: at none.")
+      .def_readonly("hook_age_ns", &OpenChangeFacts::hook_age_ns, "For how long.")
       .def_readonly("instant_ns", &OpenChangeFacts::instant_ns, "T; 0: it is not decided.")
       .def_readonly(
           "late", &OpenChangeFacts::late,

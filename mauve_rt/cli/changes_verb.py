@@ -44,13 +44,13 @@ def main(args: argparse.Namespace) -> int:
 def change_lines(reply: Any, executor: str) -> Iterator[str]:
     """What a ListChanges reply says, in words."""
     from mauve_rt.cli.views import duration  # noqa: PLC0415
-    from mauve_rt.control.open_changes import done_with, in_state  # noqa: PLC0415 - it loads messages
+    from mauve_rt.control.open_changes import done_with, in_hook, in_state  # noqa: PLC0415 - it loads messages
     from mauve_rt.interfaces.changes import PHASES  # noqa: PLC0415
 
     for change in reply.changes:
         phase = PHASES.get(change.phase, str(change.phase))
         by = f" by {change.author}" if change.author else ""
-        yield f"{phase}, begun {duration(change.age_ns)} ago{by}: {'; '.join(change.steps)}"
+        yield f"{phase}, begun {duration(change.age_ns)} ago{by}: {'; '.join(change.steps)}{in_hook(change)}"
         for late in change.late:
             yield f"  late: {late.name} has not {done_with(phase)} the change, {in_state(late)}"
     if reply.cleanup:

@@ -42,7 +42,7 @@ def long_ones(changes: Sequence["OpenChange"], now_ns: int) -> Iterator[str]:
             continue
         by = f" of {change.author}" if change.author else ""
         if not change.late:
-            yield f"the change{by} is {change.phase}"
+            yield f"the change{by} is {change.phase}{in_hook(change)}"
         for late in change.late:
             yield f"late: {late.name} has not {done_with(change.phase)} the change{by}, {in_state(late)}"
 
@@ -50,6 +50,11 @@ def long_ones(changes: Sequence["OpenChange"], now_ns: int) -> Iterator[str]:
 def done_with(phase: str) -> str:
     """What a component has yet to do with a change: `agreed to` or `taken`."""
     return "agreed to" if phase == "waiting" else "taken"
+
+
+def in_hook(change: Any) -> str:
+    """`, in configure of core my_robot/Pid for 3.2 s`; of a change of the kernel, or a message OpenChange."""
+    return f", in {change.hook} for {change.hook_age_ns / 1e9:.3g} s" if change.hook else ""
 
 
 def in_state(late: Any) -> str:

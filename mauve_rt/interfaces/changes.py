@@ -27,6 +27,8 @@ def open_change_message(change: OpenChangeFacts, now_ns: int) -> Any:
         age_ns=max(now_ns - change.begun_ns, 0),
         phase=_NUMBERS[change.phase],
         instant_ns=change.instant_ns,
+        hook=cut(change.hook, MAX_TEXT),
+        hook_age_ns=change.hook_age_ns,
         late=[
             LateComponent(
                 name=late.name,

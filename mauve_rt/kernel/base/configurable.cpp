@@ -2,11 +2,13 @@
 #include "mauve_rt/base/configurable.hpp"
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/running_hook.hpp"
 
 namespace mauve {
 
 void Configurable::configure() {
   if (configured_) return;
+  const RunningHook running("configure", description());
   try {
     if (!configure_hook()) {
       throw Error(
@@ -25,6 +27,7 @@ void Configurable::cleanup() {
   if (!configured_) return;
   check_cleanup();
   configured_ = false;
+  const RunningHook running("cleanup", description());
   try {
     cleanup_hook();
   } catch (

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <thread>
 #include <vector>
 
 #include "mauve_rt/change/transaction_commit.hpp"
@@ -27,7 +28,7 @@ namespace mauve {
 /// | lists_ ... services_  | who asked, before the commit   | who publishes, once | the gate's mutex                   |
 /// | reports_              | who asked, then who settles    | who asked | reports_mutex_, from the commit on           |
 /// | commit_, touched_     | who asked, before the commit   | who tells of it | facts_mutex_                           |
-/// | step_texts_, author   | who asked                      | who tells of it | before the architecture keeps it       |
+/// | step_texts_, author, thread_ | who asked               | who tells of it | before the architecture keeps it       |
 /// | begun_ns_             | who asked, who commits a prepared one | who tells of it | relaxed: a lone number          |
 /// | is_armed_             | who prepared, who commits      | who tells of it | release/acquire: begun_ns_             |
 class TransactionCommit::Work final : public std::enable_shared_from_this<TransactionCommit::Work>,
@@ -187,6 +188,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
       actions_;  // in the order they are taken in; the new parts come after
   StateGuard guard_;
   std::vector<std::string> step_texts_;
+  const std::thread::id thread_{std::this_thread::get_id()};  // that asked
   std::atomic<time_ns_t> begun_ns_{0};
   std::atomic<bool> is_armed_{false};  // prepared, and not being committed
   bool is_prepared_{false};            // for a prepared transaction, which lets go of it if it is not made

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/running_hook.hpp"
 
 #include "change/work.hpp"
 
@@ -279,6 +280,11 @@ void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
                         .steps = step_texts_,
                         .begun_ns = begun_ns_.load(std::memory_order_relaxed)};  // relaxed: is_armed_
   const std::lock_guard lock(facts_mutex_);
+  if (commit_ == nullptr) {
+    RunningHook::Facts running = RunningHook::of(thread_);
+    facts.hook = std::move(running.hook);
+    if (running.since_ns != 0) facts.hook_age_ns = monotonic_now_ns() - running.since_ns;
+  }
   const CutWord cut = commit_ != nullptr ? commit_->look() : CutWord{};
   if (commit_ != nullptr && !cut.is_off()) {
     const bool is_made = cut.is_closed();

@@ -129,6 +129,8 @@ TEST_F(OpenChangeBeside, AHungPreparationAndAHeldChangeLockKeepNobodyFromTheList
   const auto open = host().open_changes();
   ASSERT_THAT(open, SizeIs(1));
   EXPECT_EQ(OpenChangePhase::preparing, open.front().phase);
+  EXPECT_THAT(open.front().hook, ::testing::StartsWith("configure of core"));
+  EXPECT_LT(0, open.front().hook_age_ns);
   EXPECT_THAT(open.front().late, IsEmpty());
   EXPECT_EQ(ErrorCode::not_running, refusal([&] { host().abandon("b"); }).code()) << "it ends with its hook";
   locked.open = true;

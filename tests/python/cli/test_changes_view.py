@@ -29,10 +29,16 @@ def test_a_change_its_late_components_and_the_way_out_are_told() -> None:
         phase=OpenChange.MADE,
         late=[arm, gone],
     )
+    preparing = OpenChange(
+        steps=["replace_core d my/Pid"],
+        phase=OpenChange.PREPARING,
+        hook="configure of core my/Pid",
+        hook_age_ns=2 * SECOND,
+    )
     waiting = OpenChange(
         steps=["stop c"], age_ns=SECOND, phase=OpenChange.WAITING, late=[LateComponent(name="c")]
     )
-    assert list(change_lines(ListChanges.Response(changes=[made, waiting]), NODE)) == [
+    assert list(change_lines(ListChanges.Response(changes=[made, waiting, preparing]), NODE)) == [
         "made, begun 4 s ago by rule slow_arm: start a; stop b",
         "  late: arm has not taken the change, in state Move for 3.2 s",
         (
@@ -41,6 +47,7 @@ def test_a_change_its_late_components_and_the_way_out_are_told() -> None:
         ),
         "waiting, begun 1 s ago: stop c",
         "  late: c has not agreed to the change, in no state",
+        "preparing, begun 0 s ago: replace_core d my/Pid, in configure of core my/Pid for 2 s",
         f"to end it: mauve changes {NODE} --abandon arm",
         f"to end it: mauve changes {NODE} --abandon c",
     ]
@@ -57,7 +64,14 @@ def test_a_cleanup_that_lasts_is_told() -> None:
 @pytest.mark.parametrize("phase", PHASES.values())
 def test_a_change_of_the_kernel_becomes_a_message(phase: str) -> None:
     facts = SimpleNamespace(
-        author="mauve", steps=["stop arm"], begun_ns=5, phase=phase, instant_ns=7, late=[LATE]
+        author="mauve",
+        steps=["stop arm"],
+        begun_ns=5,
+        phase=phase,
+        instant_ns=7,
+        hook="",
+        hook_age_ns=0,
+        late=[LATE],
     )
     message = open_change_message(facts, 9)  # type: ignore[arg-type]
     assert (PHASES[message.phase], message.author, message.age_ns, message.instant_ns) == (
@@ -74,4 +88,15 @@ def test_only_a_change_that_is_open_for_long_is_told_in_diagnostics() -> None:
     assert list(long_ones([change], 11 * SECOND)) == []  # type: ignore[list-item]
     assert list(long_ones([change], 12 * SECOND)) == [  # type: ignore[list-item]
         "late: arm has not taken the change of rule r, in state Move for 3.2 s"
+    ]
+    hangs = SimpleNamespace(
+        author="",
+        phase="preparing",
+        begun_ns=0,
+        late=[],
+        hook="configure of core my/Pid",
+        hook_age_ns=2 * SECOND,
+    )
+    assert list(long_ones([hangs], 2 * SECOND)) == [  # type: ignore[list-item]
+        "the change is preparing, in configure of core my/Pid for 2 s"
     ]

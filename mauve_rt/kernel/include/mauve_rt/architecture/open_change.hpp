@@ -38,7 +38,9 @@ struct OpenChangeFacts {
   std::vector<std::string> steps{};  // in words
   time_ns_t begun_ns{0};             // when it was asked for, on the host's clock
   OpenChangePhase phase{OpenChangePhase::preparing};
-  time_ns_t instant_ns{0};  // T; 0: it is not decided
+  std::string hook{};  // the hook of a part that it is at: "configure of core my_robot/Pid"; empty: at none
+  time_ns_t hook_age_ns{0};  // for how long
+  time_ns_t instant_ns{0};   // T; 0: it is not decided
   std::vector<LateComponent>
       late{};  // made: the components that have not taken it; waiting: those that have not agreed
 };

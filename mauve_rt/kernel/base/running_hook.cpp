@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/base/running_hook.hpp"
+
+#include <map>
+#include <mutex>
+#include <utility>
+
+namespace mauve {
+
+namespace {
+
+/// Of all threads that execute one. It outlives static objects, whose parts may be cleaned up at the end of the process.
+struct Running {
+  std::mutex mutex;
+  std::map<std::thread::id, RunningHook::Facts> hooks;
+};
+Running& running() {
+  static auto* const all = new Running;
+  return *all;
+}
+
+}  // namespace
+
+RunningHook::RunningHook(const char* name, const std::string& part)
+    : outer_{.hook = std::string(name) + " of " + part, .since_ns = monotonic_now_ns()} {
+  Running& all = running();
+  const std::lock_guard lock(all.mutex);
+  std::swap(outer_, all.hooks[std::this_thread::get_id()]);
+}
+
+RunningHook::~RunningHook() {
+  Running& all = running();
+  const std::lock_guard lock(all.mutex);
+  if (outer_.hook.empty()) {
+    all.hooks.erase(std::this_thread::get_id());
+  } else {
+    all.hooks[std::this_thread::get_id()] = std::move(outer_);
+  }
+}
+
+RunningHook::Facts RunningHook::of(std::thread::id thread) {
+  Running& all = running();
+  const std::lock_guard lock(all.mutex);
+  const auto found = all.hooks.find(thread);
+  return found != all.hooks.end() ? found->second : Facts{};
+}
+
+}  // namespace mauve

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/running_hook.hpp"
+
+namespace mauve::testing::test_running_hook {
+
+std::string own() { return RunningHook::of(std::this_thread::get_id()).hook; }
+
+struct Inner : Configurable {
+  bool configure_hook() override {
+    seen = own();
+    return true;
+  }
+  std::string description() const override { return "inner"; }
+  std::string seen{};
+};
+
+struct Outer : Configurable {
+  bool configure_hook() override {
+    before = own();
+    inner.configure();
+    after = own();
+    const std::thread::id thread = std::this_thread::get_id();
+    std::thread([&] {
+      other = own();
+      seen_by_other = RunningHook::of(thread).hook;
+    }).join();
+    return true;
+  }
+  void cleanup_hook() override {
+    cleaning = own();
+    throw 1;
+  }
+  std::string description() const override { return "outer"; }
+  Inner inner;
+  std::string before{}, after{}, other{}, seen_by_other{}, cleaning{};
+};
+
+TEST(RunningHook, IsTheInnermostOfItsThread) {
+  Outer outer;
+  outer.configure();
+  EXPECT_EQ("configure of outer", outer.before);
+  EXPECT_EQ("configure of inner", outer.inner.seen);
+  EXPECT_EQ("configure of outer", outer.after);
+  EXPECT_EQ("", outer.other);
+  EXPECT_EQ("configure of outer", outer.seen_by_other);
+  EXPECT_EQ("", own());
+  outer.cleanup();
+  EXPECT_EQ("cleanup of outer", outer.cleaning);
+  EXPECT_EQ("", own()) << "after one that throws";
+  EXPECT_EQ(0, RunningHook::of(std::this_thread::get_id()).since_ns);
+}
+
+}  // namespace mauve::testing::test_running_hook
