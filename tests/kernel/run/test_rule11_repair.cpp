@@ -155,6 +155,18 @@ TYPED_TEST(Rule11Repaired, OrAsItWasWhereItsPartsCannotBeConfiguredAnew) {
   this->until([&] { return picky.core_as<TestCore>().runs >= 3; });
 }
 
+TYPED_TEST(Rule11Repaired, OrUnconfiguredWherePartsThatAreObjectsFail) {
+  Picky::breaks = false;
+  const Component& own = this->architecture.add_component(
+      "own", std::make_unique<TestShell>(), std::make_unique<Picky>(), std::make_unique<TestFsm>(), {});
+  Picky::fails = true;
+  EXPECT_THROW(this->commit(std::move(Transaction().configure("own"))), Error);
+  Picky::fails = false;
+  EXPECT_EQ(ComponentState::unconfigured, own.task().state());
+  this->commit(std::move(Transaction().configure("own").start("own")));
+  EXPECT_EQ(ComponentState::running, own.task().state());
+}
+
 TYPED_TEST(Rule11Repaired, NotByAPropertyNorByAStart) {
   Transaction set;
   set.set_property("c", "gain", 2.0);
