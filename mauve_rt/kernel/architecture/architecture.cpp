@@ -11,7 +11,6 @@
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/prefault.hpp"
-#include "change/steps/step_kind.hpp"
 #include "parts/lookup.hpp"
 
 namespace mauve {
@@ -137,7 +136,7 @@ void Architecture::bring_back(Component& hung) {
   constexpr time_ns_t kEarlierChanges = s_to_ns(5);
   const auto probation = hung.present_probation();
   Transaction change;
-  change.add(steps::bring_back, hung.name()).by("probation");
+  change.bring_back(hung.name()).by("probation");
   try {
     make(std::move(change), {.timeouts = {.commit_ns = kEarlierChanges}});
   } catch (const Error& failure) {

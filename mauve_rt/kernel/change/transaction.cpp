@@ -97,6 +97,9 @@ Transaction& Transaction::start(const std::string& component, std::optional<time
   return add(steps::start, component, {}, clock_ns ? StepValue(PropertyValue(*clock_ns)) : StepValue{});
 }
 Transaction& Transaction::stop(const std::string& component) { return add(steps::stop, component); }
+Transaction& Transaction::bring_back(const std::string& component) {
+  return add(steps::bring_back, component);
+}
 Transaction& Transaction::configure(const std::string& component) { return add(steps::configure, component); }
 Transaction& Transaction::resynchronise() { return add(steps::resynchronise, {}); }
 

@@ -125,6 +125,9 @@ class Transaction {
   Transaction& shadow(const std::string& component, const std::string& implementation, ShadowOptions options);
   Transaction& shadow(const std::string& component, std::unique_ptr<CoreBase> core, ShadowOptions options,
                       std::unique_ptr<Shell> shell = nullptr);
+  /// Of one whose core on probation hangs: the old core goes on by another thread, in a component that takes its place (probation.hpp).
+  /// The architecture asks for it by itself.
+  Transaction& bring_back(const std::string& component);
   /// Ends the component's shadow; without a shadow there is nothing to do.
   Transaction& end_shadow(const std::string& component);
   /// Replaces the live core by the candidate of the component's shadow, which keeps its own state: nothing is handed over.
@@ -151,11 +154,11 @@ class Transaction {
                              std::unique_ptr<CoreBase> fallback = nullptr);
   template <typename ShellType, typename CoreType, typename FsmType>
   Transaction& add_component(const std::string& name, const ComponentParts& rest = {}) {
-    return add_component(std::move(name),
+    return add_component(name,
                          Parts{.shell = new_part<Shell, ShellType>(),
                                .core = new_part<CoreBase, CoreType>(),
                                .fsm = new_part<FsmBase, FsmType>()},
-                         std::move(rest));
+                         rest);
   }
   /// It is parked, its outputs written as on a stop, its ports disconnected.
   Transaction& remove_component(const std::string& name);

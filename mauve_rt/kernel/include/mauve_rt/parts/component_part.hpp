@@ -21,6 +21,7 @@ class ComponentPart : public ConfigurablePart {
  public:
   using Factory = std::function<std::unique_ptr<Base>()>;
 
+  /// [setup]
   void set_implementation(std::string name) { implementation_ = std::move(name); }
   /// package/Class [rt]
   const std::string& implementation() const MAUVE_RT { return implementation_; }
@@ -38,6 +39,9 @@ class ComponentPart : public ConfigurablePart {
   }
 
  private:
+  friend Base;
+  ComponentPart() = default;
+
   std::string implementation_;
   Factory make_{};
 };
