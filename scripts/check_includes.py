@@ -66,6 +66,8 @@ UPWARD = {
     ("include/mauve_rt/architecture/architecture.hpp", "mauve_rt/change/transaction.hpp"),
     ("run/component.cpp", "mauve_rt/architecture/architecture.hpp"),
     ("run/component.cpp", "mauve_rt/change/transaction_commit.hpp"),
+    ("run/component_fallback.cpp", "mauve_rt/architecture/architecture.hpp"),
+    ("run/component_fallback.cpp", "mauve_rt/architecture/plugin.hpp"),
 }
 
 # Examples and benchmarks see the kernel as any user does: by the door and by headers of storeys.

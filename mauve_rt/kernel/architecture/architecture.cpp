@@ -18,6 +18,8 @@ namespace mauve {
 namespace {
 
 constexpr time_ns_t kEndTimeout = ms_to_ns(500);
+/// How long a request waits for the cleanup of what it has put out.
+constexpr time_ns_t kCleanup = s_to_ns(1);
 
 /// Until the process ends, and beyond the end of static objects.
 template <typename Objects>
@@ -38,22 +40,32 @@ std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, c
 
 }  // namespace
 
-Architecture::Architecture(PluginRegistry* registry) : registry_(registry) {
+Architecture::Architecture(PluginRegistry* registry)
+    : registry_(registry), presence_(std::make_shared<ArchitecturePresence>()) {
+  presence_->architecture = this;
   note_allocated_before();  // whatever comes after may be what its components own
 }
 
 Architecture::~Architecture() {
   comebacks_.wait(0, kForever);  // it is a change of this architecture
-  const bool have_ended = end_threads();
+  keeper_.wait(0, monotonic_now_ns() + kEndTimeout);
+  {
+    const std::unique_lock gone(presence_->mutex);
+    presence_->architecture = nullptr;
+  }
+  // A fallback core whose configure hangs uses shell, fsm and resources of its component.
+  const bool have_ended = end_threads() && presence_->renewals.load(std::memory_order_acquire) == 0;
   std::erase_if(open_, [](const auto& change) { return change->settle(); });
   if (!have_ended || !open_.empty()) {
-    // A thread that does not come back from its state is left behind with all it may use: nothing of that is freed.
+    // A thread that does not come back from user code is left behind with all it may use: nothing of that is freed.
     for (const auto& resource : lists_.resources) resource->set_notifier(nullptr);
     keep_for_ever(std::move(lists_.resources));
     for (const Leaving& leaving : leaving_) leaving.component->task().detach_thread();
     keep_for_ever(std::move(leaving_));
     auto& components = lists_.components;
-    const auto has_ended = [](const auto& component) { return component->task().has_ended(); };
+    const auto has_ended = [](const auto& component) {
+      return component->task().has_ended() && !component->is_renewing();
+    };
     const auto first = std::partition(components.begin(), components.end(), has_ended);
     std::for_each(first, components.end(), [](const auto& component) { component->task().detach_thread(); });
     keep_for_ever(std::vector<std::shared_ptr<Component>>(first, components.end()));
@@ -71,6 +83,7 @@ void Architecture::configure() {
 }
 
 void Architecture::cleanup() {
+  wait_disposed(0);  // a component is not cleaned up while its fallback core is being made ready
   const auto change = change_lock_.join_alone();
   Configurable::cleanup();
 }
@@ -91,14 +104,24 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
   return work;
 }
 
-void Architecture::dispose(const std::string& what, std::function<void()> work) {
+bool Architecture::disposes_beside(const void* lane) const {
   const Runner* const runner = host();
-  if (runner == nullptr || runner->is_simulated()) return work();
-  keeper_.take(what, std::move(work));
+  if (runner != nullptr && !runner->is_simulated()) return true;
+  return lane != nullptr &&
+         keeper_.is_at(lane);  // of a host that has gone: it may use what is to be cleaned up
+}
+
+void Architecture::dispose(const std::string& what, std::function<void()> work, const void* lane) {
+  if (!disposes_beside(lane)) return work();
+  dispose_beside(what, std::move(work), lane);
+}
+
+void Architecture::dispose_beside(const std::string& what, std::function<void()> work, const void* lane) {
+  keeper_.take(what, std::move(work), lane);
 }
 
 void Architecture::wait_disposed(std::uint64_t first) const {
-  keeper_.wait(first, later_by(monotonic_now_ns(), s_to_ns(1)));
+  keeper_.wait(first, later_by(monotonic_now_ns(), kCleanup));
 }
 
 TransactionReport Architecture::commit(Transaction transaction, const TransactionOptions& options) {
@@ -149,8 +172,9 @@ void Architecture::settle_probations() noexcept {
     const bool is_probation_over = component->is_probation_over();  // it gives up one that hangs
     const auto probation = component->present_probation();
     if (probation != nullptr && probation->claim_comeback())
-      comebacks_.take("the comeback of the old core of " + component->description(),
-                      [this, component] { bring_back(*component); });
+      comebacks_.take(
+          "the comeback of the old core of " + component->description(),
+          [this, component] { bring_back(*component); }, component.get());
     const auto shadow = component->last_shadow();
     if (shadow != nullptr) shadow->conclude_if_hung(component->task().state_age().hung_after_ns);
     const bool has_shadow_ended = shadow != nullptr && shadow->is_to_settle();
@@ -485,6 +509,7 @@ bool Architecture::configure_hook() {
 
 void Architecture::check_cleanup() const {
   for (const auto& component : components()) {
+    component->check_renewed();
     if (component->task().is_parked()) continue;
     throw Error(ErrorCode::already_running, "the component still executes a state",
                 {.component = component->name(),

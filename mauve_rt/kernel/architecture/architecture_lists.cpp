@@ -35,6 +35,7 @@ std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) 
   const std::lock_guard lock(trace_mutex_);
   Task& task = made->task();
   if (task.number() < finals_.size()) task.set_first_record(finals_[task.number()].written);
+  made->set_self(made);
   return made;
 }
 
@@ -107,8 +108,9 @@ void Architecture::reap() {
   }
   for (const Leaving& leaving : ended) {
     for (const auto& port : leaving.component->shell().ports()) port->disconnect();
-    dispose("cleanup of the removed " + leaving.component->description(),
-            [component = leaving.component] { component->cleanup(); });
+    dispose(
+        "cleanup of the removed " + leaving.component->description(),
+        [component = leaving.component] { component->cleanup(); }, leaving.component->lane());
     if (leaving.was_listed) retire_trace(leaving.component->task());
   }
   {

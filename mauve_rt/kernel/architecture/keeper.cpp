@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/architecture/keeper.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 namespace mauve {
@@ -18,44 +24,41 @@ struct Keeper::State {
   struct Work {
     std::string what;
     std::function<void()> call;
+    std::uint64_t number;  // of all that came, from 1 on
+  };
+  /// It is there while its thread is.
+  struct Lane {
+    std::deque<Work> works{};
+    Busy busy{};
+    std::uint64_t at{0};  // the number of what it does now; 0: nothing
+    std::thread::id thread{};
+
+    std::uint64_t oldest() const noexcept { return at != 0 || works.empty() ? at : works.front().number; }
   };
   std::mutex mutex;
   std::condition_variable changed;
-  std::deque<Work> works;
-  Busy busy;
+  std::map<const void*, Lane> lanes;
   std::uint64_t taken{0};
-  std::uint64_t done{0};
-  bool is_to_end{false};
 };
 
 Keeper::Keeper() : state_(std::make_shared<State>()) {}
 
-Keeper::~Keeper() {
-  if (!thread_.joinable()) return;
-  const time_ns_t until_ns = monotonic_now_ns() + kEnd;
-  wait(0, until_ns);
-  bool is_over = false;
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->is_to_end = true;
-    is_over = state_->taken == state_->done;
-  }
-  state_->changed.notify_all();
-  if (is_over) {
-    thread_.join();
-  } else {
-    thread_.detach();
-  }
+Keeper::~Keeper() { wait(0, monotonic_now_ns() + kEnd); }
+
+void Keeper::take(std::string what, std::function<void()> work, const void* lane) {
+  const std::lock_guard lock(state_->mutex);
+  const auto [place, is_new] = state_->lanes.try_emplace(lane);
+  State::Lane& its = place->second;
+  its.works.push_back({.what = std::move(what), .call = std::move(work), .number = ++state_->taken});
+  if (!is_new) return;
+  std::thread thread(&Keeper::run, state_, lane);
+  its.thread = thread.get_id();
+  thread.detach();  // it ends with the work of its lane, and owns what it uses
 }
 
-void Keeper::take(std::string what, std::function<void()> work) {
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->works.push_back({.what = std::move(what), .call = std::move(work)});
-    ++state_->taken;
-    if (!thread_.joinable()) thread_ = std::thread(&Keeper::run, state_);
-  }
-  state_->changed.notify_all();
+bool Keeper::is_at(const void* lane) const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->lanes.contains(lane);
 }
 
 std::uint64_t Keeper::taken() const {
@@ -66,29 +69,37 @@ std::uint64_t Keeper::taken() const {
 void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   std::unique_lock lock(state_->mutex);
   const std::uint64_t taken = state_->taken;
-  if (thread_.get_id() == std::this_thread::get_id()) return;
-  while (state_->done < taken) {
-    const time_ns_t now_ns = monotonic_now_ns();
-    const time_ns_t since_ns = state_->busy.since_ns;
-    const bool is_anothers = state_->done < first && since_ns != 0 && now_ns - since_ns > kAnothers;
-    if (now_ns >= until_ns || is_anothers) return;
+  const auto is_awaited = [&](const auto& each) {
+    const State::Lane& lane = each.second;
+    if (lane.oldest() == 0 || lane.oldest() > taken) return false;
+    const bool is_anothers = lane.at != 0 && lane.at <= first;
+    return !is_anothers || monotonic_now_ns() - lane.busy.since_ns <= kAnothers;
+  };
+  const auto is_own = [](const auto& each) { return each.second.thread == std::this_thread::get_id(); };
+  const auto& lanes = state_->lanes;
+  if (std::any_of(lanes.begin(), lanes.end(), is_own)) return;
+  while (monotonic_now_ns() < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited))
     state_->changed.wait_for(lock, std::chrono::milliseconds(20));
-  }
 }
 
 Keeper::Busy Keeper::busy() const {
   const std::lock_guard lock(state_->mutex);
-  return state_->busy;
+  Busy longest;
+  for (const auto& [key, lane] : state_->lanes) {
+    if (lane.at == 0 || (longest.since_ns != 0 && longest.since_ns <= lane.busy.since_ns)) continue;
+    longest = lane.busy;
+  }
+  return longest;
 }
 
-void Keeper::run(const std::shared_ptr<State>& state) {
+void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
   std::unique_lock lock(state->mutex);
-  for (;;) {
-    state->changed.wait(lock, [&] { return state->is_to_end || !state->works.empty(); });
-    if (state->works.empty()) return;
-    State::Work work = std::move(state->works.front());
-    state->works.pop_front();
-    state->busy = {.what = std::move(work.what), .since_ns = monotonic_now_ns()};
+  State::Lane& its = state->lanes.at(lane);
+  while (!its.works.empty()) {
+    State::Work work = std::move(its.works.front());
+    its.works.pop_front();
+    its.at = work.number;
+    its.busy = {.what = std::move(work.what), .since_ns = monotonic_now_ns()};
     lock.unlock();
     try {
       work.call();
@@ -96,10 +107,12 @@ void Keeper::run(const std::shared_ptr<State>& state) {
     }
     work.call = nullptr;  // what it held goes here, not under the mutex
     lock.lock();
-    state->busy = {};
-    ++state->done;
+    its.busy = {};
+    its.at = 0;
     state->changed.notify_all();
   }
+  state->lanes.erase(lane);
+  state->changed.notify_all();
 }
 
 }  // namespace mauve

@@ -6,6 +6,7 @@
 
 #include "base/prefault.hpp"
 #include "change/work.hpp"
+#include "run/preview.hpp"
 
 namespace mauve {
 
@@ -27,44 +28,12 @@ void set_all(Shell& shell, const std::map<std::string, DraftProperty>& propertie
   }
 }
 
-/// While it lives the calling thread finds the properties and the wiring of a shell as they will be.
-class Preview {
- public:
-  Preview() = default;
-  ~Preview() {
-    for (PropertyBase* property : properties_) property->end_preview();
-    for (PortBase* port : ports_) port->end_preview();
-  }
-  Preview(const Preview&) = delete;
-  Preview& operator=(const Preview&) = delete;
-
-  void begin(const Shell& shell, const DraftComponent& draft) {
-    // An urgent change may set any of those that are in meanwhile: this one is refused then, but may read no half of a value.
-    if (&shell == &draft.component->shell()) {
-      for (const ShownProperty& shown : draft.component->shown().properties)
-        preview(shell, shown.name, shown.value);
-    }
-    for (const auto& [name, property] : draft.properties) preview(shell, name, property.value);
-    for (const auto& port : shell.ports()) {
-      const auto wire = draft.wires.find(port->name());
-      const bool is_wired = wire != draft.wires.end();
-      ports_.push_back(port.get());
-      port->preview(is_wired ? port->prepare(*wire->second.service, wire->second.resource)
-                             : PortConnection{});
-    }
-  }
-
- private:
-  void preview(const Shell& shell, const std::string& name, const PropertyValue& value) {
-    PropertyBase* const property = shell.find_property(name);
-    if (property == nullptr) return;
-    properties_.push_back(property);
-    property->preview(value);
-  }
-
-  std::vector<PropertyBase*> properties_;
-  std::vector<PortBase*> ports_;
-};
+/// An urgent change may set any of the properties that are in meanwhile: this change is refused then.
+void begin_preview(Preview& preview, const Shell& shell, const DraftComponent& draft) {
+  if (&shell == &draft.component->shell()) preview.set(shell, draft.component->shown().properties);
+  for (const auto& [name, property] : draft.properties) preview.set(shell, name, property.value);
+  preview.wire(shell, draft.wires);
+}
 
 void restore_state(Component& component, ComponentState before, FaultNote& fault) {
   component.show();  // it was configured with what would have been
@@ -162,11 +131,12 @@ bool TransactionCommit::Work::make_anew(DraftComponent& changed) {
 void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
   Component& component = *changed.component;
   if (!architecture_.is_configured() || make_anew(changed) || options_.dry_run) return;
+  component.check_renewed();
   draft_->hold(changed);
   ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
   component.task().swap_fault(before.fault);
   Preview preview;
-  preview.begin(component.shell(), changed);
+  begin_preview(preview, component.shell(), changed);
   component.configure_anew();
   configured_anew_.push_back(std::move(before));
   changed.state = ComponentState::stopped;
@@ -223,7 +193,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
                                                             std::move(*draft.probation)));
   }
   Preview preview;
-  preview.begin(change.parts->shell(), draft);
+  begin_preview(preview, change.parts->shell(), draft);
   change.parts->prepare();
   if (const Handover* handover = change.parts->handover()) {
     StepReport& report = reports_[static_cast<std::size_t>(draft.core_step - 1)];
@@ -316,7 +286,8 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   if (task.is_parked()) {
     for (const auto& port : component->shell().ports()) port->disconnect();
     if (component->is_configured()) component->update_listening();
-    architecture_.dispose("cleanup of " + component->description(), [component] { component->cleanup(); });
+    architecture_.dispose(
+        "cleanup of " + component->description(), [component] { component->cleanup(); }, component->lane());
   }
   if (!ended) {
     architecture_.keep_until_ended(component, was_listed);

@@ -389,11 +389,10 @@ void TransactionCommit::Work::set_epoch() {
 void TransactionCommit::Work::renew_fallback(Change& change) {
   Component& component = *change.draft->component;
   const bool is_outdated = change.parts->restarts() || change.draft->sets_structural();
-  // The core that is out may be the next spare: it is cleaned up first. A core that is on probation may need the old one yet.
-  const CoreBase* const out = change.parts->has_probation() ? nullptr : change.parts->core();
-  const bool is_spare = out != nullptr && out->implementation() == component.fallback_implementation();
-  if (is_spare) change.parts->retire();
-  component.renew_fallback_if_needed(is_spare ? change.parts->give_back_core() : nullptr, is_outdated);
+  // The core that is out may be the next spare. A core that is on probation may need the old one yet.
+  std::shared_ptr<PartsChange> out;
+  if (!change.parts->has_probation()) out = std::move(change.parts);
+  component.renew_fallback(std::move(out), is_outdated);
 }
 
 /// A shadow that begins has the properties that the same change sets.

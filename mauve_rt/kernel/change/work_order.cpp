@@ -212,12 +212,9 @@ void TransactionCommit::Work::settle_place(Change& change) {
   }
   if (has_taken && change.parts != nullptr) {
     component.settle_probation();  // the take has ended it
-    if (change.parts->has_probation()) {
-      renew_fallback(change);
-      component.keep_probation(std::move(change.parts));
-    } else if (!component.fallback_implementation().empty()) {
-      renew_fallback(change);
-    }
+    const bool has_probation = change.parts->has_probation();
+    if (!component.fallback_implementation().empty()) renew_fallback(change);
+    if (has_probation) component.keep_probation(std::move(change.parts));
   }
   dispose(change);
   const auto is_its = [&](const auto& action) { return action->task == &component.task(); };
@@ -235,7 +232,8 @@ void TransactionCommit::Work::dispose(Change& change) {
   std::shared_ptr<PartsChange> parts = std::move(change.parts);
   architecture_.dispose(
       "cleanup of parts of " + change.draft->component->description(),
-      [component = change.draft->component, parts = std::move(parts)]() mutable { parts.reset(); });
+      [component = change.draft->component, parts = std::move(parts)]() mutable { parts.reset(); },
+      change.draft->component->lane());
 }
 
 void TransactionCommit::Work::note_handover(const Change& change) {

@@ -136,20 +136,25 @@ void PortBase::disconnect() noexcept {
 }
 
 void PortBase::preview(const PortConnection& connection) {
-  stand_in_ = make_stand_in();
-  stand_in_->set_context(context_);
-  stand_in_->attach(connection.service, nullptr);
-  stand_in_->connection_ = connection;
-  previewer_.store(pthread_self(), std::memory_order_relaxed);
+  auto stand_in = make_stand_in();
+  stand_in->set_context(context_);
+  stand_in->attach(connection.service, nullptr);
+  stand_in->connection_ = connection;
+  end_preview();
+  stand_ins_.begin() = std::move(stand_in);
+  const std::lock_guard lock(
+      shown_mutex_);  // another thread's preview may end: the bit stays while there is one
   set_special(kPreviewed, kPreviewed);
 }
 
 void PortBase::end_preview() noexcept {
-  set_special(kPreviewed, 0);
-  previewer_.store(kNobody, std::memory_order_relaxed);
-  if (stand_in_ == nullptr) return;
-  stand_in_->attach(nullptr, nullptr);
-  stand_in_.reset();
+  std::unique_ptr<PortBase>* const own = stand_ins_.find();
+  if (own == nullptr) return;
+  if (*own != nullptr) (*own)->attach(nullptr, nullptr);
+  own->reset();
+  const std::lock_guard lock(shown_mutex_);
+  stand_ins_.end();
+  if (!stand_ins_.is_any()) set_special(kPreviewed, 0);
 }
 
 ConnectedTo PortBase::connected_to() const {

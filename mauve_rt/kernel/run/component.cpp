@@ -41,14 +41,16 @@ void Component::leave_architecture() noexcept {
 
 class Component::JoinedChange {
  public:
-  JoinedChange(Architecture* architecture, const Task& task, ChangeMark& mark) {
+  JoinedChange(Architecture* architecture, Component& component) {
     if (architecture == nullptr) return;
     lock_ = architecture->change_lock().join();
     if (!lock_.owns_lock()) return;  // a part of a change, which has claimed what it touches
     CommitGate& commits = architecture->commit_gate();
+    ChangeMark& mark = component.change_mark_;
     architecture->wait_for_earlier(kEarlierChange, [&] {
       const CommitGate::Look table(commits);
-      if (mark.is_claimed() || commits.has_open_about(task)) return EarlierChange::under_way;
+      if (mark.is_claimed() || commits.has_open_about(component.task_) || component.is_renewing())
+        return EarlierChange::under_way;
       if (mark.is_unsettled()) return EarlierChange::late;
       mark.claim();
       mark.hold();
@@ -73,7 +75,7 @@ class Component::JoinedChange {
 };
 
 Component::JoinedChange Component::join_change() {
-  return {architecture_.load(std::memory_order_acquire), task_, change_mark_};
+  return {architecture_.load(std::memory_order_acquire), *this};
 }
 
 Architecture& Component::require_listed() const {
@@ -84,18 +86,6 @@ Architecture& Component::require_listed() const {
 void Component::put_back_parked(Probation& probation) {
   const auto change = join_change();
   task_.put_back_parked(probation);
-}
-
-/// Where the core that is out may be the next fallback it is cleaned up at once.
-void Component::dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bool at_once) noexcept {
-  Architecture* const architecture = architecture_.load(std::memory_order_acquire);
-  if (at_once || architecture == nullptr || !fallback_name_.empty()) {
-    parts->retire();
-    return renew_fallback_if_needed(parts->give_back_core(), is_outdated);
-  }
-  architecture->dispose(
-      "cleanup of parts of " + description(),
-      [own = architecture->find_component(name_), parts = std::move(parts)]() mutable { parts.reset(); });
 }
 
 void Component::dispose(const std::string& what, std::function<void()> work) {
@@ -123,11 +113,6 @@ void Component::set_parts(Parts parts) {
   declared_core_ = parts_.core->implementation();
   core_name_.store(TraceNames::intern(declared_core_), std::memory_order_relaxed);
   show();
-}
-
-void Component::set_fallback(std::unique_ptr<CoreBase> core) {
-  fallback_name_ = core->implementation();
-  fallback_core_ = std::move(core);
 }
 
 ShownParts Component::shown() const {
@@ -474,57 +459,6 @@ bool Component::configure_hook() {
   return true;
 }
 
-/// The fallback is ready with the component: at the time of a fault nothing is left to be built.
-void Component::prepare_fallback() {
-  if (fallback_core_ == nullptr) return;
-  fallback_ =
-      std::make_unique<PartsChange>(*this, Parts{.shell = {}, .core = std::move(fallback_core_), .fsm = {}});
-  fallback_->be_fallback();
-  spare_ = fallback_->core();
-  fallback_->prepare();
-  task_.set_fallback(fallback_.get());
-}
-
-void Component::check_fallback(const Shell& shell, const FsmBase& fsm) const {
-  if (spare_ == nullptr) return;
-  const std::unique_ptr<CoreBase> rebuilt = rebuilt_core(*spare_);  // renew_fallback() puts it in
-  CoreBase& core = rebuilt != nullptr ? *rebuilt : *spare_;
-  if (core.accepts(shell) && fsm.bind_core(core).is_bound()) return;
-  throw Error(ErrorCode::type_mismatch, "the fallback core would not suit the new parts",
-              {.component = name_,
-               .element = "fallback " + fallback_name_,
-               .expected = "a core for " + shell.description() + " and " + fsm.description(),
-               .remedy = "remove the component and add one with another fallback, in one transaction"});
-}
-
-void Component::renew_fallback(std::unique_ptr<CoreBase> out) {
-  task_.set_fallback(nullptr);
-  spare_ = nullptr;
-  if (fallback_ != nullptr && !fallback_->was_taken()) out = fallback_->give_back_core();
-  fallback_.reset();
-  if (out == nullptr || fallback_name_.empty() || out->implementation() != fallback_name_) return;
-  out->cleanup();
-  if (auto rebuilt = rebuilt_core(*out)) out = std::move(rebuilt);
-  fallback_core_ = std::move(out);
-  prepare_fallback();
-  if (task_.has_thread()) prefault_allocated();
-}
-
-std::unique_ptr<CoreBase> Component::rebuilt_core(const CoreBase& core) const {
-  const PluginRegistry* registry = require_listed().registry();
-  if (registry == nullptr) return nullptr;
-  const int generation = registry->generation_of("core", core.implementation());
-  if (generation == 0 || generation == core.generation()) return nullptr;
-  return registry->make_core(core.implementation());
-}
-
-bool Component::has_outdated_fallback() const {
-  const PluginRegistry* registry = require_listed().registry();
-  if (registry == nullptr || spare_ == nullptr) return false;
-  const int generation = registry->generation_of("core", fallback_name_);
-  return generation != 0 && generation != spare_->generation();
-}
-
 void Component::update_listening(const FsmBase& fsm) {
   for (const auto& state : fsm.states()) {
     if (state->event == nullptr) continue;
@@ -545,17 +479,16 @@ Parts Component::another() const {
   return {.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
 }
 
-std::unique_ptr<CoreBase> Component::another_fallback() const {
-  return spare_ != nullptr ? spare_->another() : nullptr;
-}
-
 void Component::configure_anew() {
   require_parked("configure");
   cleanup();
   configure();
 }
 
-void Component::check_cleanup() const { require_parked("cleanup"); }
+void Component::check_cleanup() const {
+  require_parked("cleanup");
+  check_renewed();
+}
 
 void Component::cleanup_hook() {
   conclude_probation();

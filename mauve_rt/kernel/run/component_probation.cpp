@@ -89,15 +89,4 @@ bool Component::revert_probation(const std::string& reason, time_ns_t timeout_ns
                             "the old core goes in when the state ends");
 }
 
-void Component::renew_fallback_if_needed(std::unique_ptr<CoreBase> out, bool is_outdated) noexcept {
-  if (!is_configured() || fallback_name_.empty()) return;
-  try {
-    if (!is_outdated && !has_outdated_fallback() &&
-        (out == nullptr || out->implementation() != fallback_name_))
-      return;
-    renew_fallback(std::move(out));
-  } catch (...) {  // it cannot be configured anew; the change itself is in
-  }
-}
-
 }  // namespace mauve

@@ -67,6 +67,11 @@ Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
 
 Task::~Task() { end_thread(kForever); }
 
+void Task::retract_fallback() noexcept {
+  fallback_.exchange(nullptr, std::memory_order_acq_rel);
+  while (is_falling_back_.load(std::memory_order_acquire)) std::this_thread::yield();
+}
+
 void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
   shell_.store(&shell, std::memory_order_release);
   core_ = core;

@@ -190,9 +190,14 @@ void Task::end_in_fault() noexcept {
   if (is_violation && put_back_after_fault(has_new_parts)) return;
   write_outputs(false);
   const bool stays = has_new_parts || !machine_.is_started() || is_to_stop() || is_taken_over();
+  is_falling_back_.store(true, std::memory_order_relaxed);  // relaxed: the exchange publishes it
   CommitAction* const fallback = stays ? nullptr : fallback_.exchange(nullptr, std::memory_order_acq_rel);
   // One that was renewed while an fsm on probation went out was made ready for that fsm.
-  if (fallback == nullptr || !fallback->adopt()) return park(ComponentState::faulted);
+  const bool falls_back = fallback != nullptr && fallback->adopt();
+  if (!falls_back) {
+    is_falling_back_.store(false, std::memory_order_release);
+    return park(ComponentState::faulted);
+  }
   // Not parked in between: nobody may take parts away that are put in this moment.
   publish_state(ComponentState::faulted);
   settle_slot();
@@ -203,6 +208,7 @@ void Task::end_in_fault() noexcept {
 void Task::fall_back(CommitAction& fallback) noexcept {
   fallback.take();
   machine_.trace(TraceKind::reconfiguration, fallback.trace_id(), kTake, 0);
+  is_falling_back_.store(false, std::memory_order_release);
   for (const auto& port : shell()->ports()) port->reopen();
   regain_priority();
   start_machine(next_instant());

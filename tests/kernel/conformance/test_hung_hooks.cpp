@@ -20,18 +20,13 @@ struct Gap {
 };
 constexpr const char* kClaimed =
     "a preparation that hangs keeps its claim of the component, and cannot be abandoned";
-constexpr const char* kLocked = "a fallback core is made ready for another fsm with the change lock held";
 constexpr const char* kStructure =
     "a preparation that adds a component claims the structure, so that others add, remove and connect "
     "nothing";
-constexpr std::array<Gap, 7> kGaps{{
+constexpr std::array<Gap, 3> kGaps{{
     {Hook::configure, "ARemovalIsMade", kClaimed},
     {Hook::configure_added, "ARemovalIsMade", kStructure},
     {Hook::configure_added, "AStructuralChangeOfOthersIsMade", kStructure},
-    {Hook::fallback, "ARemovalIsMade", kLocked},
-    {Hook::fallback, "ACommittedRuleIsCompleted", kLocked},
-    {Hook::fallback, "AnotherChangeIsMade", kLocked},
-    {Hook::fallback, "AStructuralChangeOfOthersIsMade", kLocked},
 }};
 
 std::vector<std::string> names_of(const std::vector<LateComponent>& components) {

@@ -62,6 +62,18 @@ enum class EarlierChange : std::uint8_t {
   late,       // one is made, and a component has not taken it yet
 };
 
+/// The architecture, for work that may outlive it: whoever holds the mutex finds it alive, or gone.
+///
+/// | member       | written by       | read by | under                                     |
+/// | ------------ | ---------------- | ------- | ----------------------------------------- |
+/// | architecture | its end          | anyone  | mutex, shared by readers: no user code    |
+/// | renewals     | who renews       | its end | acq_rel: what a renewal did before it ended |
+struct ArchitecturePresence {
+  std::shared_mutex mutex;
+  Architecture* architecture;
+  std::atomic<int> renewals{0};  // of fallback cores, that are not over
+};
+
 /// Each is claimed by one change at a time.
 struct ArchitectureClaims {
   bool structure{false};  // to add or remove something, or wire ports
@@ -280,7 +292,13 @@ class Architecture final : public Configurable {
   /// A change is made that is to be settled. [rt]
   void note_open() MAUVE_RT { has_open_.store(true, std::memory_order_relaxed); }  // relaxed: a hint
   /// Has what was put out cleaned up, in user code: beside all changes where threads run, else at once. [non-rt]
-  void dispose(const std::string& what, std::function<void()> work);
+  /// `lane`: Component::lane() of the component whose parts it is about.
+  void dispose(const std::string& what, std::function<void()> work, const void* lane = nullptr);
+  /// Beside all changes, whether threads run or not. [non-rt]
+  void dispose_beside(const std::string& what, std::function<void()> work, const void* lane);
+  /// Whether dispose() would do so. [non-rt]
+  bool disposes_beside(const void* lane = nullptr) const;
+  const std::shared_ptr<ArchitecturePresence>& presence() const noexcept { return presence_; }
   /// What that does now, and since when. [non-rt]
   Keeper::Busy disposing() const { return keeper_.busy(); }
   /// How much was given to that by now. [non-rt]
@@ -342,6 +360,7 @@ class Architecture final : public Configurable {
   std::vector<std::shared_ptr<Resource>> retiring_;
   std::vector<Leaving> leaving_;
   Lists lists_;
+  std::shared_ptr<ArchitecturePresence> presence_;
   Keeper keeper_;  // first to end but for the one that changes: it cleans up what others had
   Keeper comebacks_;
 };

@@ -2,23 +2,19 @@
 // Keeper: what changes have put out goes here, and is cleaned up by a thread that nobody waits for without an end.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
 
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
 
-/// One ordinary thread, made for the first work. The hooks that clean a part up are user code: one that hangs costs the memory of
-/// what comes after it, and holds no change, no rule and no shutdown. All functions [non-rt].
+/// Ordinary threads, one for each lane that has work. The hooks that clean a part up are user code: one that hangs costs the memory
+/// of what comes after it in its lane, and holds no change, no rule, no shutdown and no other lane. All functions [non-rt].
 ///
-/// All members of State are written and read under its mutex; the thread owns it too, as it may outlive the keeper.
+/// All members of State are written and read under its mutex; the threads own it too, as they may outlive the keeper.
 class Keeper {
  public:
   /// What it does now, and since when.
@@ -28,26 +24,28 @@ class Keeper {
   };
 
   Keeper();
-  /// Waits a little for what is left, then leaves the thread to itself, with all that it holds.
+  /// Waits a little for what is left, then leaves the threads to themselves, with all that they hold.
   ~Keeper();
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  /// Has this done, after all that came before. `what` tells what hangs.
-  void take(std::string what, std::function<void()> work);
+  /// Has this done, after all that came before in the same lane, which any address names. `what` tells what hangs.
+  void take(std::string what, std::function<void()> work, const void* lane = nullptr);
+  /// Whether work of that lane is not done yet.
+  bool is_at(const void* lane) const;
   /// How much has come by now.
   std::uint64_t taken() const;
-  /// Waits until all is done that came before, at most until the instant; hardly, where it is at something that came before the
-  /// caller's own, of which `first` had come before. Not from its own thread.
+  /// Waits until all is done that came before, at most until the instant; hardly, where a lane is at something that came before the
+  /// caller's own, of which `first` had come before. Not from one of its own threads.
   void wait(std::uint64_t first, time_ns_t until_ns) const;
+  /// Of several the one that lasts longest.
   Busy busy() const;
 
  private:
   struct State;
-  static void run(const std::shared_ptr<State>& state);
+  static void run(const std::shared_ptr<State>& state, const void* lane);
 
   std::shared_ptr<State> state_;
-  std::thread thread_;
 };
 
 }  // namespace mauve

@@ -2,8 +2,6 @@
 // What all ports are, whatever they carry: a name, a kind, a type, and one connection that can be exchanged.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <memory>
 #include <span>
@@ -13,9 +11,9 @@
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/previews.hpp"
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/this_thread.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/output_watch.hpp"
 #include "mauve_rt/data/port_cell.hpp"
@@ -54,7 +52,7 @@ struct ConnectedTo {
 /// A port does not know when its service ends: disconnect it before the resource goes.
 ///
 /// special_ says whether a read or a write may be anything but a look at the service: one load tells. Its bits: closed or left
-/// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with previewer_.
+/// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with stand_ins_.
 ///
 /// | member      | written by                     | read by                   | order                                |
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
@@ -66,10 +64,9 @@ struct ConnectedTo {
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
 /// | is_seated_  | swap()                         | same                      | one change at a time                 |
 /// | own_seat_   | the service that gave it       | same, the component       | its own: biased_mutex.hpp            |
-/// | stand_in_   | preview(), end_preview()       | the thread that previews  | that thread's own                    |
+/// | stand_ins_  | preview(), end_preview()       | the thread that previews  | each its own: base/previews.hpp; its bit: shown_mutex_ |
 /// | watch_      | the component's thread; who ends the watch | component            | its own: revocable_reference.hpp     |
 /// | tap_        | the component's thread; who ends the tap | component              | its own: revocable_reference.hpp     |
-/// | previewer_  | the same                       | any                       | relaxed: see is_previewed()          |
 class PortBase {
  public:
   PortBase(std::string name, PortKind kind, std::string type)
@@ -185,14 +182,12 @@ class PortBase {
   bool is_previewed() const noexcept {
     if (!is_special()) [[likely]]
       return false;
-    // Relaxed: only the thread that stored its own id here finds it, and that one has made the stand-in itself.
-    const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
-    return previewer != kNobody && is_this_thread(previewer);
+    return stand_ins_.find() != nullptr;
   }
   /// The port that the previewing thread has in place of this one.
   template <typename Port>
   Port& stand_in() const noexcept {
-    return static_cast<Port&>(*stand_in_);
+    return static_cast<Port&>(**stand_ins_.find());
   }
   std::uint32_t trace_id() const noexcept { return connection_.trace_id; }
   /// Component's logical clock, or the real one outside of any. [rt]
@@ -223,7 +218,6 @@ class PortBase {
   bool keeps_zero() const MAUVE_RT { return has(kClosed); }
 
  private:
-  static constexpr pthread_t kNobody{};  // as glibc never calls a thread
   static constexpr std::uint32_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16;
 
   bool has(std::uint32_t bits) const noexcept {
@@ -244,7 +238,7 @@ class PortBase {
   }
 
   const PortConnection& connection() const noexcept {
-    return is_previewed() ? stand_in_->connection_ : connection_;
+    return is_previewed() ? stand_in<PortBase>().connection_ : connection_;
   }
 
   std::string name_;
@@ -261,8 +255,7 @@ class PortBase {
   bool is_seated_{false};  // has its seat at connection_.service
   RevocableReference<OutputWatch> watch_;
   RevocableReference<PortTap> tap_;
-  std::unique_ptr<PortBase> stand_in_;
-  std::atomic<pthread_t> previewer_{kNobody};
+  Previews<std::unique_ptr<PortBase>> stand_ins_;
 };
 
 }  // namespace mauve

@@ -2,17 +2,14 @@
 // Properties: typed parameters of a shell, with default, unit, description and range.
 #pragma once
 
-#include <pthread.h>
-
-#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "mauve_rt/base/previews.hpp"
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/this_thread.hpp"
 #include "mauve_rt/base/value.hpp"
 
 namespace mauve {
@@ -61,8 +58,7 @@ void check_declaration(const std::string& name, const PropertyValue& initial, co
 /// | member           | written by                                                  | read by            |
 /// |------------------|-------------------------------------------------------------|--------------------|
 /// | the value        | swap(): the component's thread inside a wait, or [setup]    | component's thread |
-/// | the preview      | preview(), end_preview(): who prepares a transaction        | that thread        |
-/// | previewer_       | the same                                                    | anyone             |
+/// | previews_        | preview(), end_preview(): who prepares parts                | each its own: base/previews.hpp |
 /// | name_, options_  | constructor                                                 | anyone             |
 class PropertyBase {
  public:
@@ -84,19 +80,9 @@ class PropertyBase {
   virtual void preview(const PropertyValue& value) = 0;
   virtual void end_preview() noexcept = 0;
 
- protected:
-  void set_previewer(pthread_t thread) noexcept { previewer_.store(thread, std::memory_order_relaxed); }
-  bool is_previewed() const noexcept {
-    // Relaxed: only the thread that stored its own id here finds it, and that one has written the preview itself.
-    const pthread_t previewer = previewer_.load(std::memory_order_relaxed);
-    return previewer != kNobody && is_this_thread(previewer);
-  }
-  static constexpr pthread_t kNobody{};  // as glibc never calls a thread
-
  private:
   std::string name_;
   PropertyOptions options_;
-  std::atomic<pthread_t> previewer_{kNobody};
 };
 
 template <PropertyType T>
@@ -109,7 +95,10 @@ class Property final : public PropertyBase {
   }
 
   /// The value in force since the component last left a wait. [rt]
-  const T& value() const MAUVE_RT { return is_previewed() ? preview_ : value_; }
+  const T& value() const MAUVE_RT {
+    const T* const preview = previews_.find();
+    return preview != nullptr ? *preview : value_;
+  }
   operator const T&() const MAUVE_RT {
     return value();
   }  // NOLINT: reads like the value, as in the paper's listings
@@ -122,18 +111,12 @@ class Property final : public PropertyBase {
     if (T* const other = std::get_if<T>(&value))
       MAUVE_RT_TRUSTED(std::swap(*other, value_));  // texts change places
   }
-  void preview(const PropertyValue& value) override {
-    preview_ = std::get<T>(value);
-    set_previewer(pthread_self());
-  }
-  void end_preview() noexcept override {
-    set_previewer(kNobody);
-    preview_ = {};
-  }
+  void preview(const PropertyValue& value) override { previews_.begin() = std::get<T>(value); }
+  void end_preview() noexcept override { previews_.end(); }
 
  private:
   T value_;
-  T preview_{};
+  Previews<T> previews_;
 };
 
 extern template class Property<bool>;

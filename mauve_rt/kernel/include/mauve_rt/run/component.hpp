@@ -207,6 +207,9 @@ struct ShownParts {
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
+/// | spare_ ... fallback_ | changes and renewals                   | the same            | the claim of the component |
+/// | is_renewing_     | renewals, the component claimed           | anyone              | release/acquire: all that the renewal did |
+/// | self_            | [setup]                                   | any ordinary thread | -                |
 /// | probation_ ... shadow_ | changes, who settles; the component claimed | any ordinary thread | shown_mutex_   |
 /// | the rest         | [setup]                                   | anyone              | -                |
 class Component final : public Configurable {
@@ -367,13 +370,18 @@ class Component final : public Configurable {
   /// Takes a shadow that has ended off the ports, and cleans it up. [non-rt], the component claimed.
   void settle_shadow() noexcept;
 
-  /// After a change of parts: makes the fallback ready for the parts that are in force now. [non-rt]
-  /// `out`: the core that was replaced, which may be the fallback itself.
-  void renew_fallback(std::unique_ptr<CoreBase> out);
-  /// The same where it is of no use any more as it is, or `out` is one of its kind. [non-rt]
-  void renew_fallback_if_needed(std::unique_ptr<CoreBase> out, bool is_outdated) noexcept;
-  /// Whether the code of the fallback was loaded anew since it was made. [non-rt]
-  bool has_outdated_fallback() const;
+  /// After a change of parts: cleans up the parts that are out, and makes the fallback ready for the parts that are in force, where
+  /// it is of no use as it is, or one of its kind is out. Beside changes and the component's thread, where threads run. [non-rt], the
+  /// change lock held, or the component claimed.
+  void renew_fallback(std::shared_ptr<PartsChange> out, bool is_outdated) noexcept;
+  /// Whether the fallback is being made ready. The component can be changed then, and removed, but not be cleaned up in its place. [rt]
+  bool is_renewing() const MAUVE_RT { return is_renewing_.load(std::memory_order_acquire); }
+  /// Throws Error (already_running) while the fallback is being made ready. [non-rt]
+  void check_renewed() const;
+  /// What is done with its parts beside changes is done in this order; nullptr: in any. [non-rt]
+  const void* lane() const noexcept { return fallback_name_.empty() ? nullptr : this; }
+  /// [setup]
+  void set_self(const std::shared_ptr<Component>& self) noexcept { self_ = self; }
 
   /// Brings the event waits' listening in line with the ports' wiring. [non-rt]
   void update_listening() { update_listening(fsm()); }
@@ -406,14 +414,15 @@ class Component final : public Configurable {
   void check_stack(const Shell& shell) const;
   time_ns_t settled_period_ns(const FsmBase& fsm) const;
   void update_listening(const FsmBase& fsm);
+  class FallbackRenewal;
   void prepare_fallback();
+  /// Whether the code of the fallback was loaded anew since it was made.
+  bool has_outdated_fallback() const;
   void dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bool at_once) noexcept;
   /// Runs hooks of parts that are out, which no change waits for; `what` is "cleanup of the shadow".
   void dispose(const std::string& what, std::function<void()> work);
   /// As a change: another one may look at the core that is in.
   void put_back_parked(Probation& probation);
-  /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.
-  std::unique_ptr<CoreBase> rebuilt_core(const CoreBase& core) const;
   void check_fallback(const Shell& shell, const FsmBase& fsm) const;
 
   std::string name_;
@@ -433,6 +442,8 @@ class Component final : public Configurable {
   std::unique_ptr<CoreBase> fallback_core_;  // until it is put in
   std::string fallback_name_;
   std::unique_ptr<PartsChange> fallback_;
+  std::atomic<bool> is_renewing_{false};
+  std::weak_ptr<Component> self_;
 
   mutable std::mutex shown_mutex_;
   ShownParts shown_;

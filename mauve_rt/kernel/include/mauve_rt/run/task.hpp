@@ -93,6 +93,7 @@ struct ChangeSignal {
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
 /// |                        |                                       | times out    |                                    |
 /// | fallback_              | ordinary threads; machine uses it up  | machine      | acq_rel: hands over the action     |
+/// | is_falling_back_       | machine                               | who retracts it | release/acquire: it was put in  |
 /// | probation_             | machine, in a take; who settles it    | machine alone| its own: base/revocable_reference.hpp |
 /// | shadow_                | machine, in a take; who settles it    | machine alone| its own: base/revocable_reference.hpp |
 /// | has_thread_            | commanders                            | anyone       | release/acquire: publishes facts_  |
@@ -126,6 +127,8 @@ class Task final : public Waiter {
   Context& context() MAUVE_RT { return machine_.context(); }
   /// What puts a fallback core in after a fault; nullptr: a fault is the end. [non-rt]
   void set_fallback(CommitAction* fallback) noexcept { fallback_.store(fallback, std::memory_order_release); }
+  /// Takes it back; where the component's thread has begun to put it in, it is in by the return. [non-rt], not on that thread
+  void retract_fallback() noexcept;
   void set_fallen_back(bool fallen_back) noexcept {
     fallen_back_.store(fallen_back, std::memory_order_release);
   }
@@ -466,6 +469,7 @@ class Task final : public Waiter {
   std::atomic<std::uint32_t> outputs_{kAllWritten};
   std::atomic<Participant*> awaiting_release_{nullptr};
   std::atomic<CommitAction*> fallback_{nullptr};
+  std::atomic<bool> is_falling_back_{false};
   std::atomic<bool> fallen_back_{false};
   RevocableReference<Probation> probation_;
   RevocableReference<Shadow> shadow_;
