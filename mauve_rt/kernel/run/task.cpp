@@ -227,9 +227,11 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
     throw_late("the component has yet to take an earlier change; it was not started", "try again");
   require_startable();
   post_start(start_on(clock_ns));
-  if (wait_started(until) || !withdraw_start()) return;
-  throw_late("the component's thread does not get to run; it was not started",
-             "look for a component of equal or higher priority that does not wait");
+  if (wait_started(until)) return;
+  if (withdraw_start())
+    throw_late("the component's thread does not get to run; it was not started",
+               "look for a component of equal or higher priority that does not wait");
+  wait_started(kForever);  // it takes the start up this moment: another one is posted only when it has
 }
 
 void Task::require_startable() const {

@@ -31,6 +31,7 @@ def test_a_change_its_late_components_and_the_way_out_are_told() -> None:
     )
     preparing = OpenChange(
         steps=["replace_core d my/Pid"],
+        age_ns=3 * SECOND,
         phase=OpenChange.PREPARING,
         hook="configure of core my/Pid",
         hook_age_ns=2 * SECOND,
@@ -47,7 +48,7 @@ def test_a_change_its_late_components_and_the_way_out_are_told() -> None:
         ),
         "waiting, begun 1 s ago: stop c",
         "  late: c has not agreed to the change, in no state",
-        "preparing, begun 0 s ago: replace_core d my/Pid, in configure of core my/Pid for 2 s",
+        "preparing, begun 3 s ago: replace_core d my/Pid, in configure of core my/Pid for 2 s",
         f"to end it: mauve changes {NODE} --abandon arm",
         f"to end it: mauve changes {NODE} --abandon c",
     ]
