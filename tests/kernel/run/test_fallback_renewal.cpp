@@ -67,7 +67,15 @@ class FallbackRenewal : public Deployed {
     guarded.spare.hangs = false;
     doors->open = true;
     asked.get();
-    wait_until([&] { return !guarded.component.is_renewing(); }, "the fallback core to be ready");
+    await_ready(guarded);
+  }
+  /// Each change may have asked for a renewal.
+  void await_ready(const Guarded& guarded) {
+    const auto is_ready = [&] {
+      architecture.wait_disposed(0);
+      return architecture.disposing().since_ns == 0 && !guarded.component.is_renewing();
+    };
+    wait_until(is_ready, "the fallback core to be ready");
   }
   void expect_to_fall_back(Guarded& guarded) {
     *fails = true;
@@ -200,7 +208,7 @@ TEST_F(FallbackRenewal, ComesBesideFaultsAndChanges) {
   change.replace_core("c", make_failing());
   if (guarded.component.task().is_parked()) change.start("c");
   commit(change);
-  wait_until([&] { return !guarded.component.is_renewing(); }, "the fallback core to be ready");
+  await_ready(guarded);
   guarded.spare.runs = 0;
   expect_to_fall_back(guarded);
 }
