@@ -225,6 +225,9 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   const std::lock_guard lock(command_mutex_, std::adopt_lock);
   if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until))
     throw_late("the component has yet to take an earlier change; it was not started", "try again");
+  // A change posts a start and goes on: the thread may be taking it up, and reads what the next one would write.
+  if (state() == ComponentState::stopped && !is_parked() && !wait_started(until))
+    throw_late("the component has yet to take up an earlier start; it was not started again", "try again");
   require_startable();
   post_start(start_on(clock_ns));
   if (wait_started(until)) return;
