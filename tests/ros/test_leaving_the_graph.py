@@ -40,7 +40,8 @@ def segments_of(process_id: int | str) -> set[Path]:
 def segments_of_nobody() -> set[Path]:
     """Shared memory of participants that no process has any more."""
     there = {path for path in Path("/dev/shm").glob("fastrtps_*") if SEGMENT.fullmatch(str(path))}  # noqa: S108
-    return there - {used for process in Path("/proc").glob("[0-9]*") for used in segments_of(process.name)}
+    used = {used for process in Path("/proc").glob("[0-9]*") for used in segments_of(process.name)}
+    return {path for path in there - used if path.exists()}  # others' processes end between the looks
 
 
 def is_there(graph: Any, name: str) -> bool:
