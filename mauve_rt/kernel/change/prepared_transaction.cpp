@@ -256,7 +256,7 @@ TransactionReport PreparedTransaction::complete() {
     const std::lock_guard change(state.architecture.change_lock());
     settle();
     note_failure();
-    failure = state.failure;  // whoever settles all changes writes it again, as long as one component is late
+    failure = state.failure;  // written again when changes are settled, as long as one component is late
   }
   state.architecture.wait_disposed(first);
   if (outcome == PreparedOutcome::stale) {

@@ -306,7 +306,7 @@ std::unique_ptr<CoreBase> Probation::take_over() noexcept {
   return core;
 }
 
-/// While one that hangs is on probation nobody else has it end, but a shutdown.
+/// While one that hangs is on probation, only a shutdown ends it besides.
 bool Probation::is_taken_over() const noexcept {
   const Phase now = phase();
   return now == kEnding || (now == kReverted && cause_ == ProbationCause::hung);

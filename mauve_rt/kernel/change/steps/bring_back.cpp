@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The old core of one whose core on probation hangs goes on: the component that hangs leaves with its thread, and another one of its
-// name comes, with that core, and with new instances of shell and fsm. In no table: nobody asks for it by name.
+// name comes, with that core, and with new instances of shell and fsm. In no table: users do not name it.
 #include "change/steps/step_kind.hpp"
 
 namespace mauve {

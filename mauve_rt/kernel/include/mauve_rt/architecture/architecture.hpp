@@ -62,7 +62,7 @@ enum class EarlierChange : std::uint8_t {
   late,       // one is made, and a component has not taken it yet
 };
 
-/// The architecture, for work that may outlive it: whoever holds the mutex finds it alive, or gone.
+/// The architecture, for work that may outlive it: while the mutex is held it stays as it is, alive or gone.
 ///
 /// | member       | written by       | read by | under                                     |
 /// | ------------ | ---------------- | ------- | ----------------------------------------- |

@@ -9,8 +9,8 @@
 
 namespace mauve {
 
-/// While it lives its thread executes a hook of a part, which may hang: whoever tells what a request is at finds it. What the
-/// thread of a component executes is told by its task (Task::state_age()). All functions [non-rt].
+/// While it lives its thread executes a hook of a part, which may hang: an open change reports it. What the thread of a component
+/// executes is in Task::state_age(). All functions [non-rt].
 class RunningHook {
  public:
   struct Facts {
@@ -18,7 +18,7 @@ class RunningHook {
     time_ns_t since_ns{0};  // on the monotonic clock
   };
 
-  /// `name`: "configure", ...; a hook that calls another one is told again when that ends.
+  /// `name`: "configure", ...; a hook that calls another one is the present one again when that ends.
   RunningHook(const char* name, const std::string& part);
   ~RunningHook();
   RunningHook(const RunningHook&) = delete;

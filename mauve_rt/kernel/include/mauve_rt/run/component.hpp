@@ -295,7 +295,6 @@ class Component final : public Configurable {
                         ReadBy replaced = ReadBy::none) const;
   /// Throws Error: unknown_port.
   PortBase& require_port(const std::string& name) const;
-  /// Whether an fsm of the present kind can be made once more. [non-rt]
 
   /// Sets a property: at once before the start, else in the component's next wait. [non-rt]
   /// Throws Error: unknown_property, type_mismatch, out_of_range; once configured structural_property,

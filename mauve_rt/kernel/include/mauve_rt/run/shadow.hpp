@@ -144,7 +144,7 @@ class Shadow {
   bool run_pending() noexcept;
   /// Cleans the candidate's parts up once it has ended, unless a state of it executes. May be called again. [non-rt]
   void retire() noexcept;
-  /// Whether nobody settles it by now: one who settles it has it retired, the shadow's own thread does so besides. [rt], any thread
+  /// True for the first caller, which has it retired; the shadow's own thread retires it as well. [rt], any thread
   bool begin_retirement() MAUVE_RT { return !is_settled_.exchange(true, std::memory_order_relaxed); }
 
   // ---- changes
