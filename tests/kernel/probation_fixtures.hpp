@@ -78,6 +78,15 @@ class Probations : public OnBothHosts<Way> {
     this->host.until([&] { return seen.runs >= runs; }, "the core to run");
   }
   void settle() { (*this->host).settle_probations(); }
+  /// An ordinary thread cleans up, at the last release of the parts: not when the change or its verdict is made.
+  void wait_cleaned(const Seen& seen) {
+    wait_until(
+        [&] {
+          settle();
+          return seen.is_cleaned.load();
+        },
+        "the cleanup");
+  }
   /// A state that lasts beyond its component's next instant.
   static void overrun(Component& component, time_ns_t by_ns = us_to_ns(100)) {
     Task& task = component.task();

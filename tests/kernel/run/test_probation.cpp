@@ -33,7 +33,7 @@ TYPED_TEST(Probations, ACoreWithoutViolationPasses) {
   EXPECT_EQ("", record.reason);
   EXPECT_GE(record.releases, 3);
   EXPECT_GE(record.end_ns, end_ns);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   EXPECT_EQ("t/New", component.core_implementation());
   this->wait_seen(*seen, seen->runs + 3);
   EXPECT_EQ(1U, (*this->host).probations().size());
@@ -74,7 +74,7 @@ TYPED_TEST(Probations, AFaultPutsTheOldCoreBack) {
   EXPECT_EQ("division by zero", component.task().fault().what);
   EXPECT_FALSE(seen->is_cleaned) << "not by the component's own thread";
   this->settle();
-  EXPECT_TRUE(seen->is_cleaned);
+  this->wait_cleaned(*seen);
   EXPECT_EQ(Verdict::reverted, this->record().verdict);
 }
 
@@ -243,13 +243,13 @@ TYPED_TEST(Probations, AnotherCoreEndsItInconclusive) {
   EXPECT_EQ(Verdict::inconclusive, all[0].verdict);
   EXPECT_EQ(Cause::replaced, all[0].cause);
   EXPECT_EQ(Verdict::running, all[1].verdict);
-  EXPECT_TRUE(this->old_seen->is_cleaned) << "the one before it is retired";
+  this->wait_cleaned(*this->old_seen);
   EXPECT_FALSE(first->is_cleaned) << "it is the old core now";
   EXPECT_TRUE((*this->host).revert_probation("c", "", s_to_ns(30)));
   this->wait_seen(*first, first->runs + 2);
   EXPECT_EQ("t/New", component.core_implementation());
   this->settle();
-  EXPECT_TRUE(second->is_cleaned);
+  this->wait_cleaned(*second);
 }
 
 TYPED_TEST(Probations, AnotherFsmEndsItInconclusive) {
@@ -260,7 +260,7 @@ TYPED_TEST(Probations, AnotherFsmEndsItInconclusive) {
   change.replace_fsm("c", std::make_unique<TestFsm>());
   this->host.commit(std::move(change), 0);
   EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   this->wait_seen(*seen, seen->runs + 3);
 }
 
@@ -301,8 +301,8 @@ TYPED_TEST(Probations, AShutdownEndsItInconclusive) {
   EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
   EXPECT_EQ(Cause::ended, this->record().cause);
   this->architecture.cleanup();
-  EXPECT_TRUE(this->old_seen->is_cleaned);
-  EXPECT_TRUE(seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
+  this->wait_cleaned(*seen);
   EXPECT_EQ(Verdict::inconclusive, component.probations().back().verdict);
 }
 
@@ -313,7 +313,7 @@ TYPED_TEST(Probations, ToConfigureAnewEndsItInconclusive) {
   this->host.stop("c");
   component.configure_anew();
   EXPECT_EQ(Verdict::inconclusive, this->record().verdict);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   this->host.start("c");
   this->wait_seen(*seen, seen->runs + 2);
 }
@@ -326,8 +326,8 @@ TYPED_TEST(Probations, ARemovedComponentsCoresAreBothRetired) {
   change.remove_component("c");
   this->host.commit(std::move(change), 0);
   EXPECT_TRUE((*this->host).probations().empty());
-  EXPECT_TRUE(this->old_seen->is_cleaned);
-  EXPECT_TRUE(seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
+  this->wait_cleaned(*seen);
 }
 
 TYPED_TEST(Probations, AStopThatIsPendingAtAFaultIsCarriedOut) {
@@ -382,7 +382,7 @@ TYPED_TEST(Probations, APreparedOneIsWatchedFromItsCommitOn) {
   prepared->complete();
   EXPECT_EQ(Verdict::reverted, this->record().verdict);
   this->settle();
-  EXPECT_TRUE(seen->is_cleaned);
+  this->wait_cleaned(*seen);
   this->expect_old_core_runs_on(component);
 }
 
@@ -580,7 +580,7 @@ TYPED_TEST(Probations, EachRandomlyBadCoreIsRevertedByTheNextRelease) {
     ASSERT_LE(std::abs(this->newest()), 10.0);
     ++reverted;
     this->settle();
-    ASSERT_TRUE(seen->is_cleaned);
+    this->wait_cleaned(*seen);
   }
   EXPECT_EQ(kRounds, reverted);
   this->host.shutdown();
@@ -806,7 +806,7 @@ TEST_F(ProbationHangs, TheOldCoreGoesInAtTheEndOfTheStateWhereNoOtherShellCanBeM
   EXPECT_EQ(Verdict::reverted, record().verdict);
   wait_state(component, ComponentState::running);
   expect_old_core_runs_on(component);
-  EXPECT_TRUE(seen->is_cleaned);
+  wait_cleaned(*seen);
 }
 
 TEST_F(ProbationHangs, AStateThatEndsAsItIsGivenUpLeavesOneOldCore) {

@@ -168,7 +168,7 @@ TYPED_TEST(FsmProbations, AnFsmAndACoreWithoutViolationPass) {
       },
       "the end");
   EXPECT_EQ(Verdict::passed, this->record().verdict);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   EXPECT_FALSE(*is_gone);
   EXPECT_THAT(this->state_names(component), ElementsAre("Check", "Run", "Pause"));
   this->wait_seen(*seen, seen->runs + 3);
@@ -189,8 +189,8 @@ TYPED_TEST(FsmProbations, AFaultPutsBothBack) {
   this->expect_old_core_runs_on(component);
   EXPECT_FALSE(*is_gone) << "not by the component's own thread";
   this->expect_old_parts_run_on(component);
-  EXPECT_TRUE(*is_gone);
-  EXPECT_TRUE(seen->is_cleaned);
+  wait_until([&] { return is_gone->load(); }, "the last holder of the fsm");
+  this->wait_cleaned(*seen);
   EXPECT_EQ(3, seen->runs);
   EXPECT_GT(this->old->runs, runs_before) << "it has its state of before";
   EXPECT_EQ("fault: division by zero in state Run", this->record().reason);
@@ -372,13 +372,13 @@ TYPED_TEST(FsmProbations, AnotherFsmAndCoreEndItInconclusive) {
   const auto all = (*this->host).probations();
   ASSERT_EQ(2U, all.size());
   EXPECT_EQ(Cause::replaced, all[0].cause);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   this->wait_seen(*second, 2);
   this->wait_verdict(Verdict::reverted);
   this->wait_seen(*first, first->runs + 2);
   this->settle();
   EXPECT_FALSE(*is_gone) << "it is the old fsm now";
-  EXPECT_TRUE(second->is_cleaned);
+  this->wait_cleaned(*second);
   EXPECT_THAT(this->state_names(component), ElementsAre("Check", "Run", "Pause"));
 }
 
@@ -393,7 +393,7 @@ TYPED_TEST(FsmProbations, ACoreAloneEndsItAndLeavesTheNewFsm) {
   Transaction change;
   change.replace_core("c", std::move(core), ProbationOptions{.duration_ns = kLong});
   this->host.commit(std::move(change), 0);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
+  this->wait_cleaned(*this->old_seen);
   this->wait_verdict(Verdict::reverted);
   this->wait_seen(*first, first->runs + 2);
   EXPECT_EQ(1, second->runs);
@@ -458,9 +458,9 @@ TYPED_TEST(FsmProbations, ARemovedComponentsPartsAreAllRetired) {
   Transaction change;
   change.remove_component("c");
   this->host.commit(std::move(change), 0);
-  EXPECT_TRUE(*is_gone);
-  EXPECT_TRUE(this->old_seen->is_cleaned);
-  EXPECT_TRUE(seen->is_cleaned);
+  wait_until([&] { return is_gone->load(); }, "the last holder of the fsm");
+  this->wait_cleaned(*this->old_seen);
+  this->wait_cleaned(*seen);
 }
 
 /// Writes at each event.
@@ -568,7 +568,7 @@ TYPED_TEST(FsmProbations, EachRandomlyBadFsmAndCoreAreRevertedByTheNextRelease) 
     ASSERT_EQ(ComponentState::running, component.task().state());
     ASSERT_LE(std::abs(this->newest()), 10.0);
     this->settle();
-    ASSERT_TRUE(seen->is_cleaned);
+    this->wait_cleaned(*seen);
     ASSERT_THAT(this->state_names(component), ElementsAre("Run", "Pause"));
     ++reverted;
   }

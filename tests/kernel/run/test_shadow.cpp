@@ -337,7 +337,7 @@ TYPED_TEST(Shadows, PromoteTakesTheWarmCandidate) {
   EXPECT_EQ(live_before, this->live->count);
   EXPECT_EQ(1, this->candidate->configured);
   EXPECT_FALSE(this->candidate->is_cleaned);
-  EXPECT_TRUE(this->live->is_cleaned);
+  wait_until([&] { return this->live->is_cleaned.load(); }, "the clean-up");
   EXPECT_EQ(Verdict::promoted, this->record().verdict);
   this->host.stop("c");
   const auto& runs = this->candidate->runs;
