@@ -17,6 +17,8 @@ from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model import load_architecture
 
 MS = 1_000_000
+# Virtual time goes first: a case compiles its variants of the package while no thread of a component runs.
+WORLDS = ("virtual time", "threads")
 FILE = """\
 mauve: 1
 components:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from rebuilt_package import RebuiltPackage
-from reload_world import World, make_world_of_bad_cores
+from reload_world import WORLDS, World, make_world_of_bad_cores
 
 from mauve_rt._kernel import ProbationRecord
 from mauve_rt.control.probations import ProbationWatch, Verdict
@@ -19,7 +19,7 @@ from mauve_rt.model.probation import read_probation
 CORE = "reload_tests/{}"
 
 
-@pytest.fixture(params=["threads", "virtual time"])
+@pytest.fixture(params=WORLDS)
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     yield from make_world_of_bad_cores(request.param, tmp_path, rebuilt)
 

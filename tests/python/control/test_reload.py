@@ -14,7 +14,7 @@ from compiled_plugins import compile_plugin
 from page_blocks import blocks
 from pages import PAGES
 from rebuilt_package import RebuiltPackage
-from reload_world import World, make_world
+from reload_world import WORLDS, World, make_world
 
 from mauve_rt.api import Core
 from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Step
@@ -22,7 +22,7 @@ from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.parts.state_fields import StateCells
 
 
-@pytest.fixture(params=["threads", "virtual time"])
+@pytest.fixture(params=WORLDS)
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     del rebuilt  # searched first
     yield from make_world(request.param, tmp_path, "[reload_tests/PyLoop, reload_tests/Other]")

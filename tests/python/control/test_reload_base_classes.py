@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from rebuilt_package import RebuiltPackage
-from reload_world import World, make_world
+from reload_world import WORLDS, World, make_world
 
 from mauve_rt.control.requests import Step
 from mauve_rt.errors import PluginError
@@ -19,7 +19,7 @@ REMEDY = "build the packages of both, and reload both in one request"
 TAKE_OTHER = Step("replace_core", "loop", "reload_tests/Other")
 
 
-@pytest.fixture(params=["threads", "virtual time"])
+@pytest.fixture(params=WORLDS)
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     del rebuilt  # searched first
     yield from make_world(request.param, tmp_path, "[reload_tests/Other, reload_tests/WideShell]")
@@ -103,7 +103,7 @@ def test_a_shell_of_the_old_build_of_its_base_class_is_refused(world: World, reb
     assert [port.name for port in world.part().ports] == ["bias", "sum"]
 
 
-@pytest.mark.parametrize("kind", ["threads", "virtual time"])
+@pytest.mark.parametrize("kind", WORLDS)
 @pytest.mark.parametrize("fallback", ["Loop", "Other"])
 def test_a_fallback_core_is_of_the_build_of_the_new_parts(
     rebuilt: RebuiltPackage, tmp_path: Path, kind: str, fallback: str

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rclpy.serialization import deserialize_message
 from rebuilt_package import RebuiltPackage
-from reload_world import World, make_world_of_bad_cores
+from reload_world import WORLDS, World, make_world_of_bad_cores
 
 from mauve_msgs.msg import Shadow
 from mauve_rt._kernel import ShadowRecord
@@ -20,7 +20,7 @@ from mauve_rt.simulation.messages import serialize
 BUDGET = "{budget_us: 50000}"
 
 
-@pytest.fixture(params=["threads", "virtual time"])
+@pytest.fixture(params=WORLDS)
 def world(request: pytest.FixtureRequest, rebuilt: RebuiltPackage, tmp_path: Path) -> Iterator[World]:
     yield from make_world_of_bad_cores(request.param, tmp_path, rebuilt)
 
