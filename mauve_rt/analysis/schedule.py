@@ -126,12 +126,21 @@ class _Thread:
     wanted: str = ""
 
 
-def run(members: Sequence[Member], choices: Choices, *, most_jobs: int) -> Schedule:
+def run(
+    members: Sequence[Member], choices: Choices, *, most_jobs: int, until_repeated: bool = False
+) -> Schedule:
     """From the epoch on, until a deadline is missed, or so many jobs.
 
     Of members that wake up at one instant with one priority, the first one goes first.
+
+    `until_repeated`: the run also ends where it begins to repeat itself. Only for choices that depend on the
+    member and its job alone.
     """
-    return _Cpu(members, choices).run(most_jobs)
+    return _Cpu(members, choices).run(most_jobs, until_repeated=until_repeated)
+
+
+_Idle = frozenset[tuple[int, int, int, Job]]
+"""Of each thread: its number, when it begins, its nominal instant, its job."""
 
 
 class _Cpu:
@@ -151,7 +160,8 @@ class _Cpu:
                 job, nominal_ns = choices.first(member)
                 self._sleep(_Thread(member, self._cycle(member, job, nominal_ns), member.machine.priority))
 
-    def run(self, most_jobs: int) -> Schedule:
+    def run(self, most_jobs: int, *, until_repeated: bool) -> Schedule:
+        idle: set[_Idle] = set()
         while len(self._cycles) < most_jobs:
             self._wake()
             if self._ready:
@@ -159,10 +169,23 @@ class _Cpu:
                 if missed is not None:
                     return Schedule(self._cycles, self._slices, missed)
             elif self._asleep:
+                if until_repeated:
+                    state = self._idle()
+                    if state in idle:
+                        break
+                    idle.add(state)
                 self._now_ns = self._asleep[0][0]
             else:
                 break
         return Schedule(self._cycles, self._slices, None)
+
+    def _idle(self) -> _Idle:
+        """What decides the future where no thread is ready. Instants are relative to the next release."""
+        next_ns = self._asleep[0][0]
+        return frozenset(
+            (number, ready_ns - next_ns, thread.cycle.nominal_ns - next_ns, thread.cycle.job)
+            for ready_ns, number, thread in self._asleep
+        )
 
     def _cycle(self, member: Member, job: Job, nominal_ns: int) -> Cycle:
         return Cycle(member.task.name, job, nominal_ns, nominal_ns + self._choices.late_ns())

@@ -27,7 +27,8 @@ def witness_of(members: Sequence[Member], *, wakeup_ns: int = 0) -> Schedule | N
         way = _WAYS[number] if number < len(_WAYS) else None
         order = [*members] if way else random.sample(members, len(members))
         most_jobs = _MOST_JOBS if way else _MOST_JOBS // RUNS
-        found = run(order, _Drawn(random, members, way, wakeup_ns), most_jobs=most_jobs)
+        choices = _Drawn(random, members, way, wakeup_ns)
+        found = run(order, choices, most_jobs=most_jobs, until_repeated=way is not None)
         if found.missed is not None:
             return found
     return None

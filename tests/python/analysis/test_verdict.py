@@ -235,6 +235,54 @@ def test_the_witness_is_the_same_each_time() -> None:
     assert found() == found()
 
 
+class Regular(Drawn):
+    """Each job as early as it may be: a run that repeats itself."""
+
+    def __init__(self) -> None:
+        pass
+
+    def first(self, member: Member) -> tuple[Job, int]:
+        return member.task.jobs[0], 0
+
+    def next(self, member: Member, job: Job) -> tuple[Job, int]:
+        return member.task.after(job)[0], job.separation_ns
+
+    def late_ns(self) -> int:
+        return 0
+
+    def before_locks_ns(self, left_ns: int) -> int:
+        return left_ns
+
+
+def test_a_run_ends_where_it_repeats_itself() -> None:
+    machines = [loop("a", 1, 4, 60), loop("b", 1, 6, 50)]
+    members = [Member(one, digraph_of(one)) for one in machines]
+    found = run(members, Regular(), most_jobs=1000, until_repeated=True)
+    assert found.missed is None
+    assert [(cycle.component, cycle.nominal_ns // MS) for cycle in found.cycles] == [
+        *(("a", 0), ("b", 0), ("a", 4), ("b", 6), ("a", 8)),
+        *(("a", 12), ("b", 12)),
+    ]
+    assert len(run(members, Regular(), most_jobs=1000).cycles) == 1000
+
+
+def test_a_run_that_ends_where_it_repeats_itself_finds_each_miss() -> None:
+    missed = 0
+    for seed in range(100):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        machines = [
+            loop(f"T{number}", random.randint(1, 4), random.randint(4, 14), 1 + number, overrun=overrun)
+            for number, overrun in enumerate(random.choices(("catch_up", "skip", "fault"), k=3))
+        ]
+        members = [Member(one, digraph_of(one)) for one in machines]
+        long = run(members, Regular(), most_jobs=2000)
+        short = run(members, Regular(), most_jobs=2000, until_repeated=True)
+        assert short.missed == long.missed, seed
+        assert short.cycles == long.cycles[: len(short.cycles)], seed
+        missed += long.missed is not None
+    assert 20 < missed < 80
+
+
 def test_no_miss_is_found_where_the_bounds_are_met() -> None:
     met = missed = 0
     for seed in range(60):
