@@ -4,7 +4,8 @@ import fcntl
 import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -26,8 +27,16 @@ def _compile(*words: str | Path) -> None:
         "CCACHE_NOHASHDIR": "1",
         "CCACHE_SLOPPINESS": "pch_defines,time_macros",
     }
-    BUILD.mkdir(parents=True, exist_ok=True)
     subprocess.run([*launcher, "g++", *FLAGS, *words], check=True, cwd=BUILD, env=os.environ | settings)
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """One process of tests at a time: the next one finds in ccache what this one compiles."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @cache
@@ -35,9 +44,7 @@ def _precompiled() -> Path:
     """The kernel's headers, precompiled where that is older than one of them: to be included by this name."""
     header = BUILD / "mauve_rt.hpp"
     output = BUILD / "mauve_rt.hpp.gch"
-    BUILD.mkdir(parents=True, exist_ok=True)
-    with (BUILD / ".lock").open("w") as lock:  # of another process of tests
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with _alone():
         newest = max(file.stat().st_mtime for file in (INSTALLED / "include" / "mauve_rt").rglob("*.hpp"))
         if not output.exists() or output.stat().st_mtime <= newest:
             header.write_text("#include <mauve_rt/mauve_rt.hpp>\n", encoding="utf-8")
@@ -50,9 +57,10 @@ def _precompiled() -> Path:
 def compile_source(source: Path, output: Path, *flags: str) -> None:
     """Compile one source into an object."""
     with_kernel = (
-        ["-fpch-preprocess", "-include", _precompiled()] if "mauve_rt" in source.read_text("utf-8") else []
+        ["-fpch-preprocess", "-include", _precompiled()] if "mauve" in source.read_text("utf-8") else []
     )
-    _compile(*with_kernel, *flags, "-c", source, "-o", output)
+    with _alone():
+        _compile(*with_kernel, *flags, "-c", source, "-o", output)
 
 
 def link(objects: Sequence[Path], library: Path, *flags: str) -> None:
