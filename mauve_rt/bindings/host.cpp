@@ -2,6 +2,8 @@
 // What runs an architecture, bound once: Deployer and SimulatedHost are made differently, and used alike.
 #include "host.hpp"
 
+#include <algorithm>
+
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/deploy/deployer.hpp"
 
@@ -51,7 +53,9 @@ class PyDeployer final : public PyHost {
 };
 
 CommitTimeouts timeouts(time_ns_t commit_ns, time_ns_t phase_ns) {
-  return {.commit_ns = commit_ns, .phase_ns = phase_ns};
+  return {.commit_ns = commit_ns,
+          .phase_ns = phase_ns,
+          .prepare_ns = std::max(CommitTimeouts{}.prepare_ns, commit_ns)};
 }
 
 /// By its registered name, which the component must declare; or by its class, which is the program's own.

@@ -63,8 +63,8 @@ Architecture::~Architecture() {
     for (const Leaving& leaving : leaving_) leaving.component->task().detach_thread();
     keep_for_ever(std::move(leaving_));
     auto& components = lists_.components;
-    const auto has_ended = [](const auto& component) {
-      return component->task().has_ended() && !component->is_renewing();
+    const auto has_ended = [this](const auto& component) {
+      return component->task().has_ended() && !component->is_renewing() && !are_parts_held(*component);
     };
     const auto first = std::partition(components.begin(), components.end(), has_ended);
     std::for_each(first, components.end(), [](const auto& component) { component->task().detach_thread(); });
@@ -104,6 +104,14 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
   return work;
 }
 
+void Architecture::check_parts_free(const Component& component) const {
+  if (!are_parts_held(component)) return;
+  throw Error(ErrorCode::already_running, "a hook of a change that was called off still uses its parts",
+              {.component = component.name(),
+               .expected = "the end of the hook",
+               .remedy = "try again, or remove the component"});
+}
+
 bool Architecture::disposes_beside(const void* lane) const {
   const Runner* const runner = host();
   if (runner != nullptr && !runner->is_simulated()) return true;
@@ -111,9 +119,12 @@ bool Architecture::disposes_beside(const void* lane) const {
          keeper_.is_at(lane);  // of a host that has gone: it may use what is to be cleaned up
 }
 
-void Architecture::dispose(const std::string& what, std::function<void()> work, const void* lane) {
+void Architecture::dispose(const std::string& what, std::function<void()> work, const Component* of,
+                           Keeper::Place place) {
+  const void* lane = of;
+  if (of != nullptr && !keeper_.is_at(of)) lane = of->lane();
   if (!disposes_beside(lane)) return work();
-  dispose_beside(what, std::move(work), lane);
+  keeper_.take(what, std::move(work), lane, place);
 }
 
 void Architecture::dispose_beside(const std::string& what, std::function<void()> work, const void* lane) {
@@ -241,12 +252,26 @@ std::shared_ptr<Component> Architecture::find_awaited(const std::string& name) c
   return nullptr;
 }
 
+bool Architecture::call_off_preparation(const std::string& target) const {
+  const std::lock_guard lock(open_mutex_);
+  return std::any_of(open_.begin(), open_.end(), [&](const auto& change) {
+    return change->is_about(target) && change->call_off_preparation();
+  });
+}
+
+void Architecture::call_off_overdue() const {
+  for (const auto& change : open_) {
+    if (change->is_overdue()) change->call_off_preparation();
+  }
+}
+
 void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   for (;;) {
     settle_changes();
     const EarlierChange earlier = look();
     if (earlier == EarlierChange::none) return;
+    if (earlier == EarlierChange::under_way) call_off_overdue();
     if (monotonic_now_ns() >= until) throw_earlier(earlier, timeout_ns);
     change_lock_.wait_for_others();
   }
@@ -257,7 +282,7 @@ void Architecture::throw_earlier(EarlierChange earlier, time_ns_t waited_ns) con
     throw Error(ErrorCode::timeout,
                 "another change of the same is being prepared or made; nothing was changed",
                 {.expected = "its end within " + std::to_string(waited_ns / ms_to_ns(1)) + " ms",
-                 .remedy = "try again, or allow a longer commit timeout"});
+                 .remedy = "try again, or allow a longer commit timeout; where it hangs, abandon it"});
   }
   for (const auto& change : open_) {
     if (const Task* late = change->find_late())
@@ -510,6 +535,7 @@ bool Architecture::configure_hook() {
 void Architecture::check_cleanup() const {
   for (const auto& component : components()) {
     component->check_renewed();
+    check_parts_free(*component);
     if (component->task().is_parked()) continue;
     throw Error(ErrorCode::already_running, "the component still executes a state",
                 {.component = component->name(),

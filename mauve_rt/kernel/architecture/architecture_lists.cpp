@@ -110,7 +110,7 @@ void Architecture::reap() {
     for (const auto& port : leaving.component->shell().ports()) port->disconnect();
     dispose(
         "cleanup of the removed " + leaving.component->description(),
-        [component = leaving.component] { component->cleanup(); }, leaving.component->lane());
+        [component = leaving.component] { component->cleanup(); }, leaving.component.get());
     if (leaving.was_listed) retire_trace(leaving.component->task());
   }
   {

@@ -26,14 +26,16 @@ struct Keeper::State {
     std::function<void()> call;
     std::uint64_t number;  // of all that came, from 1 on
   };
-  /// It is there while its thread is.
+  /// It is there while it has a thread, or somebody holds it.
   struct Lane {
     std::deque<Work> works{};
     Busy busy{};
     std::uint64_t at{0};  // the number of what it does now; 0: nothing
     std::thread::id thread{};
+    int holds{0};
 
-    std::uint64_t oldest() const noexcept { return at != 0 || works.empty() ? at : works.front().number; }
+    bool has_next() const noexcept { return holds == 0 && !works.empty(); }
+    std::uint64_t oldest() const noexcept { return at != 0 || !has_next() ? at : works.front().number; }
   };
   std::mutex mutex;
   std::condition_variable changed;
@@ -43,22 +45,57 @@ struct Keeper::State {
 
 Keeper::Keeper() : state_(std::make_shared<State>()) {}
 
-Keeper::~Keeper() { wait(0, monotonic_now_ns() + kEnd); }
+Keeper::~Keeper() {
+  wait(0, monotonic_now_ns() + kEnd);
+  static std::mutex mutex;
+  static auto* const left_behind = new std::deque<std::shared_ptr<State>>;
+  const std::scoped_lock lock(mutex, state_->mutex);
+  const auto is_held = [](const auto& each) { return each.second.holds != 0; };
+  // Who holds a lane uses what waits there.
+  if (std::any_of(state_->lanes.begin(), state_->lanes.end(), is_held)) left_behind->push_back(state_);
+}
 
-void Keeper::take(std::string what, std::function<void()> work, const void* lane) {
+void Keeper::take(std::string what, std::function<void()> work, const void* lane, Place place) {
   const std::lock_guard lock(state_->mutex);
-  const auto [place, is_new] = state_->lanes.try_emplace(lane);
-  State::Lane& its = place->second;
-  its.works.push_back({.what = std::move(what), .call = std::move(work), .number = ++state_->taken});
-  if (!is_new) return;
-  std::thread thread(&Keeper::run, state_, lane);
+  State::Lane& its = state_->lanes[lane];
+  its.works.insert(place == Place::next ? its.works.begin() : its.works.end(),
+                   {.what = std::move(what), .call = std::move(work), .number = ++state_->taken});
+  run_if_idle(state_, lane);
+}
+
+void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) {
+  State::Lane& its = state->lanes.at(lane);
+  if (its.thread != std::thread::id{} || !its.has_next()) return;
+  std::thread thread(&Keeper::run, state, lane);
   its.thread = thread.get_id();
   thread.detach();  // it ends with the work of its lane, and owns what it uses
+}
+
+void Keeper::hold(const void* lane) {
+  const std::lock_guard lock(state_->mutex);
+  ++state_->lanes[lane].holds;
+}
+
+void Keeper::release(const void* lane) {
+  const std::lock_guard lock(state_->mutex);
+  State::Lane& its = state_->lanes.at(lane);
+  if (--its.holds > 0 || its.thread != std::thread::id{}) return;
+  if (its.works.empty()) {
+    state_->lanes.erase(lane);
+  } else {
+    run_if_idle(state_, lane);
+  }
 }
 
 bool Keeper::is_at(const void* lane) const {
   const std::lock_guard lock(state_->mutex);
   return state_->lanes.contains(lane);
+}
+
+bool Keeper::is_held(const void* lane) const {
+  const std::lock_guard lock(state_->mutex);
+  const auto found = state_->lanes.find(lane);
+  return found != state_->lanes.end() && found->second.holds != 0;
 }
 
 std::uint64_t Keeper::taken() const {
@@ -95,7 +132,7 @@ Keeper::Busy Keeper::busy() const {
 void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
   std::unique_lock lock(state->mutex);
   State::Lane& its = state->lanes.at(lane);
-  while (!its.works.empty()) {
+  while (its.has_next()) {
     State::Work work = std::move(its.works.front());
     its.works.pop_front();
     its.at = work.number;
@@ -111,7 +148,8 @@ void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
     its.at = 0;
     state->changed.notify_all();
   }
-  state->lanes.erase(lane);
+  its.thread = {};
+  if (its.holds == 0) state->lanes.erase(lane);
   state->changed.notify_all();
 }
 

@@ -21,6 +21,7 @@ void Configurable::configure() {
     throw Error(ErrorCode::configure_failed, caught_text(), {.element = description()});
   }
   configured_ = true;
+  running.leave();
 }
 
 void Configurable::cleanup() {

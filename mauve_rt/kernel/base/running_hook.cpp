@@ -5,6 +5,8 @@
 #include <mutex>
 #include <utility>
 
+#include "mauve_rt/base/error.hpp"
+
 namespace mauve {
 
 namespace {
@@ -34,8 +36,24 @@ RunningHook::~RunningHook() {
   if (outer_.hook.empty()) {
     all.hooks.erase(std::this_thread::get_id());
   } else {
-    all.hooks[std::this_thread::get_id()] = std::move(outer_);
+    Facts& present = all.hooks[std::this_thread::get_id()];
+    outer_.is_off |= present.is_off;
+    present = std::move(outer_);
   }
+}
+
+void RunningHook::leave() const {
+  if (!of(std::this_thread::get_id()).is_off) return;
+  throw Error(ErrorCode::wrong_revision, kCalledOff);
+}
+
+bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& tell) {
+  Running& all = running();
+  const std::lock_guard lock(all.mutex);
+  const auto found = all.hooks.find(thread);
+  if (found == all.hooks.end() || !tell()) return false;
+  found->second.is_off = true;
+  return true;
 }
 
 RunningHook::Facts RunningHook::of(std::thread::id thread) {

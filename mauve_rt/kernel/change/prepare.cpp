@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What a transaction makes ready before its commit, and throws away when there is none.
 #include <algorithm>
+#include <chrono>
+#include <system_error>
 
 #include "mauve_rt/architecture/runner.hpp"
 
@@ -11,6 +13,9 @@
 namespace mauve {
 
 namespace {
+
+/// How often who waits for a preparation looks whether a hook of it is overdue.
+constexpr std::chrono::milliseconds kOverdueLook{20};
 
 void connect_all(Shell& shell, const std::map<std::string, Wire>& wires) {
   for (const auto& [name, wire] : wires) {
@@ -52,6 +57,89 @@ Action& TransactionCommit::Work::keep(const Component& component, std::unique_pt
   kept.task = &component.task();
   actions_.push_back(std::move(action));
   return kept;
+}
+
+bool TransactionCommit::Work::has_hooks() const noexcept {
+  const auto& components = draft_->components();
+  return !draft_->resources().empty() ||
+         std::any_of(components.begin(), components.end(), [](const DraftComponent& component) {
+           return component.is_added || component.has_new_parts() || component.shadow != nullptr ||
+                  component.configure_step != 0;
+         });
+}
+
+/// A thread of its own executes the hooks, which may hang: who asked waits for it until the change is called off.
+void TransactionCommit::Work::prepare_beside_others() {
+  if (!has_hooks()) return prepare();
+  std::thread preparer;
+  try {
+    preparer = std::thread([self = shared_from_this(), presence = architecture_.presence()] {
+      self->run_preparation(*presence);
+    });
+  } catch (const std::system_error&) {  // there are no threads to be had
+    return prepare_interruptibly();
+  }
+  std::unique_lock lock(preparation_.mutex);
+  while (!preparation_.is_over) {
+    preparation_.changed.wait_for(lock, kOverdueLook);
+    if (preparation_.is_over) break;
+    lock.unlock();
+    if (is_overdue()) call_off_preparation();
+    lock.lock();
+    if (preparation_.is_over || !is_called_off_.load(std::memory_order_relaxed)) continue;
+    preparation_.is_left = true;
+    preparer.detach();
+    throw_called_off();
+  }
+  lock.unlock();
+  preparer.join();
+  if (preparation_.failure) std::rethrow_exception(preparation_.failure);
+}
+
+void TransactionCommit::Work::run_preparation(ArchitecturePresence& presence) {
+  std::exception_ptr failure;
+  thread_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  {
+    const ChangeLock::Inside inside(architecture_.change_lock());
+    try {
+      prepare_interruptibly();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  }
+  {
+    const std::lock_guard lock(preparation_.mutex);
+    preparation_.is_over = true;
+    preparation_.failure = std::move(failure);
+    preparation_.changed.notify_all();
+    if (!preparation_.is_left) return;
+  }
+  end_left_behind(presence);
+}
+
+/// The hook has returned at last. Where the architecture has gone meanwhile, it has left behind all that the hook used.
+void TransactionCommit::Work::end_left_behind(ArchitecturePresence& presence) {
+  const std::shared_lock use(presence.mutex);
+  if (presence.architecture == nullptr) return;
+  const std::lock_guard change(architecture_.change_lock());
+  std::shared_lock<std::shared_mutex> host_use;
+  host_ = architecture_.use_host(host_use);
+  deployed_ = host_ != nullptr && host_->is_deployed();
+  phase_.store(Phase::off, std::memory_order_release);
+  discard();
+  draft_.reset();
+}
+
+void TransactionCommit::Work::prepare_interruptibly() {
+  struct Preparing {
+    explicit Preparing(std::atomic<bool>& is_so) : value(is_so) {
+      value.store(true, std::memory_order_relaxed);
+    }
+    ~Preparing() { value.store(false, std::memory_order_relaxed); }
+    std::atomic<bool>& value;
+  };
+  const Preparing preparing(is_preparing_);
+  prepare();
 }
 
 void TransactionCommit::Work::prepare() {
@@ -132,6 +220,7 @@ void TransactionCommit::Work::configure_anew(DraftComponent& changed) {
   Component& component = *changed.component;
   if (!architecture_.is_configured() || make_anew(changed) || options_.dry_run) return;
   component.check_renewed();
+  architecture_.check_parts_free(component);
   draft_->hold(changed);
   ConfiguredAnew before{.component = &component, .before = changed.state, .fault = {}};
   component.task().swap_fault(before.fault);
@@ -284,10 +373,19 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   component->conclude_shadow();
   const bool ended = host_ != nullptr ? host_->detach(*component) : task.end_thread(monotonic_now_ns());
   if (task.is_parked()) {
-    for (const auto& port : component->shell().ports()) port->disconnect();
-    if (component->is_configured()) component->update_listening();
+    const auto disconnect = [component] {
+      for (const auto& port : component->shell().ports()) port->disconnect();
+      if (component->is_configured()) component->update_listening();
+    };
+    const bool are_held = architecture_.are_parts_held(*component);  // a hook may use its ports
+    if (!are_held) disconnect();
     architecture_.dispose(
-        "cleanup of " + component->description(), [component] { component->cleanup(); }, component->lane());
+        "cleanup of " + component->description(),
+        [component, disconnect, are_held] {
+          if (are_held) disconnect();
+          component->cleanup();
+        },
+        component.get());
   }
   if (!ended) {
     architecture_.keep_until_ended(component, was_listed);
@@ -328,6 +426,15 @@ void TransactionCommit::Work::discard_rest() noexcept {
     draft_->release();
   }
   release_whole();
+  if (is_called_off_.load(std::memory_order_relaxed)) release_parts();
+}
+
+/// What was prepared refers to the parts that were in.
+void TransactionCommit::Work::release_parts() noexcept {
+  changes_.clear();
+  actions_.clear();
+  repairs_.clear();
+  for (const auto& component : draft_->claimed()) architecture_.release_parts(*component);
 }
 
 /// What was configured anew is not what others were prepared for.

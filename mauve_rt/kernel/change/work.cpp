@@ -27,7 +27,8 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
 
 void TransactionCommit::Work::begin(Transaction transaction) {
   transaction_ = std::move(transaction);
-  for (const auto& step : transaction_.steps()) step_texts_.push_back(step->text());
+  for (const auto& step : transaction_.steps())
+    step_texts_.push_back(step->text() + (options_.dry_run ? " (dry run)" : ""));
   const time_ns_t patience_ns = is_simulated_ ? 0 : options_.timeouts.commit_ns;
   architecture_.wait_for_earlier(patience_ns, [this] { return look_at_earlier(); });
   claim_whole();
@@ -60,19 +61,21 @@ void TransactionCommit::Work::begin_alone() {
 void TransactionCommit::Work::make(Transaction transaction) {
   const time_ns_t began = monotonic_now_ns();
   begin(std::move(transaction));
-  if (!options_.dry_run) architecture_.keep_open(shared_from_this());
+  architecture_.keep_open(shared_from_this());
   try {
     draft_steps();
     const auto pause = let_others_in();
-    prepare();
+    pause != nullptr ? prepare_beside_others() : prepare();
     prepare_ns_ = monotonic_now_ns() - began;
     if (!options_.dry_run) {
       require_host_open();
       commit_by_force_if_asked();
     }
   } catch (...) {
+    if (preparation_.is_left) throw;
     phase_.store(Phase::off, std::memory_order_release);
     discard();
+    if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
     throw;
   }
   if (options_.dry_run) {
@@ -122,7 +125,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     require_preparable();
     {
       const auto pause = let_others_in();
-      prepare();
+      pause != nullptr ? prepare_beside_others() : prepare();
     }
     gather();
     require_host_open();
@@ -146,7 +149,9 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     draft_->release();
     release_whole();
   } catch (...) {
+    if (preparation_.is_left) throw;
     discard();
+    if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
     throw;
   }
   is_armed_.store(true, std::memory_order_release);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -28,9 +29,13 @@ namespace mauve {
 /// | lists_ ... services_  | who asked, before the commit   | who publishes, once | the gate's mutex                   |
 /// | reports_              | who asked, then who settles    | who asked | reports_mutex_, from the commit on           |
 /// | commit_, touched_     | who asked, before the commit   | who tells of it | facts_mutex_                           |
-/// | step_texts_, author, thread_ | who asked               | who tells of it | before the architecture keeps it       |
+/// | step_texts_, author   | who asked                      | who tells of it | before the architecture keeps it       |
+/// | thread_               | who asked, who prepares        | anyone  | relaxed: a lone fact                           |
+/// | preparation_          | who asked, who prepares        | the same | its mutex                                     |
 /// | begun_ns_             | who asked, who commits a prepared one | who tells of it | relaxed: a lone number          |
 /// | is_armed_             | who prepared, who commits      | who tells of it | release/acquire: begun_ns_             |
+/// | is_preparing_, is_called_off_ | who asked; who calls off, at a hook | same | relaxed: RunningHook's mutex         |
+/// | claimed_              | who asked, who calls off       | who asked | the gate's mutex                             |
 class TransactionCommit::Work final : public std::enable_shared_from_this<TransactionCommit::Work>,
                                       public OpenChange,
                                       private Publication {
@@ -73,6 +78,9 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   bool is_under_way() const noexcept override;
   void tell(std::vector<OpenChangeFacts>& all) const override;
   std::shared_ptr<Component> find_awaited(const std::string& component) const override;
+  bool is_about(const std::string& target) const noexcept override;
+  bool is_overdue() const override;
+  bool call_off_preparation() override;
   /// Throws why it was not made. [non-rt]
   [[noreturn]] void throw_not_made();
   /// [non-rt], the change lock held.
@@ -107,8 +115,16 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void release_whole() noexcept;
   [[nodiscard]] std::unique_ptr<ChangeLock::Pause> let_others_in();
   void draft_steps();
+  void free_claims() noexcept;
+  bool acts_on_present_parts() const noexcept;
+  [[noreturn]] void throw_called_off() const;
   void require_preparable() const;
   // prepare
+  bool has_hooks() const noexcept;
+  void prepare_beside_others();
+  void prepare_interruptibly();
+  void run_preparation(ArchitecturePresence& presence);
+  void end_left_behind(ArchitecturePresence& presence);
   void prepare();
   void prepare_resource(DraftResource& added);
   void prepare_added(DraftComponent& added);
@@ -142,6 +158,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void retire_removed(const std::shared_ptr<Component>& component);
   void end_settlement() noexcept;
   void discard_rest() noexcept;
+  void release_parts() noexcept;
   void note_configured_anew() noexcept;
   void set_epoch();
   void keep_for_report();
@@ -188,11 +205,22 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
       actions_;  // in the order they are taken in; the new parts come after
   StateGuard guard_;
   std::vector<std::string> step_texts_;
-  const std::thread::id thread_{std::this_thread::get_id()};  // that asked
+  std::atomic<std::thread::id> thread_{std::this_thread::get_id()};  // that prepares
   std::atomic<time_ns_t> begun_ns_{0};
-  std::atomic<bool> is_armed_{false};  // prepared, and not being committed
-  bool is_prepared_{false};            // for a prepared transaction, which lets go of it if it is not made
-  mutable std::mutex facts_mutex_;     // for a moment: no hook, and no other lock
+  std::atomic<bool> is_armed_{false};       // prepared, and not being committed
+  std::atomic<bool> is_preparing_{false};   // beside other changes: each hook that it is at can be called off
+  std::atomic<bool> is_called_off_{false};  // the claims are free, and the parts of its components are held
+  struct Preparation {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool is_over{false};
+    bool is_left{
+        false};  // it was called off, and who asked has gone: the thread that prepares does what is left to be done
+    std::exception_ptr failure{};
+  };
+  Preparation preparation_;
+  bool is_prepared_{false};         // for a prepared transaction, which lets go of it if it is not made
+  mutable std::mutex facts_mutex_;  // for a moment: no hook, and no other lock
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component

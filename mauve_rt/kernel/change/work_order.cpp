@@ -11,9 +11,6 @@ namespace mauve {
 
 /// The changes of what this one is about: those under way, and those that a late component has not taken yet.
 EarlierChange TransactionCommit::Work::look_at_earlier() const {
-  const ArchitectureClaims& claims = architecture_.claims();
-  if ((claims.structure && is_structural()) || (claims.revision && options_.expected_revision != 0))
-    return EarlierChange::under_way;
   const auto& steps = transaction_.steps();
   const bool is_for_all =
       std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
@@ -23,7 +20,11 @@ EarlierChange TransactionCommit::Work::look_at_earlier() const {
     });
   };
   const auto components = architecture_.components();
+  const bool is_structural = this->is_structural();
   const CommitGate::Look table(architecture_.commit_gate());
+  const ArchitectureClaims& claims = architecture_.claims();
+  if ((claims.structure && is_structural) || (claims.revision && options_.expected_revision != 0))
+    return EarlierChange::under_way;
   EarlierChange found = EarlierChange::none;
   for (const auto& component : components) {
     const ChangeMark& mark = component->change_mark();
@@ -41,12 +42,15 @@ bool TransactionCommit::Work::is_structural() const noexcept {
 }
 
 void TransactionCommit::Work::claim_whole() noexcept {
-  claimed_ = {.structure = is_structural(), .revision = options_.expected_revision != 0};
+  const ArchitectureClaims wanted{.structure = is_structural(), .revision = options_.expected_revision != 0};
+  const CommitGate::Look table(architecture_.commit_gate());
+  claimed_ = wanted;
   architecture_.claims().structure |= claimed_.structure;
   architecture_.claims().revision |= claimed_.revision;
 }
 
 void TransactionCommit::Work::release_whole() noexcept {
+  const CommitGate::Look table(architecture_.commit_gate());
   if (claimed_.structure) architecture_.claims().structure = false;
   if (claimed_.revision) architecture_.claims().revision = false;
   claimed_ = {};
@@ -233,7 +237,7 @@ void TransactionCommit::Work::dispose(Change& change) {
   architecture_.dispose(
       "cleanup of parts of " + change.draft->component->description(),
       [component = change.draft->component, parts = std::move(parts)]() mutable { parts.reset(); },
-      change.draft->component->lane());
+      change.draft->component.get(), is_called_off_ ? Keeper::Place::next : Keeper::Place::last);
 }
 
 void TransactionCommit::Work::note_handover(const Change& change) {
@@ -263,6 +267,54 @@ const Task* TransactionCommit::Work::find_late() const noexcept {
   return nullptr;
 }
 
+// ---- who calls it off while it is prepared
+
+bool TransactionCommit::Work::is_about(const std::string& target) const noexcept {
+  const auto& steps = transaction_.steps();
+  return std::any_of(steps.begin(), steps.end(),
+                     [&target](const auto& step) { return step->target == target; });
+}
+
+bool TransactionCommit::Work::is_overdue() const {
+  if (!is_preparing_.load(std::memory_order_relaxed)) return false;
+  const time_ns_t since_ns = RunningHook::of(thread_.load(std::memory_order_relaxed)).since_ns;
+  return since_ns != 0 && monotonic_now_ns() - since_ns >= options_.timeouts.prepare_ns;
+}
+
+/// Its thread stays at its hook meanwhile, and looks at no component afterwards: it finds out as it leaves the hook. Until then the
+/// hook may use the parts that were in.
+bool TransactionCommit::Work::call_off_preparation() {
+  return RunningHook::call_off(thread_.load(std::memory_order_relaxed), [this] {
+    if (!is_preparing_.load(std::memory_order_relaxed) || is_called_off_.load(std::memory_order_relaxed))
+      return false;
+    if (acts_on_present_parts()) return false;
+    for (const auto& component : draft_->claimed()) architecture_.hold_parts(*component);
+    is_called_off_.store(true, std::memory_order_relaxed);
+    draft_->release();
+    release_whole();
+    preparation_.changed.notify_all();
+    return true;
+  });
+}
+
+bool TransactionCommit::Work::acts_on_present_parts() const noexcept {
+  const auto& components = draft_->components();
+  if (std::any_of(components.begin(), components.end(),
+                  [](const DraftComponent& component) { return component.promoted != nullptr; }))
+    return true;
+  const auto& claimed = draft_->claimed();
+  const CommitGate::Look table(architecture_.commit_gate());
+  return std::any_of(claimed.begin(), claimed.end(),
+                     [](const auto& component) { return component->change_mark().is_held(); });
+}
+
+void TransactionCommit::Work::throw_called_off() const {
+  throw Error(ErrorCode::wrong_revision, RunningHook::kCalledOff,
+              {.expected = "hooks that end within " +
+                           std::to_string(options_.timeouts.prepare_ns / ms_to_ns(1)) + " ms",
+               .remedy = "find out why its hook lasts, then ask again"});
+}
+
 // ---- what it reports
 
 bool TransactionCommit::Work::is_under_way() const noexcept {
@@ -279,8 +331,9 @@ void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
                         .begun_ns = begun_ns_.load(std::memory_order_relaxed)};  // relaxed: is_armed_
   const std::lock_guard lock(facts_mutex_);
   if (commit_ == nullptr) {
-    RunningHook::Facts running = RunningHook::of(thread_);
+    RunningHook::Facts running = RunningHook::of(thread_.load(std::memory_order_relaxed));
     facts.hook = std::move(running.hook);
+    if (running.is_off) facts.hook += " (called off)";
     if (running.since_ns != 0) facts.hook_age_ns = monotonic_now_ns() - running.since_ns;
   }
   const CutWord cut = commit_ != nullptr ? commit_->look() : CutWord{};

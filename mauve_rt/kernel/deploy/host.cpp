@@ -79,6 +79,7 @@ std::shared_ptr<Component> Host::find_leaving(const std::string& name, const Com
 
 Abandoned Host::abandon(const std::string& component) {
   require_deployed();
+  if (architecture_.call_off_preparation(component)) return Abandoned::called_off;
   const auto awaited = architecture_.find_awaited(component);
   const auto held = awaited != nullptr ? awaited : architecture_.hold_component(component);
   Task& task = held->task();
@@ -93,8 +94,8 @@ Abandoned Host::abandon(const std::string& component) {
         ErrorCode::not_running, "no decided change waits for the component, and no state of it hangs",
         {.component = component,
          .element = age.state,
-         .remedy = "look at the open changes: one that is being prepared cannot be abandoned; to stop the "
-                   "component whatever it does, stop it by force"});
+         .remedy = "look at the open changes: one that is being prepared is called off while it is at a hook "
+                   "of a new part; to stop the component whatever it does, stop it by force"});
   }
   return task.stop(0, true) ? Abandoned::faulted : Abandoned::stopped;
 }

@@ -88,6 +88,9 @@ ChangeLock::Pause::Pause(ChangeLock& lock) : lock_(lock) {
   lock_.given_back_.notify_all();
 }
 
+ChangeLock::Inside::Inside(const ChangeLock& lock) : lock_(lock) { entered.push_back(&lock_); }
+ChangeLock::Inside::~Inside() { std::erase(entered, &lock_); }
+
 ChangeLock::Pause::~Pause() {
   lock_.mutex_.lock();
   --lock_.paused_;

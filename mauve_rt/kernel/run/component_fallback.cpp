@@ -252,8 +252,9 @@ void Component::dispose(std::shared_ptr<PartsChange> parts, bool is_outdated, bo
   if (!fallback_name_.empty()) return renew_fallback(std::move(parts), is_outdated);
   Architecture* const architecture = architecture_.load(std::memory_order_acquire);
   if (at_once || architecture == nullptr) return parts->retire();
-  architecture->dispose("cleanup of parts of " + description(),
-                        [own = self_.lock(), parts = std::move(parts)]() mutable { parts.reset(); });
+  architecture->dispose(
+      "cleanup of parts of " + description(),
+      [own = self_.lock(), parts = std::move(parts)]() mutable { parts.reset(); }, this);
 }
 
 }  // namespace mauve

@@ -170,6 +170,7 @@ class Watch {
 
 inline constexpr time_ns_t kLong = s_to_ns(60);
 inline constexpr time_ns_t kShort = ms_to_ns(20);
+inline constexpr time_ns_t kOverdue = ms_to_ns(500);
 
 /// Components `b`, whose hook misbehaves, and `p`, which is well. Both write 7 to a resource of their own.
 template <typename Way>
@@ -343,16 +344,17 @@ class HookCase : public Hosted<Way>, public ::testing::WithParamInterface<Hook> 
     }
   }
   void ask(Transaction transaction) {
-    const auto answer = [this](Transaction asked) {
+    const auto answer = [this](Transaction& asked) {
       try {
-        commit(asked);
+        this->host().commit(std::move(asked),
+                            {.timeouts = {.commit_ns = kLong, .phase_ns = 0, .prepare_ns = kOverdue}});
       } catch (const Error& error) {
         return error.code();
       }
       return ErrorCode::internal;  // none
     };
-    change =
-        std::async(is_virtual ? std::launch::deferred : std::launch::async, answer, std::move(transaction));
+    change = std::async(is_virtual ? std::launch::deferred : std::launch::async,
+                        [answer, asked = std::move(transaction)]() mutable { return answer(asked); });
     if (is_virtual) change.wait();
   }
 

@@ -12,23 +12,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-/// Cells in which the kernel does not do yet what the others do, and why.
-struct Gap {
-  Hook hook;
-  const char* test;
-  const char* why;
-};
-constexpr const char* kClaimed =
-    "a preparation that hangs keeps its claim of the component, and cannot be abandoned";
-constexpr const char* kStructure =
-    "a preparation that adds a component claims the structure, so that others add, remove and connect "
-    "nothing";
-constexpr std::array<Gap, 3> kGaps{{
-    {Hook::configure, "ARemovalIsMade", kClaimed},
-    {Hook::configure_added, "ARemovalIsMade", kStructure},
-    {Hook::configure_added, "AStructuralChangeOfOthersIsMade", kStructure},
-}};
-
 std::vector<std::string> names_of(const std::vector<LateComponent>& components) {
   std::vector<std::string> names;
   for (const LateComponent& component : components) names.push_back(component.name);
@@ -38,10 +21,6 @@ std::vector<std::string> names_of(const std::vector<LateComponent>& components) 
 class HungHook : public HookCase<OnThreads> {
  protected:
   void SetUp() override {
-    const std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    for (const Gap& gap : kGaps) {
-      if (gap.hook == hook() && test.starts_with(std::string(gap.test) + "/")) GTEST_SKIP() << gap.why;
-    }
     add_parts();
     begin();
     watch.emplace(*doors);

@@ -168,6 +168,33 @@ def test_list_and_abandon_wait_for_no_preparation(stage: Stage) -> None:
     assert reply.result().success, reply.result().message
 
 
+def test_a_preparation_that_hangs_is_called_off(stage: Stage) -> None:
+    """Who asked for it is answered, and the next change is made, while the hook lasts."""
+    awaited = stage.folder / "configured"
+    value = {
+        "shell": "executor_tests/CounterShell",
+        "core": "executor_tests/PyPatient",
+        "fsm": "executor_tests/CounterFsm",
+        "properties": {"label": str(awaited)},
+    }
+    steps = [ReconfigurationStep(kind="add_component", target="new", value=json.dumps(value))]
+    reply = stage.graph.ask_later(Reconfigure, f"{NODE}/reconfigure", steps=steps)
+    stage.graph.spin_until(awaited.with_suffix(".begun").exists, "the preparation")
+    stage.await_open(OpenChange.PREPARING)
+    done = stage.mauve("changes", NODE, "--abandon", "new")
+    assert (done.returncode, "is called off" in done.stdout) == (0, True), done.stderr
+    stage.graph.spin_until(reply.done, "the answer")
+    assert reply.result().code == Code.WRONG_REVISION, reply.result().message
+    assert "called off while it was prepared" in reply.result().message
+    listed = stage.mauve("changes", NODE)
+    assert "(called off)" in listed.stdout, listed.stdout
+    removed = stage.mauve("reconfigure", NODE, "-", text="- {kind: remove_component, target: late}\n")
+    assert removed.returncode == 0, removed.stderr
+    assert not awaited.exists()
+    awaited.touch()
+    stage.graph.spin_until(lambda: not stage.changes(), "the end of the hook")
+
+
 def test_what_nothing_waits_for_is_not_abandoned(stage: Stage) -> None:
     refused = stage.mauve("changes", NODE, "--abandon", "late")
     assert (refused.returncode, "NOT_RUNNING" in refused.stderr) == (1, True), refused.stderr

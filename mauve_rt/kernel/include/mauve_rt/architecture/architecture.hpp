@@ -90,7 +90,8 @@ struct ArchitectureClaims {
 /// | names_                          | who changes it        | anyone  | list_mutex_                    |
 /// | numbered_                       | who changes it        | changes | list_mutex_                    |
 /// | leaving_, retiring_             | who changes it        | anyone  | list_mutex_                    |
-/// | prepared_, claims_              | changes               | changes | change_lock_                   |
+/// | prepared_                       | changes               | changes | change_lock_                   |
+/// | claims_                         | changes, and who calls one off | changes | the gate's mutex      |
 /// | open_                           | changes               | anyone  | change_lock_ and open_mutex_ to write, one of them to read |
 /// | has_open_                       | changes               | anyone  | relaxed: a hint                |
 /// | host_                           | hosts                 | anyone  | host_mutex_                    |
@@ -266,8 +267,13 @@ class Architecture final : public Configurable {
   /// Settles what can be settled and lets other threads have the change lock until the look finds nothing to wait for, at most so
   /// long. [non-rt], the change lock held. Throws as throw_earlier().
   void wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look);
-  /// What changes under way have claimed beside components. [non-rt], the change lock held.
-  ArchitectureClaims& claims() noexcept { return claims_; }
+  /// Calls off a change of that component, or resource, that is being prepared and is at a hook of a new part; whether there was
+  /// one. Waits for no change and for no hook. [non-rt]
+  bool call_off_preparation(const std::string& target) const;
+  /// Each whose hook has lasted for longer than it asked for. [non-rt], the change lock held.
+  void call_off_overdue() const;
+  /// What changes under way have claimed beside components. [rt], within a CommitGate::Look
+  ArchitectureClaims& claims() MAUVE_RT { return claims_; }
   /// Throws Error (timeout): another change lasts, or a component, which is named, has not taken one. [non-rt], change lock held.
   [[noreturn]] void throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
@@ -292,12 +298,20 @@ class Architecture final : public Configurable {
   /// A change is made that is to be settled. [rt]
   void note_open() MAUVE_RT { has_open_.store(true, std::memory_order_relaxed); }  // relaxed: a hint
   /// Has what was put out cleaned up, in user code: beside all changes where threads run, else at once. [non-rt]
-  /// `lane`: Component::lane() of the component whose parts it is about.
-  void dispose(const std::string& what, std::function<void()> work, const void* lane = nullptr);
+  /// `of`: the component whose parts it is about.
+  void dispose(const std::string& what, std::function<void()> work, const Component* of = nullptr,
+               Keeper::Place place = Keeper::Place::last);
   /// Beside all changes, whether threads run or not. [non-rt]
   void dispose_beside(const std::string& what, std::function<void()> work, const void* lane);
   /// Whether dispose() would do so. [non-rt]
   bool disposes_beside(const void* lane = nullptr) const;
+  /// A hook that was called off uses the parts of the component that are in by now: until release_parts() what is put out of it is
+  /// not cleaned up, and it is not configured in its place. [non-rt]
+  void hold_parts(const Component& component) { keeper_.hold(&component); }
+  void release_parts(const Component& component) { keeper_.release(&component); }
+  bool are_parts_held(const Component& component) const { return keeper_.is_held(&component); }
+  /// Throws Error (already_running) while they are. [non-rt]
+  void check_parts_free(const Component& component) const;
   const std::shared_ptr<ArchitecturePresence>& presence() const noexcept { return presence_; }
   /// What that does now, and since when. [non-rt]
   Keeper::Busy disposing() const { return keeper_.busy(); }

@@ -29,10 +29,17 @@ class Keeper {
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  /// Has this done, after all that came before in the same lane, which any address names. `what` tells what hangs.
-  void take(std::string what, std::function<void()> work, const void* lane = nullptr);
-  /// Whether work of that lane is not done yet.
+  /// Has this done, after all that came before in the same lane, which any address names, or before what waits there. `what` tells
+  /// what hangs.
+  enum class Place : std::uint8_t { last, next };
+  void take(std::string what, std::function<void()> work, const void* lane = nullptr,
+            Place place = Place::last);
+  /// Whether work of that lane is not done yet, or the lane is held.
   bool is_at(const void* lane) const;
+  bool is_held(const void* lane) const;
+  /// Nothing more of that lane is begun until each who holds it has released it.
+  void hold(const void* lane);
+  void release(const void* lane);
   /// How much has come by now.
   std::uint64_t taken() const;
   /// Waits until all is done that came before, at most until the instant; hardly, where a lane is at something that came before the
@@ -44,6 +51,7 @@ class Keeper {
  private:
   struct State;
   static void run(const std::shared_ptr<State>& state, const void* lane);
+  static void run_if_idle(const std::shared_ptr<State>& state, const void* lane);
 
   std::shared_ptr<State> state_;
 };

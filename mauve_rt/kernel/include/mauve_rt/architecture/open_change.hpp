@@ -65,6 +65,13 @@ class OpenChange {
   virtual void tell(std::vector<OpenChangeFacts>& /*all*/) const {}
   /// The component of that name if it is made, and that component has not taken it. [non-rt]
   virtual std::shared_ptr<Component> find_awaited(const std::string& /*component*/) const { return nullptr; }
+  /// Whether a step of it names that component, or resource. [non-rt]
+  virtual bool is_about(const std::string& /*target*/) const noexcept { return false; }
+  /// Whether it is at a hook that has lasted for longer than who asked for it allows. [non-rt]
+  virtual bool is_overdue() const { return false; }
+  /// While it is at a hook of a new part, and only then: nobody waits for it any more, and what it has claimed is free. When the
+  /// hook returns, if it does, who asked for the change is told. Whether it was called off. [non-rt]
+  virtual bool call_off_preparation() { return false; }
 };
 
 }  // namespace mauve

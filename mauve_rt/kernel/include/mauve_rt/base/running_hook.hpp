@@ -2,6 +2,7 @@
 // RunningHook: user code that an ordinary thread executes now.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <thread>
 
@@ -16,7 +17,11 @@ class RunningHook {
   struct Facts {
     std::string hook{};     // "configure of core my_robot/Pid"; empty: none
     time_ns_t since_ns{0};  // on the monotonic clock
+    bool is_off{false};     // nobody waits for it any more
   };
+
+  static constexpr const char* kCalledOff =
+      "the change was called off while it was prepared; nothing was changed";
 
   /// `name`: "configure", ...; a hook that calls another one is the present one again when that ends.
   RunningHook(const char* name, const std::string& part);
@@ -24,8 +29,14 @@ class RunningHook {
   RunningHook(const RunningHook&) = delete;
   RunningHook& operator=(const RunningHook&) = delete;
 
+  /// The hook has returned. Throws Error (wrong_revision) where it was called off.
+  void leave() const;
+
   /// What that thread executes now.
   static Facts of(std::thread::id thread);
+  /// While that thread executes a hook, and only then: does so, and if that answers true nobody waits for the hook any more, and
+  /// leave() throws. Whether it was called off. No hook of any thread begins or ends meanwhile.
+  static bool call_off(std::thread::id thread, const std::function<bool()>& tell);
 
  private:
   Facts outer_;

@@ -60,8 +60,10 @@ class Host : public Runner {
 
   /// As Architecture::open_changes().
   std::vector<OpenChangeFacts> open_changes() const { return architecture_.open_changes(); }
-  /// The way out of a change that waits for a component: calls the change off if that is not decided; else, where a change that is
-  /// made waits for the component, or its state hangs, stops the component by force at once. Waits for no change and for no hook.
+  /// The way out of a change that waits for a component, or for a hook of a part of its own: calls the change off if that is not
+  /// decided; else, where a change that is made waits for the component, or its state hangs, stops the component by force at once.
+  /// A change that is being prepared can be named by what it adds, also a resource. One that acts on the parts that are in, by a
+  /// promote, or a configure for want of other instances, is not called off. Waits for no change and for no hook.
   /// Throws Error: unknown_component; not_running where neither is so; faulted where it was given up before; as Task::stop().
   Abandoned abandon(const std::string& component);
 

@@ -43,6 +43,18 @@ class ChangeLock {
     ChangeLock& lock_;
   };
 
+  /// While it lives the calling thread counts as inside the change of another thread, which waits for it. [non-rt]
+  class Inside {
+   public:
+    explicit Inside(const ChangeLock& lock);
+    ~Inside();
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+
+   private:
+    const ChangeLock& lock_;
+  };
+
  private:
   void check_outside() const;
   bool is_inside() const noexcept;

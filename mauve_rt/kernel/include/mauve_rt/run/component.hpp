@@ -46,6 +46,8 @@ struct StepReport {
 struct CommitTimeouts {
   time_ns_t commit_ns{s_to_ns(1)};  // for the component to reach a wait
   time_ns_t phase_ns{s_to_ns(1)};   // for the release that follows, to measure its phase; 0: do not wait
+  // For each hook that makes a part ready: afterwards another change of the same, which waits for this one, calls it off.
+  time_ns_t prepare_ns{s_to_ns(60)};
 };
 
 /// The parts of a component; in a change a null pointer says that the part stays.
@@ -377,7 +379,7 @@ class Component final : public Configurable {
   bool is_renewing() const MAUVE_RT { return is_renewing_.load(std::memory_order_acquire); }
   /// Throws Error (already_running) while the fallback is being made ready. [non-rt]
   void check_renewed() const;
-  /// What is done with its parts beside changes is done in this order; nullptr: in any. [non-rt]
+  /// What is done with its parts beside changes is done in the order of this lane, unless it is nullptr: in any. [non-rt]
   const void* lane() const noexcept { return fallback_name_.empty() ? nullptr : this; }
   /// [setup]
   void set_self(const std::shared_ptr<Component>& self) noexcept { self_ = self; }
