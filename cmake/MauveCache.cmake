@@ -16,6 +16,10 @@ if(MAUVE_CCACHE AND MAUVE_CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     string(REGEX REPLACE "/$" "" _ros "${_ros}")
     file(CREATE_LINK "${_ros}" "${_links}/ros" SYMBOLIC)
   endif()
+  set(_options "")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU") # GCC names a header of ROS by its real path where that is the shorter one
+    set(_options -fno-canonical-system-headers)
+  endif()
   set(_launcher "${_links}/mauve_ccache")
   configure_file("${PROJECT_SOURCE_DIR}/cmake/mauve_ccache.in" "${_launcher}" @ONLY
     FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
