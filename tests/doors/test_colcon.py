@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from doors import (
     ALL_JOBS,
-    CHEAP_BUILD,
+    LEAN_BUILD,
     NINJA,
     ROOT,
     build,
@@ -66,7 +66,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (workspace / "src" / "a_listener").mkdir()
     for name, text in LISTENER.items():
         (workspace / "src" / "a_listener" / name).write_text(text, encoding="utf-8")
-    options = {"names": {"mauve_rt": {"cmake-args": CHEAP_BUILD}}}
+    options = {"names": {"mauve_rt": {"cmake-args": LEAN_BUILD}}}
     (workspace / "colcon.meta").write_text(json.dumps(options), encoding="utf-8")
     build("colcon", "build", "--symlink-install", cwd=workspace, environment=SHELL)
     return workspace

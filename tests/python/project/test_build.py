@@ -16,6 +16,8 @@ SCRIPTS = ROOT / "scripts"
 # What CMake needs to configure the kernel.
 KERNEL_SOURCES = ("CMakeLists.txt", "package.xml", "cmake", "mauve_rt/kernel", "mauve_rt/rules")
 
+TASK_STEPS = "run/task_steps.cpp"  # of the kernel, in no unit
+
 
 def _configured(build: Path, *options: str, sources: Path = ROOT) -> None:
     words = ["cmake", "-G", "Ninja", "-S", sources, "-B", build, "-DMAUVE_BUILD_TESTS=OFF", *options]
@@ -91,27 +93,50 @@ def test_setup_tells_the_cpu_time_of_its_commands(tmp_path: Path):
     assert 1.9 <= float(told[1]) < 4
 
 
-@pytest.mark.skipif(not shutil.which("ccache"), reason="ccache is not installed")
-def test_clones_in_different_folders_share_what_was_compiled(tmp_path: Path):
+def _copied_kernel(clone: Path) -> Path:
+    for name in KERNEL_SOURCES:
+        (clone / name).parent.mkdir(parents=True, exist_ok=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, clone / name)
+    return clone
+
+
+def _compile_one_source(clone: Path, build: Path, cache: Path) -> subprocess.CompletedProcess[str]:
+    """Compile TASK_STEPS of a clone by a ccache of its own."""
     environment = {name: text for name, text in os.environ.items() if not name.startswith("CCACHE_")}
-    environment["CCACHE_DIR"] = str(tmp_path / "cache")
-    for clone in (tmp_path / "one", tmp_path / "another" / "of" / "them"):
-        for name in KERNEL_SOURCES:
-            (clone / name).parent.mkdir(parents=True, exist_ok=True)
-            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-            copy(ROOT / name, clone / name)
-        _configured(clone / "build", "-DMAUVE_BUILD_ROS=OFF", "-DMAUVE_UNITS=OFF", sources=clone)
-        words = [
-            "ninja",
-            "-C",
-            clone / "build",
-            "mauve_rt/kernel/CMakeFiles/mauve_rt_kernel.dir/base/names.cpp.o",
-        ]
-        subprocess.run(words, env=environment, check=True, capture_output=True)
+    environment["CCACHE_DIR"] = str(cache)
+    _configured(build, "-DMAUVE_BUILD_ROS=OFF", sources=clone)
+    words = ["ninja", "-C", build, f"mauve_rt/kernel/CMakeFiles/mauve_rt_kernel.dir/{TASK_STEPS}.o"]
+    return subprocess.run(words, env=environment, check=False, capture_output=True, text=True)
+
+
+@pytest.mark.skipif(not shutil.which("ccache"), reason="ccache is not installed")
+def test_a_clone_and_a_workspace_share_what_was_compiled(tmp_path: Path):
+    cache = tmp_path / "cache"
+    clone, workspace = tmp_path / "clone", tmp_path / "of" / "colcon"
+    builds = {
+        clone / "build": _copied_kernel(clone),
+        workspace / "build" / "mauve_rt": _copied_kernel(workspace / "src" / "mauve_rt"),
+    }
+    for build, sources in builds.items():
+        _compile_one_source(sources, build, cache).check_returncode()
     words = ["ccache", "--print-stats"]
+    environment = os.environ | {"CCACHE_DIR": str(cache)}
     said = subprocess.run(words, env=environment, check=True, capture_output=True, text=True).stdout
     counts = dict(line.split() for line in said.splitlines())
     assert (counts["cache_miss"], counts["direct_cache_hit"]) == ("1", "1")
+    units = [sorted((build / "mauve_rt").rglob("unit_*.cpp")) for build in builds]
+    assert units[0]
+    assert [unit.read_bytes() for unit in units[0]] == [unit.read_bytes() for unit in units[1]]
+
+
+@pytest.mark.skipif(not shutil.which("ccache"), reason="ccache is not installed")
+def test_an_error_names_the_source_by_its_real_path(tmp_path: Path):
+    clone = _copied_kernel(tmp_path / "clone")
+    source = clone / "mauve_rt" / "kernel" / TASK_STEPS
+    source.write_text("#error wrong\n", encoding="utf-8")
+    done = _compile_one_source(clone, clone / "build", tmp_path / "cache")
+    assert f"\n{source}:1:2: error: #error wrong\n" in done.stdout
 
 
 def test_an_interface_is_parsed_once(tmp_path: Path):
