@@ -16,8 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--abandon",
         metavar="COMPONENT",
         default="",
-        help="call off the change that waits for this component, or for a hook of a part that it adds; if the change is decided, or a state of the "
-        "component hangs, give the component up: it becomes FAULTED, with safe outputs",
+        help="call off the change that waits for this component, or for a hook of a part that it adds; if "
+        "the change is decided, or a state of the component hangs, give the component up: it becomes "
+        "FAULTED, with safe outputs",
     )
     completed_by(component, complete_components)
 

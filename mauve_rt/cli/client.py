@@ -24,6 +24,7 @@ from mauve_rt.node.shared.static_peers import resolve_static_peers, unresolved_t
 
 DISCOVERY_TIMEOUT_S = 10.0  # for a service that is being started, or on another machine
 STARTING_S = 3.0  # where there is no executor at all, one may be starting
+OTHERS_S = 1.0  # where there are others: the names of a node may come after its participant
 REPLY_TIMEOUT_S = 15.0  # longer than any time-out that a request can ask for
 RESEND_S = 4.0
 _LIST_SERVICE, _LIST = "mauve_msgs/srv/ListComponents", "/list_components"
@@ -104,7 +105,7 @@ class Client:
             return False  # in the second case its endpoints are being matched
         if service.rpartition("/")[0] in self._discovery.nodes():
             return False  # on a loaded machine a node's services arrive seconds after its name
-        return bool(_executors(offered)) or waited_s >= STARTING_S
+        return waited_s >= (OTHERS_S if _executors(offered) else STARTING_S)
 
     def _unanswered(self, service: str) -> str:
         said = f"no reply from {service} within {REPLY_TIMEOUT_S:g} s; "

@@ -119,6 +119,7 @@ def test_an_executor_that_is_seen_between_two_looks_is_no_wrong_name(
     peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(client_module, "OTHERS_S", 0.0)
     peer.start()
     look = Discovery.offered
     looks: list[bool] = []
@@ -143,22 +144,40 @@ def test_a_node_whose_services_arrive_late_is_no_wrong_name(
 ) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setattr(client_module, "STARTING_S", 0.0)
+    monkeypatch.setattr(client_module, "OTHERS_S", 0.0)
+    polls = _begin_at_the_fifth_poll(peer, "/peer", monkeypatch)
+    with connected() as client:
+        client.call(ListComponents, "/peer/list_components", ListComponents.Request())
+    assert polls.count(True) >= 5
+
+
+def test_a_node_whose_name_arrives_after_others_is_no_wrong_name(
+    peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(client_module, "OTHERS_S", LONG_S)
+    polls = _begin_at_the_fifth_poll(peer, "/late/executor", monkeypatch)
+    with connected() as client:
+        client.call(ListComponents, "/late/executor/list_components", ListComponents.Request())
+    assert polls.count(True) >= 5
+
+
+def _begin_at_the_fifth_poll(peer: Peer, name: str, monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Offer the services when all seems to be known; another executor is there from the beginning."""
     _list(peer, "/other/executor")
     peer.start()
     poll = Discovery.is_complete
     polls: list[bool] = []
 
-    def poll_and_begin_at_the_fifth(discovery: Discovery) -> bool:
+    def poll_and_begin(discovery: Discovery) -> bool:
         is_complete = poll(discovery)
         polls.append(is_complete)
         if polls.count(True) == 5:
-            _list(peer, "/peer")
+            _list(peer, name)
         return is_complete
 
-    monkeypatch.setattr(Discovery, "is_complete", poll_and_begin_at_the_fifth)
-    with connected() as client:
-        client.call(ListComponents, "/peer/list_components", ListComponents.Request())
-    assert polls.count(True) >= 5
+    monkeypatch.setattr(Discovery, "is_complete", poll_and_begin)
+    return polls
 
 
 def test_a_participant_is_known_when_its_nodes_are(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
