@@ -265,6 +265,7 @@ TEST_F(CalledOffPreparation, WhoWaitsForItCallsItOffOnceItIsOverdue) {
 }
 
 TEST_F(CalledOffPreparation, WhoAskedIsAnsweredOnceAHookIsOverdue) {
+  EXPECT_EQ(s_to_ns(60), CommitTimeouts{}.prepare_ns) << "where nothing is said";
   deploy();
   begin_slow_core({.timeouts = {.prepare_ns = ms_to_ns(200)}});
   expect_called_off();

@@ -213,7 +213,7 @@ def test_its_hooks_run_on_ordinary_threads_its_actions_on_the_component_s(stage:
     stage.until(lambda: "tick" in made[0].threads)
     stage.replace(METRONOME)
     threads = made[0].threads
-    assert threads["configure"] == threading.get_ident()
+    assert threads["configure"] not in (threads["tick"], threading.get_ident()), "it may hang"
     assert threads["tick"] == threads["adopt"] != threading.get_ident()
     assert threads["cleanup"] not in (threads["tick"], threading.get_ident()), "a thread that holds no change"
 
