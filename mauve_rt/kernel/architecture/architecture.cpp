@@ -2,7 +2,6 @@
 #include "mauve_rt/architecture/architecture.hpp"
 
 #include <algorithm>
-#include <deque>
 
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/architecture/runner.hpp"
@@ -10,6 +9,7 @@
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
+#include "base/keep_for_ever.hpp"
 #include "base/prefault.hpp"
 #include "parts/lookup.hpp"
 
@@ -20,15 +20,6 @@ namespace {
 constexpr time_ns_t kEndTimeout = ms_to_ns(500);
 /// How long a request waits for the cleanup of what it has put out.
 constexpr time_ns_t kCleanup = s_to_ns(1);
-
-/// Until the process ends, and beyond the end of static objects.
-template <typename Objects>
-void keep_for_ever(Objects objects) {
-  static std::mutex mutex;
-  static auto* const kept = new std::deque<Objects>;
-  const std::lock_guard lock(mutex);
-  kept->push_back(std::move(objects));
-}
 
 template <typename Item>
 std::shared_ptr<Item> find_in(const std::vector<std::shared_ptr<Item>>& items, const std::string& name) {

@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "base/keep_for_ever.hpp"
+
 namespace mauve {
 
 namespace {
@@ -47,12 +49,10 @@ Keeper::Keeper() : state_(std::make_shared<State>()) {}
 
 Keeper::~Keeper() {
   wait(0, monotonic_now_ns() + kEnd);
-  static std::mutex mutex;
-  static auto* const left_behind = new std::deque<std::shared_ptr<State>>;
-  const std::scoped_lock lock(mutex, state_->mutex);
+  const std::lock_guard lock(state_->mutex);
   const auto is_held = [](const auto& each) { return each.second.holds != 0; };
   // Who holds a lane uses what waits there.
-  if (std::any_of(state_->lanes.begin(), state_->lanes.end(), is_held)) left_behind->push_back(state_);
+  if (std::any_of(state_->lanes.begin(), state_->lanes.end(), is_held)) keep_for_ever(state_);
 }
 
 void Keeper::take(std::string what, std::function<void()> work, const void* lane, Place place) {

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// keep_for_ever(): for what a thread that does not come back from user code may still use.
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <utility>
+
+namespace mauve {
+
+/// Until the process ends, and beyond the end of static objects. [non-rt]
+template <typename Objects>
+void keep_for_ever(Objects objects) {
+  static std::mutex mutex;
+  static auto* const kept = new std::deque<Objects>;
+  const std::lock_guard lock(mutex);
+  kept->push_back(std::move(objects));
+}
+
+}  // namespace mauve
