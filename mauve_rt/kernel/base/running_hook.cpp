@@ -47,11 +47,11 @@ void RunningHook::leave() const {
   throw Error(ErrorCode::wrong_revision, kCalledOff);
 }
 
-bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& tell) {
+bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& decide) {
   Running& all = running();
   const std::lock_guard lock(all.mutex);
   const auto found = all.hooks.find(thread);
-  if (found == all.hooks.end() || !tell()) return false;
+  if (found == all.hooks.end() || !decide()) return false;
   found->second.is_off = true;
   return true;
 }

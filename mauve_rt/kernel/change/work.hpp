@@ -115,7 +115,6 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void release_whole() noexcept;
   [[nodiscard]] std::unique_ptr<ChangeLock::Pause> let_others_in();
   void draft_steps();
-  void free_claims() noexcept;
   bool acts_on_present_parts() const noexcept;
   [[noreturn]] void throw_called_off() const;
   void require_preparable() const;
@@ -214,8 +213,8 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
     std::mutex mutex;
     std::condition_variable changed;
     bool is_over{false};
-    bool is_left{
-        false};  // it was called off, and who asked has gone: the thread that prepares does what is left to be done
+    // It was called off, and the requester has returned: the thread that prepares does what is left to be done.
+    bool is_left{false};
     std::exception_ptr failure{};
   };
   Preparation preparation_;

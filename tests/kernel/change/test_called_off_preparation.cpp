@@ -344,22 +344,19 @@ TEST_F(CalledOffPreparation, ManyAtOnceLeaveOneCore) {
       }
     });
   };
-  struct BriefDoors : Doors {
-    static std::shared_ptr<Doors> opened(unsigned after_us) {
-      auto brief = std::make_shared<Doors>();
-      std::thread([brief, after_us] {
-        std::this_thread::sleep_for(std::chrono::microseconds(after_us));
-        brief->open = true;
-      }).detach();
-      return brief;
-    }
+  const auto doors_that_open = [](auto after_us) {
+    auto brief = std::make_shared<Doors>();
+    std::thread([brief, after_us] {
+      std::this_thread::sleep_for(std::chrono::microseconds(after_us));
+      brief->open = true;
+    }).detach();
+    return brief;
   };
   for (unsigned seed : {1U, 2U, 3U}) {
     repeat(seed, [&](std::mt19937& random) {
       Transaction change;
       if (random() % 3 == 0) change.replace_shell("b", std::make_unique<LoggedShell>("shell", log));
-      change.replace_core("b", std::make_unique<LoggedCore>(
-                                   "core", log, BriefDoors::opened(static_cast<unsigned>(random() % 4'000))));
+      change.replace_core("b", std::make_unique<LoggedCore>("core", log, doors_that_open(random() % 4'000)));
       commit(change,
              {.timeouts = {.commit_ns = s_to_ns(30), .prepare_ns = random() % 2 == 0 ? ms_to_ns(2) : kLong}});
       ++made;

@@ -17,6 +17,8 @@ namespace mauve {
 /// All members of State are written and read under its mutex; the threads own it too, as they may outlive the keeper.
 class Keeper {
  public:
+  /// Where work enters its lane: after all that waits there, or before it.
+  enum class Place : std::uint8_t { last, next };
   /// What it does now, and since when.
   struct Busy {
     std::string what;
@@ -29,9 +31,7 @@ class Keeper {
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  /// Has this done, after all that came before in the same lane, which any address names, or before what waits there. `what` tells
-  /// what hangs.
-  enum class Place : std::uint8_t { last, next };
+  /// Has this done, in its turn in the lane, which any address names. `what` names what hangs.
   void take(std::string what, std::function<void()> work, const void* lane = nullptr,
             Place place = Place::last);
   /// Whether work of that lane is not done yet, or the lane is held.

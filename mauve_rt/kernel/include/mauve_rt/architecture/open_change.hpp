@@ -69,8 +69,8 @@ class OpenChange {
   virtual bool is_about(const std::string& /*target*/) const noexcept { return false; }
   /// Whether it is at a hook that has lasted for longer than who asked for it allows. [non-rt]
   virtual bool is_overdue() const { return false; }
-  /// While it is at a hook of a new part, and only then: nobody waits for it any more, and what it has claimed is free. When the
-  /// hook returns, if it does, who asked for the change is told. Whether it was called off. [non-rt]
+  /// While it executes a hook of a new part, and only then: its requester is answered at once, and what it has claimed is free. What
+  /// the hook uses is released when it returns. Whether it was called off. [non-rt]
   virtual bool call_off_preparation() { return false; }
 };
 

@@ -17,7 +17,7 @@ class RunningHook {
   struct Facts {
     std::string hook{};     // "configure of core my_robot/Pid"; empty: none
     time_ns_t since_ns{0};  // on the monotonic clock
-    bool is_off{false};     // nobody waits for it any more
+    bool is_off{false};     // it was called off: its requester was answered
   };
 
   static constexpr const char* kCalledOff =
@@ -34,9 +34,9 @@ class RunningHook {
 
   /// What that thread executes now.
   static Facts of(std::thread::id thread);
-  /// While that thread executes a hook, and only then: does so, and if that answers true nobody waits for the hook any more, and
-  /// leave() throws. Whether it was called off. No hook of any thread begins or ends meanwhile.
-  static bool call_off(std::thread::id thread, const std::function<bool()>& tell);
+  /// While that thread executes a hook, and only then: calls `decide`, and if that returns true the hook is called off: leave()
+  /// throws. Whether it was called off. No hook of any thread begins or ends while `decide` runs.
+  static bool call_off(std::thread::id thread, const std::function<bool()>& decide);
 
  private:
   Facts outer_;

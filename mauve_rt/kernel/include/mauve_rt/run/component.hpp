@@ -46,7 +46,7 @@ struct StepReport {
 struct CommitTimeouts {
   time_ns_t commit_ns{s_to_ns(1)};  // for the component to reach a wait
   time_ns_t phase_ns{s_to_ns(1)};   // for the release that follows, to measure its phase; 0: do not wait
-  // For each hook that makes a part ready: afterwards another change of the same, which waits for this one, calls it off.
+  // For each hook that makes a part ready: afterwards the change is called off.
   time_ns_t prepare_ns{s_to_ns(60)};
 };
 
