@@ -106,6 +106,17 @@ inline std::vector<TraceRecord> records_of(const TraceDrain& drain, TraceKind ki
   return found;
 }
 
+/// The component, which is stopped, was released at each instant but those that a busy machine made it skip; the last ones may
+/// have no release after them.
+inline void expect_released_at_each_instant(const std::vector<time_ns_t>& instants, const Component& component,
+                                            time_ns_t period_ns) {
+  ASSERT_GE(instants.size(), 2U);
+  const time_ns_t missing =
+      (instants.back() - instants.front()) / period_ns - (static_cast<time_ns_t>(instants.size()) - 1);
+  EXPECT_GE(missing, 0);
+  EXPECT_LE(missing, static_cast<time_ns_t>(component.task().statistics().skipped.load()));
+}
+
 /// Declared after variables of a test that its components use: ends the components before those go.
 struct ComponentsEndFirst {
   explicit ComponentsEndFirst(Deployer& whose) : deployer(whose) {}

@@ -98,6 +98,13 @@ class Probations : public OnBothHosts<Way> {
       }
     }
   }
+  /// After the shutdown.
+  static void expect_untouched(Component& neighbour) {
+    expect_released_at_each_instant(Base::core(neighbour).instants, neighbour, kPeriod);
+    if constexpr (Base::is_virtual) {
+      EXPECT_EQ(0U, neighbour.task().statistics().skipped.load());
+    }
+  }
   double newest() const {
     Number value{-1.0};
     time_ns_t time = 0;

@@ -133,18 +133,6 @@ class FsmProbations : public Probations<Way> {
     }
   }
 
-  /// After the shutdown. A busy machine makes a component skip instants; the last ones may have no execution after them.
-  static void expect_untouched(Component& neighbour) {
-    const auto& instants = Probations<Way>::core(neighbour).instants;
-    ASSERT_FALSE(instants.empty());
-    const auto skipped = static_cast<time_ns_t>(neighbour.task().statistics().skipped.load());
-    const time_ns_t lost =
-        (instants.back() - instants.front()) / kPeriod - static_cast<time_ns_t>(instants.size()) + 1;
-    EXPECT_LE(lost, skipped);
-    if constexpr (Probations<Way>::is_virtual) {
-      EXPECT_EQ(0, skipped);
-    }
-  }
 
   std::vector<time_ns_t> executed_ns;
 };

@@ -135,16 +135,6 @@ class Shadows : public OnBothHosts<Way> {
   void wait_verdict(Verdict verdict) {
     this->host.until([&] { return record().verdict == verdict; }, to_string(verdict));
   }
-  /// The component was released at each instant that it did not skip itself; the last skip may lie behind its last release.
-  static void expect_whole(const std::vector<time_ns_t>& instants, const Component& component) {
-    ASSERT_GE(instants.size(), 2U);
-    const auto skipped = static_cast<time_ns_t>(component.task().statistics().skipped.load());
-    const time_ns_t missing =
-        (instants.back() - instants.front()) / kPeriod - (static_cast<time_ns_t>(instants.size()) - 1);
-    EXPECT_LE(missing, skipped);
-    EXPECT_GE(missing, 0);
-  }
-
   SharedData<Number>* out{nullptr};
   std::shared_ptr<Log> live;
   std::shared_ptr<Log> candidate;
@@ -285,7 +275,7 @@ TYPED_TEST(Shadows, ACandidateOverItsBudgetCostsNobodyElse) {
   EXPECT_EQ(record.compared, this->output().live_only) << "the candidate writes nothing";
   std::vector<time_ns_t> instants;
   for (const Run& run : this->live->runs) instants.push_back(run.instant_ns);
-  this->expect_whole(instants, component);
+  expect_released_at_each_instant(instants, component, kPeriod);
   if constexpr (TestFixture::is_virtual) {
     EXPECT_EQ(kTakes, record.largest_execution_ns);
     EXPECT_EQ(record.compared, record.over_budget);
@@ -296,7 +286,7 @@ TYPED_TEST(Shadows, ACandidateOverItsBudgetCostsNobodyElse) {
     EXPECT_EQ(0U, neighbour.task().statistics().overruns.load());
   }
   this->host.stop("n");
-  this->expect_whole(this->core(neighbour).instants, neighbour);
+  expect_released_at_each_instant(this->core(neighbour).instants, neighbour, kPeriod);
 }
 
 TYPED_TEST(Shadows, AFaultOfTheCandidateEndsTheShadow) {
