@@ -72,11 +72,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
       commit_by_force_if_asked();
     }
   } catch (...) {
-    if (preparation_.is_left) throw;
-    phase_.store(Phase::off, std::memory_order_release);
-    discard();
-    if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
-    throw;
+    rethrow_not_made();
   }
   if (options_.dry_run) {
     phase_.store(Phase::off, std::memory_order_release);
@@ -85,6 +81,15 @@ void TransactionCommit::Work::make(Transaction transaction) {
   if (settle()) architecture_.forget_open(*this);
   release_whole();
   if (failure_) std::rethrow_exception(failure_);
+}
+
+/// In a handler. A hook that was left behind ends the change itself, once it has returned.
+void TransactionCommit::Work::rethrow_not_made() {
+  if (preparation_.is_left) throw;
+  phase_.store(Phase::off, std::memory_order_release);
+  discard();
+  if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
+  throw;
 }
 
 /// What would be done before the commit cannot wait for it.
@@ -149,10 +154,7 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     draft_->release();
     release_whole();
   } catch (...) {
-    if (preparation_.is_left) throw;
-    discard();
-    if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
-    throw;
+    rethrow_not_made();
   }
   is_armed_.store(true, std::memory_order_release);
   prepare_ns_ = monotonic_now_ns() - began;

@@ -117,6 +117,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void draft_steps();
   bool acts_on_present_parts() const noexcept;
   [[noreturn]] void throw_called_off() const;
+  [[noreturn]] void rethrow_not_made();
   void require_preparable() const;
   // prepare
   bool has_hooks() const noexcept;
