@@ -138,7 +138,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     const BiasedMutex::Hold hold(overwrites() ? write.mutex() : readers_mutex_, reader.seat);
     const std::uint64_t head =
         readers_.head.load(std::memory_order_relaxed);  // relaxed: written under this lock
-    if (readers_.tail == head) {
+    if (readers_.tail <= head) {  // less: the writer has overwritten elements since the last look
       readers_.tail = writers_.tail.load(std::memory_order_acquire);
       if (readers_.tail == head) {
         if (reader.seen == 0) return DataStatus::none;
