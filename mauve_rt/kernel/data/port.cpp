@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -85,6 +86,7 @@ PortConnection PortBase::prepare(ServiceBase& service, const std::string& resour
 }
 
 void PortBase::swap(PortConnection& connection) noexcept {
+  MAUVE_EXPECTS(!is_seated_ || connection_.service != nullptr);
   attach(nullptr, nullptr);
   if (is_seated_) connection_.service->unseat(own_seat_);
   is_seated_ = connection.service != nullptr && connection.service->seat(own_seat_);
@@ -108,6 +110,7 @@ bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
 }
 
 bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {
+  MAUVE_AUDIT(is_closed());
   if (output().on_stop != OutputPolicy::set_zero) return true;
   const TryWrite tried = try_write_zero(service, time_ns);
   if (tried != TryWrite::must_wait || !may_wait) return tried == TryWrite::done;
