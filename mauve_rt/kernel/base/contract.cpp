@@ -7,14 +7,21 @@
 
 namespace mauve::detail {
 
+namespace {
+
+Error error_of(const Contract& contract) {
+  return {ErrorCode::internal, "broken " + std::string(contract.kind) + ": " + contract.condition,
+          ErrorDetail{.element = std::string(contract.file) + ":" + std::to_string(contract.line),
+                      .remedy = "report this line: it names a defect in the code"}};
+}
+
+}  // namespace
+
 void break_contract(const Contract& contract) {
-  const Error broken(ErrorCode::internal, "broken " + std::string(contract.kind) + ": " + contract.condition,
-                     {.element = std::string(contract.file) + ":" + std::to_string(contract.line),
-                      .remedy = "report this line: it names a defect in the code"});
-  // Before the throw: it may end the process, in a noexcept function.
-  const std::string line = "mauve_rt: " + std::string(broken.what()) + "\n";
+  // Before the throw, which ends the process in a noexcept function.
+  const std::string line = "mauve_rt: " + std::string(error_of(contract).what()) + "\n";
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, line.data(), line.size());
-  throw broken;
+  throw error_of(contract);
 }
 
 }  // namespace mauve::detail

@@ -99,6 +99,7 @@ void PortBase::swap(PortConnection& connection) noexcept {
 }
 
 bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
+  MAUVE_AUDIT(is_closed());
   if (is_safe_) return true;
   ServiceBase* service = nullptr;
   {
@@ -110,7 +111,6 @@ bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
 }
 
 bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {
-  MAUVE_AUDIT(is_closed());
   if (output().on_stop != OutputPolicy::set_zero) return true;
   const TryWrite tried = try_write_zero(service, time_ns);
   if (tried != TryWrite::must_wait || !may_wait) return tried == TryWrite::done;
