@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 
 namespace mauve::rules {
@@ -138,6 +139,7 @@ bool Action::settle(Host& host) {
 }
 
 void Action::complete() {
+  MAUVE_EXPECTS(stage_.load(std::memory_order_relaxed) == Stage::heard);  // relaxed: this thread has seen it
   if (prepared_ != nullptr) {
     report_.emplace();
     try {
@@ -152,6 +154,7 @@ void Action::complete() {
 }
 
 void Action::carry_out(Host& host) {
+  MAUVE_EXPECTS(!is_preparable_ && committed_ == nullptr);
   report_.emplace();
   how_ = Ended::refused;
   try {
@@ -194,6 +197,7 @@ std::optional<Ended> Action::ended() noexcept {
 
 bool Action::commit() noexcept {
   if (!is_preparable_ || stage_.load(std::memory_order_acquire) != Stage::begun) return false;
+  MAUVE_EXPECTS(prepared_ != nullptr);
   how_ = how_ended(prepared_->commit(options_.timeouts.commit_ns));
   stage_.store(Stage::over, std::memory_order_release);
   return true;

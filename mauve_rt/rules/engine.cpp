@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 
@@ -104,6 +105,7 @@ Engine::Engine(std::vector<Rule> rules) {
     return std::pair(b->rule.priority, a->index) < std::pair(a->rule.priority, b->index);
   });
   for (std::size_t rank = 0; rank < by_rank_.size(); ++rank) by_rank_[rank]->rank = rank;
+  MAUVE_ENSURES(by_rank_.size() == lives_.size());
 }
 
 Engine::~Engine() = default;
@@ -116,6 +118,7 @@ void Engine::wake() noexcept {
 // ---- what is found of the architecture
 
 void Engine::set_present(std::size_t rule, bool present, time_ns_t now_ns) noexcept {
+  MAUVE_EXPECTS(rule < lives_.size());
   Life& life = *lives_[rule];
   if (life.armed == present) return;
   life.armed = present;
@@ -342,6 +345,7 @@ void Engine::begun(time_ns_t now_ns) noexcept {
     life.gives_way = life.under_way.has_value();
     in_the_way(life);
   } else {
+    MAUVE_EXPECTS(!life.under_way);
     life.under_way = action.act;
     decided = action.act == Act::do_ ? Decided::do_ : Decided::undo;
   }
@@ -349,6 +353,7 @@ void Engine::begun(time_ns_t now_ns) noexcept {
 }
 
 void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexcept {
+  MAUVE_EXPECTS(rule < lives_.size());
   Life& life = *lives_[rule];
   if (act == Act::otherwise) return otherwise_ended(life, how, now_ns);
   if (life.under_way != act) return;  // forgotten meanwhile
@@ -365,6 +370,7 @@ void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexc
   const time_ns_t first_ns = is_changed ? kFirstAfterChange : std::max(life.rule.cooldown_ns, kFirstRetry);
   const time_ns_t longest_ns = std::max(kLongestRetry, life.rule.cooldown_ns);
   const time_ns_t wait_ns = first_ns > (longest_ns >> life.failures) ? longest_ns : first_ns << life.failures;
+  MAUVE_AUDIT(wait_ns > 0);
   life.failures = std::min(life.failures + 1, kMostDoublings);
   life.excused.reset();
   life.not_before_ns = later_by(now_ns, wait_ns);

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/trace.hpp"
@@ -196,6 +197,7 @@ time_ns_t RuleRunner::step() noexcept {
 
 /// Posts it; its end wakes the engine.
 void RuleRunner::begin(const PendingAction& pending, time_ns_t now_ns) noexcept {
+  MAUVE_EXPECTS(pending.rule < rules_.size());
   Rule& rule = *rules_[pending.rule];
   if (pending.act == Act::otherwise) {
     engine_->begun(now_ns);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/rules/signal.hpp"
 
+#include "mauve_rt/base/contract.hpp"
+
 namespace mauve::rules {
 
 void Signal::Record::write(const Last& report) noexcept {
@@ -10,6 +12,7 @@ void Signal::Record::write(const Last& report) noexcept {
   place.time_ns.store(report.time_ns, std::memory_order_release);
   place.value.store(report.value, std::memory_order_release);
   place.count.store(report.count, std::memory_order_release);
+  MAUVE_AUDIT(count_.load(std::memory_order_relaxed) + 1 == count);  // else another thread writes, too
   count_.store(count, std::memory_order_seq_cst);
 }
 

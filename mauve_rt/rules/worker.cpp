@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 
@@ -14,6 +15,7 @@ Worker::~Worker() {
 }
 
 void Worker::start(const ThreadSettings& settings, std::function<void()> job) {
+  MAUVE_EXPECTS(!runs_);
   job_ = std::move(job);
   asked_.store(0, std::memory_order_relaxed);  // the thread's creation publishes it
   const auto entry = [](void* self) -> void* {

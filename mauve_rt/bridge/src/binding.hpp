@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/data/client.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -79,7 +80,10 @@ class Binding {
   /// Whether it serves a resource; nothing is sent or taken before. [non-rt]
   bool is_attached() const noexcept { return resource_ != nullptr; }
   /// Serves the resource from now on, and keeps it alive. [non-rt] Throws Error when it is none to serve.
-  virtual void attach(std::shared_ptr<Resource> resource) { resource_ = std::move(resource); }
+  virtual void attach(std::shared_ptr<Resource> resource) {
+    MAUVE_EXPECTS(resource != nullptr);
+    resource_ = std::move(resource);
+  }
   /// Sends what its resource has for the outside, oldest first; true when there may be more. [non-rt]
   virtual bool send() { return false; }
   /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
@@ -92,7 +96,10 @@ class Binding {
   virtual void report(BridgeReport& report) const = 0;
 
  protected:
-  Resource& resource() const noexcept { return *resource_; }
+  Resource& resource() const {
+    MAUVE_EXPECTS(is_attached());
+    return *resource_;
+  }
 
  private:
   std::string resource_name_;

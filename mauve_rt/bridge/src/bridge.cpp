@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
@@ -21,7 +22,8 @@ template <typename Kind, typename... Args>
 std::size_t Bridge::open(const Args&... args) {
   auto made = std::make_unique<Kind>(node_, args...);
   const std::lock_guard lock(mutex_);
-  bindings_.emplace(opened_, std::move(made));
+  const bool is_new = bindings_.emplace(opened_, std::move(made)).second;
+  MAUVE_ENSURES(is_new);
   return opened_++;
 }
 

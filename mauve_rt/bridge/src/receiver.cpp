@@ -3,6 +3,8 @@
 
 #include <rcl/error_handling.h>
 
+#include "mauve_rt/base/contract.hpp"
+
 #include "rcl_error.hpp"
 #include "thread.hpp"
 
@@ -25,6 +27,7 @@ Receiver::~Receiver() {
 }
 
 void Receiver::start(std::vector<Arrival*> arrivals) {
+  MAUVE_EXPECTS(!thread_.joinable());
   arrivals_ = std::move(arrivals);
   ending_.store(false, std::memory_order_release);
   if (!arrivals_.empty()) thread_ = start_thread(name_, [this] { run(); });

@@ -5,6 +5,7 @@
 
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
@@ -38,7 +39,8 @@ Architecture::Architecture(PluginRegistry* registry)
 }
 
 Architecture::~Architecture() {
-  comebacks_.wait(0, kForever);  // it is a change of this architecture
+  MAUVE_AUDIT(prepared_.empty());  // a prepared transaction refers to its architecture
+  comebacks_.wait(0, kForever);    // it is a change of this architecture
   keeper_.wait(0, monotonic_now_ns() + kEndTimeout);
   {
     const std::unique_lock gone(presence_->mutex);
@@ -147,6 +149,7 @@ StepReport Architecture::commit_one(Transaction transaction, const CommitTimeout
 }
 
 void Architecture::settle_changes() noexcept {
+  MAUVE_AUDIT(change_lock_.is_held_here());
   has_open_.store(false, std::memory_order_relaxed);  // relaxed: a hint; first: one may be made meanwhile
   if (std::any_of(open_.begin(), open_.end(), [](const auto& change) { return change->is_under_way(); }))
     note_open();
@@ -170,6 +173,7 @@ void Architecture::bring_back(Component& hung) {
 }
 
 void Architecture::settle_probations() noexcept {
+  MAUVE_AUDIT(change_lock_.is_held_here());
   for (const auto& component : components()) {
     const bool is_probation_over = component->is_probation_over();  // it gives up one that hangs
     const auto probation = component->present_probation();
@@ -214,6 +218,7 @@ void Architecture::settle_probations_if_idle() noexcept {
 }
 
 void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
+  MAUVE_EXPECTS(change_lock_.is_held_here());
   const std::lock_guard lock(open_mutex_);
   open_.push_back(std::move(change));
 }
@@ -251,12 +256,14 @@ bool Architecture::call_off_preparation(const std::string& target) const {
 }
 
 void Architecture::call_off_overdue() const {
+  MAUVE_EXPECTS(change_lock_.is_held_here());
   for (const auto& change : open_) {
     if (change->is_overdue()) change->call_off_preparation();
   }
 }
 
 void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<EarlierChange()>& look) {
+  MAUVE_EXPECTS(change_lock_.is_held_here());
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   for (;;) {
     settle_changes();
@@ -269,6 +276,7 @@ void Architecture::wait_for_earlier(time_ns_t timeout_ns, const std::function<Ea
 }
 
 void Architecture::throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const {
+  MAUVE_EXPECTS(change_lock_.is_held_here());
   if (earlier == EarlierChange::under_way) {
     throw Error(ErrorCode::timeout,
                 "another change of the same is being prepared or made; nothing was changed",
@@ -293,6 +301,7 @@ void Architecture::settle_if_idle() noexcept {
 }
 
 Runner* Architecture::use_host(std::shared_lock<std::shared_mutex>& use) const {
+  MAUVE_EXPECTS(change_lock_.is_held_here());
   const std::lock_guard lock(host_mutex_);
   // Only its end waits for that. Tried: changes share it, and a host that ends was released before. A hook may shut down
   // the host, which takes these locks the other way round.
@@ -301,6 +310,7 @@ Runner* Architecture::use_host(std::shared_lock<std::shared_mutex>& use) const {
 }
 
 void Architecture::drop_stale_prepared() noexcept {
+  MAUVE_AUDIT(prepared_.empty() || change_lock_.is_held_here());  // none is left at the architecture's end
   for (OpenChange* prepared : prepared_) prepared->drop_if_stale();
 }
 
@@ -316,6 +326,7 @@ void Architecture::set_host(Runner& host) {
       throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
                   {.expected = "an architecture without a host", .remedy = "shut its host down first"});
     }
+    MAUVE_EXPECTS(change_lock_.is_held_here());
     host_ = &host;
   }
   const Lists all = lists();
@@ -467,6 +478,7 @@ std::vector<Wiring> Architecture::wiring() const {
 }
 
 void Architecture::swap_lists(Lists& lists) noexcept {
+  MAUVE_AUDIT(commit_gate_.is_looked_at_here());
   lists_.components.swap(lists.components);
   lists_.resources.swap(lists.resources);
 }

@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
+
 #include "base/keep_for_ever.hpp"
 
 namespace mauve {
@@ -79,6 +81,7 @@ void Keeper::hold(const void* lane) {
 void Keeper::release(const void* lane) {
   const std::lock_guard lock(state_->mutex);
   State::Lane& its = state_->lanes.at(lane);
+  MAUVE_EXPECTS(its.holds > 0);
   if (--its.holds > 0 || its.thread != std::thread::id{}) return;
   if (its.works.empty()) {
     state_->lanes.erase(lane);
@@ -133,6 +136,7 @@ void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
   std::unique_lock lock(state->mutex);
   State::Lane& its = state->lanes.at(lane);
   while (its.has_next()) {
+    MAUVE_AUDIT(its.at == 0 && its.thread == std::this_thread::get_id());
     State::Work work = std::move(its.works.front());
     its.works.pop_front();
     its.at = work.number;

@@ -8,6 +8,8 @@
 #include <ctime>
 #include <mutex>
 
+#include "mauve_rt/base/contract.hpp"
+
 namespace mauve {
 
 namespace {
@@ -50,8 +52,9 @@ void BiasedMutex::Seat::await_leave() noexcept {
   }
 }
 
-/// Afterwards the user of the bias is not inside, and enters by the mutex. Under the mutex.
+/// Afterwards the user of the bias is not inside, and enters by the mutex.
 void BiasedMutex::revoke(Seat& granted) noexcept {
+  MAUVE_AUDIT(mutex_.is_held_here());
   owner_.store(nullptr, std::memory_order_relaxed);
   process_barrier();
   granted.await_leave();
@@ -81,12 +84,14 @@ bool BiasedMutex::try_lock() noexcept {
 }
 
 void BiasedMutex::unlock() noexcept {
+  MAUVE_AUDIT(mutex_.is_held_here());
   owner_.store(granted_.load(std::memory_order_relaxed), std::memory_order_release);
   mutex_.unlock();
 }
 
-/// Under the mutex; unlock() carries it out.
+/// unlock() carries it out.
 void BiasedMutex::grant() noexcept {
+  MAUVE_AUDIT(mutex_.is_held_here());
   const bool is_alone = first_ != nullptr && first_->next_ == nullptr;
   const bool is_biased = is_alone && !is_shared_ && has_process_barrier();
   granted_.store(is_biased ? first_ : nullptr, std::memory_order_relaxed);

@@ -128,6 +128,12 @@ void PiMutex::let_go_of_all_but(int held) noexcept {
   }
 }
 
+bool PiMutex::is_held_here() const noexcept {
+  const PiMutex* held = this_thread().last;
+  while (held != nullptr && held != this) held = held->below_;
+  return held == this;
+}
+
 bool PiMutex::was_misused_by_this_thread() noexcept { return std::exchange(this_thread().misused, false); }
 
 int PiMutex::held_by_this_thread() noexcept { return this_thread().held.load(std::memory_order_relaxed); }

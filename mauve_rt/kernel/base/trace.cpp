@@ -5,6 +5,8 @@
 #include <map>
 #include <mutex>
 
+#include "mauve_rt/base/contract.hpp"
+
 namespace mauve {
 
 namespace {
@@ -54,6 +56,7 @@ TraceRing::TraceRing(std::uint16_t component, std::size_t capacity)
 void TraceRing::drain(std::vector<TraceRecord>& into) {
   const std::uint64_t head = head_.load(std::memory_order_acquire);
   std::uint64_t tail = tail_.load(std::memory_order_relaxed);  // relaxed: only the consumer writes it
+  MAUVE_EXPECTS(head - tail <= mask_ + 1);
   for (; tail != head; ++tail) into.push_back(places_[tail & mask_]);
   tail_.store(tail, std::memory_order_release);
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
+
 #include "parts/lookup.hpp"
 
 namespace mauve {
@@ -46,6 +48,7 @@ DraftComponent* Draft::find(const std::string& name) noexcept {
 
 /// A component whose thread was left behind takes no change any more: the change that claims it removes it.
 DraftComponent Draft::claim(std::shared_ptr<Component> component) {
+  MAUVE_EXPECTS(architecture_.change_lock().is_held_here());
   DraftComponent draft;
   claimed_.reserve(claimed_.size() + 1);
   std::shared_ptr<const Wires> wires;
@@ -78,6 +81,7 @@ void Draft::hold(const DraftComponent& component) {
   {
     const CommitGate::Look table(architecture_.commit_gate());
     ChangeMark& mark = component.component->change_mark();
+    MAUVE_EXPECTS(is_claiming_);
     is_same = mark.changes() == component.changes &&
               !architecture_.commit_gate().has_open_about(component.component->task());
     if (is_same) mark.hold();

@@ -12,6 +12,7 @@
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/architecture/plugin.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 
 namespace mauve {
@@ -106,6 +107,7 @@ class Draft {
   void hold(const DraftComponent& component);
   /// The change is made: whether who publishes it is to release the claims. [rt], within a CommitGate::Look
   bool forget_claims() MAUVE_RT {
+    MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
     const bool is_claiming = is_claiming_;
     is_claiming_ = false;
     return is_claiming;

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/contract.hpp"
 
 #include "base/prefault.hpp"
 #include "change/work.hpp"
@@ -125,7 +126,7 @@ void TransactionCommit::Work::end_left_behind(ArchitecturePresence& presence) {
   std::shared_lock<std::shared_mutex> host_use;
   host_ = architecture_.use_host(host_use);
   deployed_ = host_ != nullptr && host_->is_deployed();
-  phase_.store(Phase::off, std::memory_order_release);
+  advance(Phase::off);
   discard();
   draft_.reset();
 }
@@ -396,11 +397,12 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
 
 /// Of one that is not made.
 void TransactionCommit::Work::discard() noexcept {
+  MAUVE_AUDIT(architecture_.change_lock().is_held_here());
   is_prepared_ = false;
   if (commit_ == nullptr || commit_->is_left()) {
     discard_rest();
     architecture_.forget_open(*this);
-    phase_.store(Phase::settled, std::memory_order_release);
+    advance(Phase::settled);
     return;
   }
   // An adopt does not end, and its thread will come back to the record: others go on.

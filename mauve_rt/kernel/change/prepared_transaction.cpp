@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 
 #include "change/work.hpp"
@@ -90,6 +91,7 @@ class PreparedTransaction::State {
           return touched.component->change_mark().is_held() || gate.has_open_about(touched.component->task());
         });
     if (is_kept_off || !is_current()) return PreparedOutcome::stale;
+    MAUVE_EXPECTS(phase.load(std::memory_order_relaxed) == kReady);  // relaxed: within a look
     phase.store(kCommitting, std::memory_order_release);
     return std::nullopt;
   }
@@ -104,6 +106,7 @@ class PreparedTransaction::State {
   }
   void end(bool is_made) noexcept {
     const CommitGate::Look table(architecture.commit_gate());
+    MAUVE_EXPECTS(phase.load(std::memory_order_relaxed) == kCommitting);  // relaxed: this thread wrote it
     phase.store(is_made ? kCommitted : kNotMade, std::memory_order_release);
   }
   PreparedOutcome commit(time_ns_t until_ns) noexcept {
@@ -192,9 +195,9 @@ PreparedOutcome PreparedTransaction::commit(time_ns_t timeout_ns) noexcept {
 
 void PreparedTransaction::call_off() noexcept { state_->call_off(); }
 
-/// The change lock held.
 bool PreparedTransaction::settle() noexcept {
   State& state = *state_;
+  MAUVE_AUDIT(state.architecture.change_lock().is_held_here());
   const State::Phase phase = state.phase.load(std::memory_order_acquire);
   if (phase != State::kCommitted) return phase == State::kSettled;
   const bool is_settled = state.work->settle();
@@ -206,8 +209,8 @@ bool PreparedTransaction::settle() noexcept {
   return is_settled;
 }
 
-/// The change lock held.
 void PreparedTransaction::drop_if_stale() noexcept {
+  MAUVE_AUDIT(state_->architecture.change_lock().is_held_here());
   {
     const CommitGate::Look table(state_->architecture.commit_gate());
     const State::Phase phase = state_->phase.load(std::memory_order_acquire);
@@ -220,9 +223,9 @@ void PreparedTransaction::drop_if_stale() noexcept {
   let_go();
 }
 
-/// The change lock held.
 void PreparedTransaction::note_failure() noexcept {
   State& state = *state_;
+  MAUVE_AUDIT(state.architecture.change_lock().is_held_here());
   if (state.phase.load(std::memory_order_acquire) != State::kNotMade || state.failure ||
       state.work == nullptr)
     return;
@@ -233,9 +236,9 @@ void PreparedTransaction::note_failure() noexcept {
   }
 }
 
-/// The change lock held.
 void PreparedTransaction::let_go() noexcept {
   State& state = *state_;
+  MAUVE_AUDIT(state.architecture.change_lock().is_held_here());
   if (state.work == nullptr || state.phase.load(std::memory_order_acquire) == State::kSettled) return;
   state.work->discard();
   state.work.reset();

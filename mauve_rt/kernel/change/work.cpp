@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/contract.hpp"
 
 namespace mauve {
 
@@ -25,7 +26,17 @@ TransactionCommit::Work::Work(Architecture& architecture, Runner* host, const Tr
       options_(options),
       begun_ns_(host != nullptr ? host->clock().now_ns() : monotonic_now_ns()) {}
 
+/// A change is made or called off once, and settled after that; one that was never committed is settled at once.
+void TransactionCommit::Work::advance(Phase to) {
+  const Phase from = phase_.load(std::memory_order_relaxed);  // relaxed: one thread at a time has the work
+  MAUVE_EXPECTS(from == Phase::being_made || to == Phase::settled ||
+                (from == Phase::off && to == Phase::off));
+  phase_.store(to, std::memory_order_release);
+}
+
 void TransactionCommit::Work::begin(Transaction transaction) {
+  MAUVE_EXPECTS(architecture_.change_lock().is_held_here());
+  MAUVE_EXPECTS(draft_ == nullptr && commit_ == nullptr);  // a work makes one change
   transaction_ = std::move(transaction);
   for (const auto& step : transaction_.steps())
     step_texts_.push_back(step->text() + (options_.dry_run ? " (dry run)" : ""));
@@ -75,7 +86,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
     rethrow_not_made();
   }
   if (options_.dry_run) {
-    phase_.store(Phase::off, std::memory_order_release);
+    advance(Phase::off);
     return discard();
   }
   if (settle()) architecture_.forget_open(*this);
@@ -86,7 +97,7 @@ void TransactionCommit::Work::make(Transaction transaction) {
 /// In a handler. A hook that was left behind ends the change itself, once it has returned.
 void TransactionCommit::Work::rethrow_not_made() {
   if (preparation_.is_left) throw;
-  phase_.store(Phase::off, std::memory_order_release);
+  advance(Phase::off);
   discard();
   if (is_called_off_.load(std::memory_order_relaxed)) throw_called_off();
   throw;
@@ -174,7 +185,7 @@ Commit::Outcome TransactionCommit::Work::commit_prepared(time_ns_t until_ns) noe
   is_armed_.store(false, std::memory_order_release);
   Commit::Outcome outcome = commit_->decide(until_ns, architecture_.commit_gate());
   committed_ = outcome == Commit::Outcome::made;
-  if (!committed_) phase_.store(Phase::off, std::memory_order_release);
+  if (!committed_) advance(Phase::off);
   const bool is_changed = outcome == Commit::Outcome::refused && commit_->refused_by() == &guard_;
   return is_changed ? Commit::Outcome::changed : outcome;
 }

@@ -61,7 +61,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
     std::uint32_t structure{0};
     std::uint32_t code{0};  // the registry's version
   };
-  /// All up to the commit. [non-rt], the change lock held. Throws Error; all is let go then.
+  /// All up to the commit. [non-rt], the change lock held, once. Throws Error; all is let go then.
   Basis prepare_for_later(Transaction transaction);
   /// The basis checked. [rt] as far as the actions are.
   Commit::Outcome commit_prepared(time_ns_t until_ns) noexcept;
@@ -97,6 +97,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
     bool is_settled{false};
   };
   enum class Phase : std::uint8_t { being_made, made, off, settled };
+  void advance(Phase to);
 
   // the table
   time_ns_t since_ns() const noexcept override;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mauve_rt/architecture/runner.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/running_hook.hpp"
 
 #include "change/work.hpp"
@@ -44,6 +45,8 @@ bool TransactionCommit::Work::is_structural() const noexcept {
 void TransactionCommit::Work::claim_whole() noexcept {
   const ArchitectureClaims wanted{.structure = is_structural(), .revision = options_.expected_revision != 0};
   const CommitGate::Look table(architecture_.commit_gate());
+  MAUVE_AUDIT(!(wanted.structure && architecture_.claims().structure));
+  MAUVE_AUDIT(!(wanted.revision && architecture_.claims().revision));
   claimed_ = wanted;
   architecture_.claims().structure |= claimed_.structure;
   architecture_.claims().revision |= claimed_.revision;
@@ -121,6 +124,7 @@ void TransactionCommit::Work::prepare_lists() {
 }
 
 time_ns_t TransactionCommit::Work::since_ns() const noexcept {
+  MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
   time_ns_t latest_ns = 0;
   for (const Element& element : elements_)
     latest_ns = std::max(latest_ns, element.component->change_mark().since_ns());
@@ -129,6 +133,7 @@ time_ns_t TransactionCommit::Work::since_ns() const noexcept {
 }
 
 bool TransactionCommit::Work::is_current() const noexcept {
+  MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
   if (is_structural_ && architecture_.commit_gate().structure() != structure_) return false;
   return is_run_only_ || std::all_of(elements_.begin(), elements_.end(), [](const Element& element) {
            return element.component->change_mark().changes() == element.changes;
@@ -136,6 +141,7 @@ bool TransactionCommit::Work::is_current() const noexcept {
 }
 
 void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
+  MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
   if (is_structural_) architecture_.swap_lists(lists_);
   for (auto& [component, wires] : wires_) component->swap_wires(wires);
   for (ServiceBase* service : services_) service->set_since_ns(instant_ns);
@@ -149,7 +155,7 @@ void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
   }
   for (Component* component : added_) component->enter(architecture_);
   if (is_structural_) architecture_.commit_gate().restructured();
-  phase_.store(Phase::made, std::memory_order_release);
+  advance(Phase::made);
   architecture_.note_open();  // last: who settles takes the hint back, then looks at the phase
   architecture_.changes().bump();
 }
@@ -173,7 +179,7 @@ bool TransactionCommit::Work::settle() noexcept {
     if (!is_all || !commit_->is_left()) return false;
     end_settlement();
   }
-  phase_.store(Phase::settled, std::memory_order_release);
+  advance(Phase::settled);
   return true;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/trace.hpp"
@@ -113,6 +114,7 @@ void ClientBase::end(std::uint32_t number, CallOutcome outcome, FunctionRef<void
 }
 
 void ClientBase::count(CallOutcome outcome, time_ns_t lasted_ns) noexcept {
+  MAUVE_AUDIT(mutex_.is_held_here());
   switch (outcome) {
     case CallOutcome::answered:
       ++counts_.answered;

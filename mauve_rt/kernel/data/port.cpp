@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -85,6 +86,7 @@ PortConnection PortBase::prepare(ServiceBase& service, const std::string& resour
 }
 
 void PortBase::swap(PortConnection& connection) noexcept {
+  MAUVE_EXPECTS(!is_seated_ || connection_.service != nullptr);
   attach(nullptr, nullptr);
   if (is_seated_) connection_.service->unseat(own_seat_);
   is_seated_ = connection.service != nullptr && connection.service->seat(own_seat_);
@@ -97,6 +99,7 @@ void PortBase::swap(PortConnection& connection) noexcept {
 }
 
 bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
+  MAUVE_AUDIT(is_closed());
   if (is_safe_) return true;
   ServiceBase* service = nullptr;
   {

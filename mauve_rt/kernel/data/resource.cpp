@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 
@@ -57,6 +58,7 @@ void EventListeners::replace(EventListener& listener, EventListener& by) noexcep
   const std::lock_guard change(change_mutex_);
   const std::lock_guard lock(mutex_);
   const auto place = std::find(listeners_.begin(), listeners_.end(), &listener);
+  MAUVE_AUDIT(place != listeners_.end());
   if (place != listeners_.end()) *place = &by;
 }
 

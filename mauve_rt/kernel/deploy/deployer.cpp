@@ -5,6 +5,7 @@
 #include <set>
 #include <thread>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 
@@ -42,7 +43,10 @@ class Deployer::Barrier {
   Barrier& operator=(const Barrier&) = delete;
 
   pthread_barrier_t& get() noexcept { return barrier_; }
-  void created_one() noexcept { --missing_; }
+  void created_one() {
+    MAUVE_EXPECTS(missing_ > 0);
+    --missing_;
+  }
   void arrive() noexcept { pthread_barrier_wait(&barrier_); }
   /// Lets those go on that have arrived, by standing in for whoever never will.
   void stand_in() {

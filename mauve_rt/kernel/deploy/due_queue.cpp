@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <climits>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -31,6 +32,7 @@ void DueQueue::Heap<Order>::push(const Entry& entry) {
 
 template <typename Order>
 void DueQueue::Heap<Order>::pop() noexcept {
+  MAUVE_AUDIT(!is_empty());
   const Entry last = entries_.back();
   entries_.pop_back();
   if (!entries_.empty()) sink(0, last);
@@ -78,6 +80,7 @@ void DueQueue::update(Task& task, time_ns_t now_ns) {
   const time_ns_t due_ns = task.due_ns();
   QueuePlace& place = task.queue_place();
   if (place.is_queued && place.is_late && due_ns <= now_ns) return;  // as late as before
+  MAUVE_EXPECTS(!place.is_queued || queued_ > 0);
   if (due_ns == kForever) {
     if (place.is_queued) --queued_;
     place.is_queued = false;
@@ -98,6 +101,7 @@ void DueQueue::update(Task& task, time_ns_t now_ns) {
 
 void DueQueue::forget(Task& task) {
   QueuePlace& place = task.queue_place();
+  MAUVE_EXPECTS(!place.is_queued || queued_ > 0);
   if (place.is_queued) --queued_;
   place.is_queued = false;
   const auto is_its = [&task](const Entry& entry) { return entry.task == &task; };

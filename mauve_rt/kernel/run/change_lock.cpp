@@ -5,6 +5,7 @@
 #include <chrono>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/task.hpp"
 
@@ -12,8 +13,22 @@ namespace mauve {
 
 namespace {
 
-/// Of the changes that the thread is inside of; a hook may change another architecture.
-thread_local std::vector<const ChangeLock*> entered;
+/// A change that the thread is inside of; a hook may change another architecture.
+struct Entered {
+  const ChangeLock* lock;
+  bool is_held;  // by this thread: not in a Pause, and not inside the change of another thread
+};
+thread_local std::vector<Entered> entered;
+
+Entered* find_entered(const ChangeLock& lock) noexcept {
+  const auto found =
+      std::find_if(entered.begin(), entered.end(), [&](const Entered& each) { return each.lock == &lock; });
+  return found != entered.end() ? &*found : nullptr;
+}
+
+void forget_entered(const ChangeLock& lock) noexcept {
+  std::erase_if(entered, [&](const Entered& each) { return each.lock == &lock; });
+}
 
 }  // namespace
 
@@ -27,8 +42,11 @@ void ChangeLock::check_caller() {
                .remedy = "let another thread ask for the change, at the component's word"});
 }
 
-bool ChangeLock::is_inside() const noexcept {
-  return std::find(entered.begin(), entered.end(), this) != entered.end();
+bool ChangeLock::is_inside() const noexcept { return find_entered(*this) != nullptr; }
+
+bool ChangeLock::is_held_here() const noexcept {
+  const Entered* const found = find_entered(*this);
+  return found != nullptr && found->is_held;
 }
 
 void ChangeLock::check_outside() const {
@@ -43,7 +61,7 @@ void ChangeLock::check_outside() const {
 void ChangeLock::lock() {
   check_outside();
   mutex_.lock();
-  entered.push_back(this);
+  entered.push_back({.lock = this, .is_held = true});
 }
 
 void ChangeLock::lock_alone() {
@@ -51,17 +69,18 @@ void ChangeLock::lock_alone() {
   std::unique_lock lock(mutex_);
   given_back_.wait(lock, [this] { return paused_ == 0; });
   lock.release();
-  entered.push_back(this);
+  entered.push_back({.lock = this, .is_held = true});
 }
 
 bool ChangeLock::try_lock() noexcept {
   if (Task::executing_here() != nullptr || is_inside() || !mutex_.try_lock()) return false;
-  entered.push_back(this);
+  entered.push_back({.lock = this, .is_held = true});
   return true;
 }
 
 void ChangeLock::unlock() noexcept {
-  std::erase(entered, this);
+  MAUVE_EXPECTS(is_held_here());
+  forget_entered(*this);
   mutex_.unlock();
   given_back_.notify_all();
 }
@@ -77,23 +96,32 @@ std::unique_lock<ChangeLock> ChangeLock::join_alone() {
 }
 
 void ChangeLock::wait_for_others() {
+  MAUVE_EXPECTS(is_held_here());
   std::unique_lock lock(mutex_, std::adopt_lock);
   given_back_.wait_for(lock, std::chrono::milliseconds(1));
   lock.release();
 }
 
 ChangeLock::Pause::Pause(ChangeLock& lock) : lock_(lock) {
+  Entered* const own = find_entered(lock_);
+  MAUVE_EXPECTS(own != nullptr && own->is_held);
+  own->is_held = false;
   ++lock_.paused_;
   lock_.mutex_.unlock();
   lock_.given_back_.notify_all();
 }
 
-ChangeLock::Inside::Inside(const ChangeLock& lock) : lock_(lock) { entered.push_back(&lock_); }
-ChangeLock::Inside::~Inside() { std::erase(entered, &lock_); }
+ChangeLock::Inside::Inside(const ChangeLock& lock) : lock_(lock) {
+  MAUVE_EXPECTS(!lock_.is_inside());
+  entered.push_back({.lock = &lock_, .is_held = false});
+}
+ChangeLock::Inside::~Inside() { forget_entered(lock_); }
 
 ChangeLock::Pause::~Pause() {
   lock_.mutex_.lock();
+  MAUVE_EXPECTS(lock_.paused_ > 0);
   --lock_.paused_;
+  find_entered(lock_)->is_held = true;
 }
 
 }  // namespace mauve

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
@@ -43,6 +44,11 @@ void Commit::assign_actions() {
   }
   std::sort(order_.begin(), order_.end(),
             [](const Participant* a, const Participant* b) { return a->task->number() < b->task->number(); });
+  // A task that takes part twice would be locked twice.
+  MAUVE_EXPECTS(
+      std::adjacent_find(order_.begin(), order_.end(), [](const Participant* a, const Participant* b) {
+        return a->task == b->task;
+      }) == order_.end());
   for (CommitAction* action : actions_) {
     Participant* const own = action->task != nullptr ? find(*action->task) : nullptr;
     if (own != nullptr) own->actions.push_back(action);  // else a check, or of an added one that does not run
@@ -100,16 +106,21 @@ void Commit::refuse(const Participant* participant, const CommitAction& action, 
 }
 
 bool Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
+  MAUVE_EXPECTS(!participant.has_voted);
   const CutWord seen = cut_.raise(entered_ns);
   participant.has_voted = true;
   participant.has_agreed.store(true, std::memory_order_relaxed);  // relaxed: for a message
-  if (seen.is_off() || to_vote_.fetch_sub(1, std::memory_order_acq_rel) != 1) return false;
+  if (seen.is_off()) return false;
+  const std::uint32_t to_vote = to_vote_.fetch_sub(1, std::memory_order_acq_rel);
+  MAUVE_EXPECTS(to_vote != 0);
+  if (to_vote != 1) return false;
   cut_.close();
   return true;
 }
 
 time_ns_t Commit::take(Participant& participant) noexcept {
   const Clock& clock = participant.task->clock();
+  MAUVE_EXPECTS(is_made() && participant.has_voted);
   time_ns_t began = clock.now_ns();
   time_ns_t overlong = 0;
   for (CommitAction* action : participant.actions) {
@@ -126,9 +137,13 @@ time_ns_t Commit::take(Participant& participant) noexcept {
 }
 
 void Commit::pass(Participant& participant) noexcept {
+  MAUVE_EXPECTS(is_made() &&
+                !participant.passed.load(std::memory_order_relaxed));  // relaxed: who passes wrote it
   participant.passed.store(true, std::memory_order_release);
   // The commit may be freed once this was the last one: only the word's address is used after it.
-  if (to_pass_.fetch_sub(1, std::memory_order_acq_rel) == 1) futex_wake_all(to_pass_);
+  const std::uint32_t to_pass = to_pass_.fetch_sub(1, std::memory_order_acq_rel);
+  MAUVE_EXPECTS(to_pass != 0);
+  if (to_pass == 1) futex_wake_all(to_pass_);
 }
 
 bool Commit::call_off(Off why, const Task* by) noexcept {
@@ -147,6 +162,7 @@ bool Commit::call_off_quietly(Off why, const Task* by) noexcept {
 }
 
 void Commit::wake_requester() noexcept {
+  MAUVE_EXPECTS(!cut_.look().is_open());
   decided_.store(1, std::memory_order_release);
   futex_wake_all(decided_);
 }
@@ -165,6 +181,7 @@ bool Commit::prepare_install() noexcept {
 }
 
 void Commit::publish() noexcept {
+  MAUVE_EXPECTS(is_made());
   if (publication_ != nullptr) publication_->publish(instant_ns());
 }
 
@@ -230,6 +247,12 @@ bool Commit::lock(time_ns_t until_ns) noexcept {
   return true;
 }
 
+/// Whether the requester holds the command mutex of each participant.
+bool Commit::has_commands() const noexcept {
+  return std::all_of(order_.begin(), order_.end(),
+                     [](const Participant* each) { return each->task->command_mutex().is_held_here(); });
+}
+
 void Commit::unlock() noexcept {
   for (Participant* participant : order_) participant->task->command_mutex().unlock();
 }
@@ -243,8 +266,9 @@ const Task* Commit::find_unfit() const noexcept {
   return nullptr;
 }
 
-/// The commands held: no start comes between this and the takes of the parked ones.
+/// No start comes between this and the takes of the parked ones.
 void Commit::begin() noexcept {
+  MAUVE_AUDIT(has_commands());
   bool takes_epoch = false;
   bool has_own = false;
   for (Participant* participant : order_) {
@@ -345,8 +369,10 @@ void Commit::await_busy(time_ns_t until_ns) noexcept {
   }
 }
 
-/// Made, the commands held: nothing of what follows waits for a component.
+/// Nothing of what follows waits for a component.
 void Commit::begin_completion() noexcept {
+  MAUVE_EXPECTS(is_made());
+  MAUVE_AUDIT(has_commands());
   for (Participant* participant : order_) {
     if (participant->is_own) {
       participant->task->notify_commit();
@@ -359,6 +385,7 @@ void Commit::begin_completion() noexcept {
 }
 
 void Commit::await_passes(time_ns_t until_ns) noexcept {
+  MAUVE_EXPECTS(is_made());
   until_ns = std::max(until_ns, monotonic_now_ns() + kPatience);
   start_parked(until_ns);
   for (Participant* participant : order_) {
@@ -428,6 +455,7 @@ bool Commit::give_up(const Participant& participant, const char* call) noexcept 
 // ---- why it was not made
 
 void Commit::rethrow_refusal() const {
+  MAUVE_EXPECTS(!is_made());
   if (given_up_ != nullptr) {
     throw Error(ErrorCode::faulted, given_up_->fault().what,
                 {.component = given_up_->name(),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/run/commit.hpp"
 
 namespace mauve {
@@ -13,7 +14,7 @@ namespace {
 template <typename Item>
 void unlink(Item*& first, const Item& item) MAUVE_RT {
   Item** place = &first;
-  while (*place != &item) place = &(*place)->next;
+  for (; *place != &item; place = &(*place)->next) MAUVE_EXPECTS(*place != nullptr);
   *place = item.next;
 }
 
@@ -27,6 +28,7 @@ bool is_in_the_way(const Commit& commit, const UrgentCommit& urgent) MAUVE_RT {
 
 /// Takes the commits that are decided off the list; those that are made are in the table then.
 void CommitGate::take_in() noexcept {
+  MAUVE_AUDIT(is_looked_at_here());
   for (Commit** place = &under_way_; *place != nullptr;) {
     Commit& commit = **place;
     const CutWord seen = commit.look();
@@ -41,6 +43,7 @@ void CommitGate::take_in() noexcept {
 
 bool CommitGate::begin(Commit& commit) noexcept {
   const Look look(*this);
+  MAUVE_AUDIT(!commit.is_structural() || structural.is_held_here());
   if (!commit.prepare_install()) return false;
   commit.next = under_way_;
   under_way_ = &commit;
@@ -54,6 +57,7 @@ void CommitGate::look_again(Commit& commit) noexcept {
 }
 
 bool CommitGate::has_open_about(const Task& task) const noexcept {
+  MAUVE_AUDIT(is_looked_at_here());
   for (const Commit* commit = under_way_; commit != nullptr; commit = commit->next) {
     if (commit->look().is_open() && commit->is_about(task)) return true;
   }
@@ -94,6 +98,7 @@ void CommitGate::close() noexcept {
 }
 
 void CommitGate::call_off_if_unwanted(Commit& commit) noexcept {
+  MAUVE_AUDIT(is_looked_at_here());
   if (!is_open_ && commit.has_own()) commit.call_off(Commit::Off::shut_down);
   if (!commit.yields()) return;
   for (const UrgentCommit* urgent = urgent_; urgent != nullptr; urgent = urgent->next) {

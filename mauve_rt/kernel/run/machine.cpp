@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 
 namespace mauve {
@@ -44,6 +45,7 @@ void Machine::count_from(std::optional<time_ns_t> reference_ns) noexcept {
 }
 
 void Machine::start(time_ns_t instant_ns) noexcept {
+  MAUVE_EXPECTS(fsm_ != nullptr && core_ != nullptr);
   leave_event_to(fsm_->initial());
   if (const time_ns_t least = fsm_->initial_interarrival_ns(); least != 0)
     instant_ns = std::max(instant_ns, later_by(active_ns_, least));
@@ -106,6 +108,7 @@ time_ns_t Machine::due_ns() const noexcept {
 }
 
 void Machine::release(time_ns_t actual_ns) noexcept {
+  MAUVE_AUDIT(is_started());
   if (!event_settled_) set_clock_ns(due_ns());  // the time is up, and no event has come
   event_settled_ = true;
   event_ns_ = kNever;
@@ -121,6 +124,7 @@ void Machine::release(time_ns_t actual_ns) noexcept {
 }
 
 Machine::Entered Machine::enter_next() {
+  MAUVE_AUDIT(next_ != nullptr);
   const State& state = *next_;
   if (&state == &fsm_->initial()) context_.instant_ns.store(clock_ns(), std::memory_order_relaxed);
   current_.store(state.trace_id, std::memory_order_relaxed);
@@ -136,6 +140,7 @@ bool Machine::execute(const State& state) {
   present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
   trace_at(began, TraceKind::state_begin, state.trace_id);
   const auto& methods = fsm_->methods();
+  MAUVE_AUDIT(state.action < methods.size());
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
   methods[state.action].run(*core_);
   next_ = successor(state);
@@ -155,12 +160,14 @@ bool Machine::execute(const State& state) {
 const State* Machine::successor(const State& state) const {
   const auto& methods = fsm_->methods();
   for (const Transition& transition : state.transitions) {
+    MAUVE_AUDIT(transition.guard < methods.size());
     if (methods[transition.guard].test(*core_)) return transition.to;
   }
   return state.next;
 }
 
 void Machine::leave_wait() {
+  MAUVE_AUDIT(is_started());
   if (next_ != nullptr) return;  // just started: it goes on in the initial state itself
   if (waiting_->transitions.empty()) {
     next_ = waiting_->next;
@@ -183,6 +190,7 @@ void Machine::enter_wait(const State& state) {
     if (const time_ns_t period = grid().period_ns; period != 0) {
       grid_place_ns_ += state.duration_ns % period;
       if (grid_place_ns_ >= period) grid_place_ns_ -= period;
+      MAUVE_AUDIT(grid_place_ns_ >= 0 && grid_place_ns_ < period);
     }
     trace_at(boundary_ns_, TraceKind::wait, state.trace_id, clock_ns());
     if (boundary_ns_ > clock_ns()) handle_overrun(state, boundary_ns_);
@@ -229,6 +237,7 @@ void Machine::handle_overrun(const State& state, time_ns_t now_ns) {
     } else {
       skipped = (now_ns - missed + period - 1) / period;
       set_clock_ns(missed + skipped * period);
+      MAUVE_AUDIT(skipped > 0 && clock_ns() >= now_ns && clock_ns() - now_ns < period);
     }
     statistics_.skipped.fetch_add(static_cast<std::uint64_t>(skipped), std::memory_order_relaxed);
   }
@@ -272,6 +281,7 @@ std::int64_t Machine::skip_lost(time_ns_t since_ns, time_ns_t now_ns) noexcept {
   const time_ns_t late = now_ns - clock_ns();
   if (!event_settled_ || period == 0 || late < period || since_ns - clock_ns() >= period) return 0;
   const std::int64_t lost = (late + period - 1) / period;
+  MAUVE_AUDIT(lost > 0);
   set_clock_ns(clock_ns() + lost * period);
   return lost;
 }
@@ -291,6 +301,7 @@ time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {
   const time_ns_t initial_ns =
       clock_ns() - grid_place_ns_;  // the initial state is entered there, or whole periods off
   const time_ns_t shift = now.first_not_before(initial_ns) - initial_ns;
+  MAUVE_AUDIT(shift >= 0 && shift < now.period_ns);
   set_clock_ns(clock_ns() + shift);
   return shift;
 }

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/run/component.hpp"
@@ -168,6 +169,7 @@ Probation::PortLimits& Probation::limits_of(PortBase& port) {
 // ---- the component's thread, or who acts for a parked one
 
 void Probation::begin(PartsChange& parts) noexcept {
+  MAUVE_EXPECTS(phase() == kPrepared);
   const Task& task = component_.task();
   parts_ = &parts;
   overruns_ = task.statistics().overruns.load(std::memory_order_relaxed);  // relaxed: this thread counts them
@@ -215,7 +217,8 @@ bool Probation::note_fault(const FaultNote& fault) noexcept {
     cause = ProbationCause::overrun;  // whose policy is fault
   }
   if (cause != ProbationCause::none && found_.cause == ProbationCause::none) {
-    MAUVE_RT_TRUSTED(fault_ = fault.what);  // empty before, so nothing is freed
+    MAUVE_AUDIT(fault_ == nullptr);  // so the assignment frees nothing
+    MAUVE_RT_TRUSTED(fault_ = fault.what);
     fault_bound_ns_ = fault.bound_ns;
     fault_where_ = fault.where;
     find({.cause = cause, .instant_ns = task.entered_ns()});
@@ -241,6 +244,7 @@ bool Probation::begin_end() noexcept {
 void Probation::end(Phase phase, ProbationCause why) noexcept {
   cause_ = why;
   ended_ns_ = component_.task().clock().now_ns();
+  MAUVE_EXPECTS(this->phase() == kEnding && phase > kEnding);
   phase_.store(phase, std::memory_order_release);  // release: the cause, and parts that were put back
   futex_wake_all(phase_);
 }

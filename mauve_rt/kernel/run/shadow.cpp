@@ -6,6 +6,7 @@
 #include <thread>
 #include <typeinfo>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/shadow_thread.hpp"
@@ -176,6 +177,7 @@ void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
     if (seen >= kEnding) return;
     // acq_rel: one of all that would end it does
   } while (!phase_.compare_exchange_weak(seen, kEnding, std::memory_order_acq_rel));
+  MAUVE_EXPECTS(why != ShadowCause::none);
   cause_ = why;
   ended_ns_ = now_ns;
   phase_.store(kEnded, std::memory_order_release);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 
 namespace mauve {
@@ -105,7 +106,9 @@ bool ShadowCapture::end_release(time_ns_t instant_ns, std::int64_t next_from) no
   present_.release = {.number = number_++, .instant_ns = instant_ns, .from = from_, .is_anew = is_anew_};
   from_ = next_from;
   const std::uint64_t filled = filled_.load(std::memory_order_relaxed);  // relaxed: this thread writes it
-  const bool is_free = filled - emptied_.load(std::memory_order_acquire) < kSlots;
+  const std::uint64_t taken = filled - emptied_.load(std::memory_order_acquire);
+  MAUVE_AUDIT(taken <= kSlots);
+  const bool is_free = taken < kSlots;
   captured_.store(number_, std::memory_order_relaxed);
   if (is_free) {
     Slot& slot = slots_[filled % kSlots];
@@ -131,15 +134,18 @@ const ShadowCapture::Release* ShadowCapture::front() const noexcept {
 }
 
 void ShadowCapture::pop() noexcept {
+  MAUVE_EXPECTS(front() != nullptr);
   // release: the slot was read before. The shadow's thread alone writes it.
   emptied_.store(emptied_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
 }
 
 const ShadowCapture::PortNote& ShadowCapture::note(std::size_t port) const noexcept {
+  MAUVE_EXPECTS(port < ports_.size());
   return slots_[emptied_.load(std::memory_order_relaxed) % kSlots].notes[port];
 }
 
 const std::byte* ShadowCapture::value(std::size_t port) const noexcept {
+  MAUVE_EXPECTS(port < ports_.size());
   return slots_[emptied_.load(std::memory_order_relaxed) % kSlots].values.data() + ports_[port]->offset;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <thread>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/futex.hpp"
 
@@ -86,6 +87,7 @@ void Task::swap_fault(FaultNote& note) noexcept {
 }
 
 void Task::clear_fault() noexcept {
+  MAUVE_AUDIT(is_parked());
   FaultNote none;
   swap_fault(none);
   fallen_back_.store(false, std::memory_order_release);
@@ -132,12 +134,14 @@ void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, st
 }
 
 std::unique_ptr<TraceRing> Task::release_ring() {
+  MAUVE_EXPECTS(has_ended());
   const std::lock_guard lock(ring_mutex_);
   machine_.set_ring(nullptr);
   return std::move(ring_);
 }
 
 void Task::begin_trace(bool trace) {
+  MAUVE_EXPECTS(!has_thread());
   const std::lock_guard lock(ring_mutex_);
   if (!trace) {
     ring_.reset();
@@ -200,6 +204,7 @@ void Task::start_at(time_ns_t instant_ns) {
 }
 
 void Task::post_start(time_ns_t instant_ns) noexcept {
+  MAUVE_AUDIT(command_mutex_.is_held_here());
   start_at_ns_ = instant_ns;
   started_.store(0, std::memory_order_relaxed);  // relaxed: kStart publishes it
   {

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/run/task.hpp"
 
@@ -30,6 +31,7 @@ bool Task::wait_slot(time_ns_t until_ns) noexcept {
 }
 
 bool Task::post(Participant& participant, time_ns_t until_ns) noexcept {
+  MAUVE_AUDIT(command_mutex_.is_held_here());
   if (!wait_slot(until_ns)) return false;
   participant_.store(&participant, std::memory_order_relaxed);  // slot_ hands it over
   // seq_cst: the thread, on its way into a park or its end, sees this, or this thread sees that it has parked or ended
@@ -74,7 +76,9 @@ bool Task::enter_slot() noexcept {
 }
 
 void Task::leave_slot(std::uint32_t to) noexcept {
-  if ((slot_.exchange(to, std::memory_order_acq_rel) & kWaited) != 0) futex_wake_all(slot_);
+  const std::uint32_t before = slot_.exchange(to, std::memory_order_acq_rel);
+  MAUVE_EXPECTS((before & kSlot) == kBusy);
+  if ((before & kWaited) != 0) futex_wake_all(slot_);
 }
 
 /// Votes, and takes a change that is made. False when the component has parked.
@@ -323,6 +327,7 @@ bool Task::settle_slot(bool ends) noexcept {
 bool Task::end_slot(Participant& participant) noexcept {
   Commit& commit = *participant.commit;
   if (commit.call_off_quietly(Commit::Off::withdrawn, this)) {
+    MAUVE_EXPECTS(withdrawn_ == nullptr);
     withdrawn_ = &participant;
     return false;
   }
@@ -351,6 +356,8 @@ void Task::release_withdrawn() noexcept {
 }
 
 void Task::take_parked(Participant& participant) noexcept {
+  MAUVE_AUDIT(command_mutex_.is_held_here());
+  MAUVE_AUDIT(participant.left_behind || is_parked());
   Commit& commit = *participant.commit;
   participant.parked_ns = clock().now_ns();
   commit.take(participant);

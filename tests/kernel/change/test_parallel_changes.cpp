@@ -201,6 +201,7 @@ TEST_F(ParallelChanges, Storm) {
     EXPECT_EQ(ComponentState::running, state(name));
     EXPECT_FALSE(architecture.component(name).change_mark().is_claimed());
   }
+  const CommitGate::Look table(architecture.commit_gate());
   EXPECT_FALSE(architecture.claims().structure);
   EXPECT_FALSE(architecture.claims().revision);
 }

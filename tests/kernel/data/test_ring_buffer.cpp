@@ -138,6 +138,10 @@ TEST_F(RingFixture, OverwritingKeepsTheNewestAndCountsTheLost) {
   EXPECT_EQ(1U, overwriting.lost());
   EXPECT_EQ(2.0, first.input.read().value.value);
   EXPECT_EQ(3.0, first.input.read().value.value);
+  EXPECT_EQ(DataStatus::old_data, first.input.read().status) << "it is empty";
+  EXPECT_TRUE(writer.output.write({4.0}));
+  EXPECT_EQ(4.0, first.input.read().value.value);
+  EXPECT_EQ(DataStatus::old_data, first.input.read().status);
 }
 
 /// Beside whoever looks at the newest one, and whoever takes a recording, which both come without a port.

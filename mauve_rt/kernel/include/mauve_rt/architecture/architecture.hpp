@@ -18,6 +18,7 @@
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/architecture/keeper.hpp"
 #include "mauve_rt/architecture/open_change.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -273,7 +274,10 @@ class Architecture final : public Configurable {
   /// Each whose hook has lasted for longer than it asked for. [non-rt], the change lock held.
   void call_off_overdue() const;
   /// What changes under way have claimed beside components. [rt], within a CommitGate::Look
-  ArchitectureClaims& claims() MAUVE_RT { return claims_; }
+  ArchitectureClaims& claims() MAUVE_RT {
+    MAUVE_AUDIT(commit_gate_.is_looked_at_here());
+    return claims_;
+  }
   /// Throws Error (timeout): another change lasts, or a component, which is named, has not taken one. [non-rt], change lock held.
   [[noreturn]] void throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
@@ -281,8 +285,14 @@ class Architecture final : public Configurable {
   /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
   void drop_stale_prepared() noexcept;
   /// [non-rt], the change lock held.
-  void enlist(OpenChange& prepared) { prepared_.push_back(&prepared); }
-  void delist(const OpenChange& prepared) noexcept { std::erase(prepared_, &prepared); }
+  void enlist(OpenChange& prepared) {
+    MAUVE_EXPECTS(change_lock_.is_held_here());
+    prepared_.push_back(&prepared);
+  }
+  void delist(const OpenChange& prepared) noexcept {
+    MAUVE_AUDIT(change_lock_.is_held_here());
+    std::erase(prepared_, &prepared);
+  }
 
   /// A component with a number of its own, not listed yet: its changes are nobody's business. One that was removed, and
   /// is gone, leaves its number to the next of its name, whose records follow its own. [non-rt]

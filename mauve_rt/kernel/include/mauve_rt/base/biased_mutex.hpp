@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/process_barrier.hpp"
 #include "mauve_rt/base/rt.hpp"
@@ -114,6 +115,7 @@ class BiasedMutex {
   /// True: by the bias, to be left by leave(). False: by lock().
   bool enter(Seat& seat) MAUVE_RT {
     if (owner_.load(std::memory_order_relaxed) == &seat) [[likely]] {  // relaxed: a hint
+      MAUVE_AUDIT(seat.inside_.load(std::memory_order_relaxed) == 0);  // relaxed: this thread wrote it last
       seat.inside_.store(seat.take_thread(), std::memory_order_relaxed);
       light_barrier();
       if (owner_.load(std::memory_order_acquire) == &seat) [[likely]]

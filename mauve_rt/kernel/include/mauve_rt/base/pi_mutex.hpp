@@ -41,6 +41,8 @@ class PiMutex {
 
   /// The name traced when the lock is contended. [setup]
   void set_trace_id(std::uint32_t id) noexcept { trace_id_ = id; }
+  /// Whether the calling thread holds it. [rt]
+  bool is_held_here() const MAUVE_RT;
   /// How many PiMutexes the calling thread holds; not 0 at a state boundary is a fault. [rt]
   static int held_by_this_thread() MAUVE_RT;
   /// The same for others to look at, while the calling thread lives. [rt]

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -31,7 +32,8 @@ class RevocableReference {
   void use(Function&& function) noexcept {
     users_.fetch_add(1, std::memory_order_seq_cst);
     if (T* const object = object_.load(std::memory_order_seq_cst)) std::forward<Function>(function)(*object);
-    users_.fetch_sub(1, std::memory_order_seq_cst);
+    const std::uint32_t users = users_.fetch_sub(1, std::memory_order_seq_cst);
+    MAUVE_AUDIT(users != 0);
     if (waiting_.load(std::memory_order_seq_cst) != 0) futex_wake_all(users_);
   }
 

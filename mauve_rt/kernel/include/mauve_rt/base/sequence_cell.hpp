@@ -9,6 +9,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -27,8 +28,10 @@ class SequenceCell {
   static constexpr std::size_t kWords = (sizeof(T) + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t);
 
  public:
-  /// [rt] One thread at a time. Sequences count from 1, one by one.
+  /// Sequences count from 1, one by one. [rt] One thread at a time.
   void store(const T& value, time_ns_t time_ns, std::uint64_t sequence) MAUVE_RT {
+    MAUVE_AUDIT(version_.load(std::memory_order_relaxed) ==
+                2 * (sequence - 1));  // relaxed: written here only
     std::array<std::uint64_t, kWords> words{};
     std::memcpy(words.data(), &value, sizeof(T));
     version_.store(2 * sequence - 1, std::memory_order_release);

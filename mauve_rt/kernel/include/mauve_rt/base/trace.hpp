@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -95,6 +96,7 @@ class TraceRing {
                std::int64_t b = 0, std::int64_t c = 0) MAUVE_RT {
     const std::uint64_t head = head_.load(std::memory_order_relaxed);  // relaxed: only this thread writes it
     const std::uint64_t dropped = dropped_.load(std::memory_order_relaxed);
+    MAUVE_AUDIT(head - seen_tail_ <= mask_ + 1);
     if (head - seen_tail_ > mask_) [[unlikely]] {
       seen_tail_ = tail_.load(std::memory_order_acquire);
       if (head - seen_tail_ > mask_) {

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/sequence_cell.hpp"
 #include "mauve_rt/data/service.hpp"
@@ -77,6 +78,7 @@ class LatestRegister {
   bool write(const T& value, time_ns_t time_ns) MAUVE_RT {
     const Table& slots = *table_.load(std::memory_order_acquire);
     const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written here only
+    MAUVE_AUDIT(newest < slots.size());
     for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
       Slot& slot = *slots[i];
       // acquire: what its readers copied, they have copied
@@ -88,6 +90,7 @@ class LatestRegister {
       if constexpr (kHasFront) front_.store(value, time_ns, sequence_);
       // release: publishes the slot. acquire: who has taken one gave another one back before; else none might look free
       const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_acq_rel);
+      MAUVE_AUDIT(index_of(before) == newest);  // else another thread writes, too
       slots[newest]->taken = before & kCountMask;
       return true;
     }
@@ -148,7 +151,11 @@ class LatestRegister {
   static std::size_t next(std::size_t i, const Table& slots) noexcept {
     return i + 1 == slots.size() ? 0 : i + 1;
   }
-  Slot& slot(std::uint32_t held) noexcept { return *(*table_.load(std::memory_order_acquire))[held - 1]; }
+  Slot& slot(std::uint32_t held) noexcept {
+    const Table& slots = *table_.load(std::memory_order_acquire);
+    MAUVE_AUDIT(held != 0 && held <= slots.size());
+    return *slots[held - 1];
+  }
 
   /// The newest slot, untouched until the reader's next call.
   const Entry& newest(std::uint32_t& held) noexcept {
@@ -176,7 +183,9 @@ class LatestRegister {
   void take_newest(std::uint32_t& held) noexcept {
     let_go(held);
     // acquire: pairs with the exchange, through the additions of other readers. release: with the next exchange
-    held = static_cast<std::uint32_t>(index_of(word_.fetch_add(1, std::memory_order_acq_rel))) + 1;
+    const std::uint64_t before = word_.fetch_add(1, std::memory_order_acq_rel);
+    MAUVE_AUDIT((before & kCountMask) != kCountMask);  // else the count would run into the index
+    held = static_cast<std::uint32_t>(index_of(before)) + 1;
   }
 
   [[no_unique_address]] std::conditional_t<kHasFront, SequenceCell<T>, Nothing> front_;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
@@ -138,7 +139,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     const BiasedMutex::Hold hold(overwrites() ? write.mutex() : readers_mutex_, reader.seat);
     const std::uint64_t head =
         readers_.head.load(std::memory_order_relaxed);  // relaxed: written under this lock
-    if (readers_.tail == head) {
+    if (readers_.tail <= head) {  // less: the writer has overwritten elements since the last look
       readers_.tail = writers_.tail.load(std::memory_order_acquire);
       if (readers_.tail == head) {
         if (reader.seen == 0) return DataStatus::none;
@@ -146,6 +147,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
         return DataStatus::old_data;
       }
     }
+    MAUVE_AUDIT(readers_.tail > head && readers_.tail - head <= places_.size());
     const Place& place = places_[readers_.place];
     value = place.value;
     time_ns = place.time_ns;
@@ -155,6 +157,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   }
   /// The oldest; under the readers' lock.
   void remove(std::uint64_t head) noexcept {
+    MAUVE_AUDIT(head < writers_.tail.load(std::memory_order_acquire));
     if (++readers_.place == places_.size()) readers_.place = 0;
     readers_.head.store(head + 1, std::memory_order_release);
   }
@@ -170,6 +173,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
         remove(writers_.head++);  // its readers have the same lock
       }
     }
+    MAUVE_AUDIT(tail - writers_.head < places_.size());
     Place& place = places_[writers_.place];
     place.value = value;
     place.time_ns = time_ns;

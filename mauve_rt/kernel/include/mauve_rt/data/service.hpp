@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 
@@ -159,7 +160,10 @@ class ServiceBase {
   void check_ports(std::uint32_t wanted) const;
   /// A port came or went; kept by PortBase and Resource. [rt]
   void add_port() MAUVE_RT { ports_.fetch_add(1, std::memory_order_relaxed); }
-  void remove_port() MAUVE_RT { ports_.fetch_sub(1, std::memory_order_relaxed); }
+  void remove_port() MAUVE_RT {
+    const std::uint32_t before = ports_.fetch_sub(1, std::memory_order_relaxed);
+    MAUVE_AUDIT(before != 0);
+  }
   /// Others than ports write to it. [non-rt]
   void bind_input() noexcept {
     inputs_.fetch_add(1, std::memory_order_relaxed);

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -65,7 +66,9 @@ class WriteLog {
       return;
     const std::uint64_t written =
         ring_->written.load(std::memory_order_relaxed);  // relaxed: written here only
-    if (written - ring_->taken.load(std::memory_order_acquire) == ring_->places.size()) {
+    const std::uint64_t waiting = written - ring_->taken.load(std::memory_order_acquire);
+    MAUVE_AUDIT(waiting <= ring_->places.size());
+    if (waiting == ring_->places.size()) {
       lost_.fetch_add(1, std::memory_order_relaxed);
       return;
     }

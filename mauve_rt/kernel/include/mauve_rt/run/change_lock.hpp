@@ -26,12 +26,14 @@ class ChangeLock {
   /// lock(), or lock_alone(), unless the calling thread is inside a change. [non-rt] Throws as check_caller().
   [[nodiscard]] std::unique_lock<ChangeLock> join();
   [[nodiscard]] std::unique_lock<ChangeLock> join_alone();
-  /// Lets others have it until one of them gives it back, at most for 1 ms. [non-rt], held.
+  /// Whether the calling thread holds it: it is inside a change, and not in a Pause. [non-rt]
+  bool is_held_here() const noexcept;
+  /// Lets others have it until one of them gives it back, at most for 1 ms. [non-rt]
   void wait_for_others();
   /// Throws Error (would_deadlock) on a component's own thread: a change waits for that one to come to a wait. [non-rt]
   static void check_caller();
 
-  /// While it lives other threads can have the lock, and the calling thread is inside its change still. [non-rt], held.
+  /// While it lives other threads can have the lock, and the calling thread is inside its change still. [non-rt]
   class Pause {
    public:
     explicit Pause(ChangeLock& lock);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/run/cut.hpp"
@@ -204,7 +205,11 @@ class Commit {
   /// [non-rt], after it ended.
   bool is_made() const noexcept { return cut_.look().is_closed(); }
   /// T. [rt], once it is made.
-  time_ns_t instant_ns() const MAUVE_RT { return cut_.look().instant_ns(); }
+  time_ns_t instant_ns() const MAUVE_RT {
+    const CutWord made = cut_.look();
+    MAUVE_EXPECTS(made.is_closed());
+    return made.instant_ns();
+  }
   /// Whether all have taken the change: what it put out may be retired. [rt]
   bool has_passed() const MAUVE_RT { return to_pass_.load(std::memory_order_acquire) == 0; }
   /// Whether the requester has gone on without those that are late. [rt]
@@ -251,6 +256,7 @@ class Commit {
   bool await_slots(time_ns_t until_ns) noexcept;
   bool lock(time_ns_t until_ns) noexcept;
   void unlock() noexcept;
+  bool has_commands() const MAUVE_RT;
   const Task* find_unfit() const noexcept;
   void begin() noexcept;
   bool check() noexcept;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
@@ -81,10 +82,15 @@ class CommitGate {
     CommitGate& gate_;
   };
 
+  /// Whether a Look of the calling thread lives. [rt]
+  bool is_looked_at_here() const MAUVE_RT { return mutex_.is_held_here(); }
   /// How often components or resources were added or removed, ports wired, or shells replaced. [rt]
   std::uint32_t structure() const MAUVE_RT { return structure_.load(std::memory_order_acquire); }
   /// Within a Look, and CommitGate::structural held by who does not commit. [rt]
-  void restructured() MAUVE_RT { structure_.fetch_add(1, std::memory_order_release); }
+  void restructured() MAUVE_RT {
+    MAUVE_AUDIT(is_looked_at_here());
+    structure_.fetch_add(1, std::memory_order_release);
+  }
 
   /// Installs a commit, which is to be carried out: until it is decided others may call it off. False: the table is not the one
   /// that it was prepared for. [rt]
@@ -132,17 +138,29 @@ class ChangeMark {
 
   /// [rt]
   bool is_claimed() const MAUVE_RT { return is_claimed_; }
-  void claim() MAUVE_RT { is_claimed_ = true; }
-  void release() MAUVE_RT { is_claimed_ = is_held_ = false; }
+  void claim() MAUVE_RT {
+    MAUVE_EXPECTS(!is_claimed_);
+    is_claimed_ = true;
+  }
+  void release() MAUVE_RT {
+    MAUVE_EXPECTS(is_claimed_);
+    is_claimed_ = is_held_ = false;
+  }
   /// By who has claimed it: not even an urgent change is to be made meanwhile, as this one acts on the parts that are in. [rt]
-  void hold() MAUVE_RT { is_held_ = true; }
+  void hold() MAUVE_RT {
+    MAUVE_EXPECTS(is_claimed_);
+    is_held_ = true;
+  }
   bool is_held() const MAUVE_RT { return is_held_; }
 
   /// How many changes are made of which the component's part is not settled: it has not taken it, or what it has put out is
   /// there still. [rt]
   bool is_unsettled() const MAUVE_RT { return unsettled_ != 0; }
   void unsettle() MAUVE_RT { ++unsettled_; }
-  void settle() MAUVE_RT { --unsettled_; }
+  void settle() MAUVE_RT {
+    MAUVE_EXPECTS(unsettled_ != 0);
+    --unsettled_;
+  }
 
   /// T of the last change that was made of it. [rt]
   time_ns_t since_ns() const MAUVE_RT { return since_ns_; }

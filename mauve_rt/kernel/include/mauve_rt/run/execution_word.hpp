@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -66,6 +67,7 @@ class ExecutionWord {
   void enter() MAUVE_RT {
     const std::uint32_t before = word_.load(std::memory_order_relaxed);
     if ((before & kEntered) != 0) return;  // it restarts
+    MAUVE_EXPECTS((before & kPhase) == kIdle);
     // A plain store: until it has entered nobody else changes an idle word. release: who times it out sees the start.
     word_.store((before + kNext) | kEntered, std::memory_order_release);
   }
@@ -170,7 +172,9 @@ class ExecutionWord {
   std::uint32_t phase() const noexcept { return word_.load(std::memory_order_acquire) & kPhase; }
   void exchange_phase(std::uint32_t from, std::uint32_t to) noexcept {
     std::uint32_t word = (word_.load(std::memory_order_acquire) & ~kPhase) | from;
-    if (!word_.compare_exchange_strong(word, (word & ~kPhase) | to, std::memory_order_acq_rel)) return;
+    const bool was_from =
+        word_.compare_exchange_strong(word, (word & ~kPhase) | to, std::memory_order_acq_rel);
+    MAUVE_ENSURES(was_from);  // else a thread would sleep for ever on the phase before
     futex_wake_all(word_);
   }
 

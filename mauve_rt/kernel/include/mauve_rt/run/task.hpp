@@ -228,7 +228,7 @@ class Task final : public Waiter {
 
   /// Waits for an earlier change that it has not taken yet; false when it has not at the instant. [rt]
   bool wait_slot(time_ns_t until_ns) MAUVE_RT;
-  /// Posts a commit: the component votes in its next wait. As wait_slot() first. [rt], command mutex held.
+  /// Posts a commit: the component votes in its next wait. As wait_slot() first. [rt], under the command mutex.
   bool post(Participant& participant, time_ns_t until_ns) MAUVE_RT;
   /// Lets it look at its slot: the commit is decided. [rt]
   void notify_commit() MAUVE_RT;
@@ -312,7 +312,7 @@ class Task final : public Waiter {
   void set_state(ComponentState state) noexcept;
   /// Exchanges what is known of the last fault, for one to be forgotten or remembered. [rt], the machine parked.
   void swap_fault(FaultNote& note) MAUVE_RT;
-  /// Forgets a fault, for configure; the machine must be parked. [non-rt]
+  /// Forgets a fault, for configure. [non-rt], parked.
   void clear_fault() noexcept;
   /// Tells who waits for changes that there was one. [rt]
   void signal_change() MAUVE_RT { changes_.bump(); }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/deploy/host.hpp"
@@ -56,7 +57,10 @@ class Reserve {
   /// What was begun; returns why a component still runs, in words; empty: none does. [non-rt]
   std::string carry_out(Host& host) noexcept;
   /// The decision thread may know. [rt]
-  void end() MAUVE_RT { stage_.store(Stage::over, std::memory_order_release); }
+  void end() MAUVE_RT {
+    MAUVE_EXPECTS(is_begun());
+    stage_.store(Stage::over, std::memory_order_release);
+  }
 
  private:
   enum class Stage : std::uint8_t { idle, begun, over };

@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 
+#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/time.hpp"
@@ -82,6 +83,8 @@ class Signal {
   /// Counts from now on how often values leave `outer`, and come back into `inner`, which lies within it. Before the
   /// signal is fed. [setup]
   void count_crossings(Bounds inner, Bounds outer, bool begins_outside) {
+    MAUVE_EXPECTS(!counts_crossings_ && last().count == 0);
+    MAUVE_EXPECTS(!(inner.low < outer.low) && !(inner.high > outer.high));
     inner_ = inner;
     outer_ = outer;
     is_outside_ = begins_outside;
