@@ -2,12 +2,11 @@
 #include "mauve_rt/rules/rule_runner.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 
 namespace mauve::rules {
@@ -479,8 +478,9 @@ void RuleRunner::tell() {
 
 std::vector<Told> RuleRunner::wait_told(time_ns_t timeout_ns) {
   std::unique_lock lock(told_mutex_);
-  told_changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
-                         [&] { return woken_ || !told_.empty(); });
+  const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
+  while (!woken_ && told_.empty() && told_changed_.wait_until(lock, until_ns)) {
+  }
   std::vector<Told> taken(std::make_move_iterator(told_.begin()), std::make_move_iterator(told_.end()));
   told_.clear();
   return taken;

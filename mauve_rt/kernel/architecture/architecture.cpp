@@ -6,7 +6,7 @@
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/keep_for_ever.hpp"
@@ -88,7 +88,7 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
   };
   const Disposed last{*this, disposed()};
   const std::lock_guard change(change_lock_);
-  std::shared_lock<std::shared_mutex> use;
+  std::shared_lock<SharedMutex> use;
   Runner* const host = use_host(use);
   auto work = std::make_unique<TransactionCommit>(*this, host, options);
   work->make(std::move(transaction));
@@ -205,7 +205,7 @@ void Architecture::settle_probations_if_idle() noexcept {
   const std::uint64_t first = disposed();
   {
     const std::lock_guard change(change_lock_, std::adopt_lock);
-    std::shared_lock<std::shared_mutex> use;
+    std::shared_lock<SharedMutex> use;
     use_host(use);
     settle_changes();
     settle_probations();
@@ -287,12 +287,12 @@ void Architecture::throw_earlier(EarlierChange earlier, time_ns_t waited_ns) con
 void Architecture::settle_if_idle() noexcept {
   if (!has_open_.load(std::memory_order_relaxed) || !change_lock_.try_lock()) return;  // relaxed: a hint
   const std::lock_guard change(change_lock_, std::adopt_lock);
-  std::shared_lock<std::shared_mutex> use;
+  std::shared_lock<SharedMutex> use;
   use_host(use);
   settle_changes();
 }
 
-Runner* Architecture::use_host(std::shared_lock<std::shared_mutex>& use) const {
+Runner* Architecture::use_host(std::shared_lock<SharedMutex>& use) const {
   const std::lock_guard lock(host_mutex_);
   // Only its end waits for that. Tried: changes share it, and a host that ends was released before. A hook may shut down
   // the host, which takes these locks the other way round.

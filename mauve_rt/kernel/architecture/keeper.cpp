@@ -2,13 +2,12 @@
 #include "mauve_rt/architecture/keeper.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
-#include <thread>
 #include <utility>
+
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 
 #include "base/keep_for_ever.hpp"
 
@@ -39,8 +38,8 @@ struct Keeper::State {
     bool has_next() const noexcept { return holds == 0 && !works.empty(); }
     std::uint64_t oldest() const noexcept { return at != 0 || !has_next() ? at : works.front().number; }
   };
-  std::mutex mutex;
-  std::condition_variable changed;
+  Mutex mutex;
+  ConditionVariable changed;
   std::map<const void*, Lane> lanes;
   std::uint64_t taken{0};
 };
@@ -66,7 +65,7 @@ void Keeper::take(std::string what, std::function<void()> work, const void* lane
 void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) {
   State::Lane& its = state->lanes.at(lane);
   if (its.thread != std::thread::id{} || !its.has_next()) return;
-  std::thread thread(&Keeper::run, state, lane);
+  OrdinaryThread thread(&Keeper::run, state, lane);
   its.thread = thread.get_id();
   thread.detach();  // it ends with the work of its lane, and owns what it uses
 }
@@ -116,7 +115,7 @@ void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   const auto& lanes = state_->lanes;
   if (std::any_of(lanes.begin(), lanes.end(), is_own)) return;
   while (monotonic_now_ns() < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited))
-    state_->changed.wait_for(lock, std::chrono::milliseconds(20));
+    state_->changed.wait_until(lock, monotonic_now_ns() + ms_to_ns(20));
 }
 
 Keeper::Busy Keeper::busy() const {

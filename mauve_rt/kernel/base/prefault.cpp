@@ -13,11 +13,12 @@
 #include <charconv>
 #include <cstdint>
 #include <exception>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -207,7 +208,7 @@ struct Looked {
   std::uintptr_t private_pages{0};  // at the last look
 };
 
-std::mutex prefault_mutex;
+Mutex prefault_mutex;
 Looked looked;
 
 /// With as many pages as then, and all mappings of then still there, no mapping is new. The allocator may have given

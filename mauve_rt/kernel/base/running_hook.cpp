@@ -2,10 +2,10 @@
 #include "mauve_rt/base/running_hook.hpp"
 
 #include <map>
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -13,7 +13,7 @@ namespace {
 
 /// Of all threads that execute one. It outlives static objects, whose parts may be cleaned up at the end of the process.
 struct Running {
-  std::mutex mutex;
+  Mutex mutex;
   std::map<std::thread::id, RunningHook::Facts> hooks;
 };
 Running& running() {

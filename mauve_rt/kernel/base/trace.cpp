@@ -3,14 +3,15 @@
 
 #include <bit>
 #include <map>
-#include <mutex>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
 namespace {
 
 struct NameTable {
-  std::mutex mutex;
+  Mutex mutex;
   std::vector<std::string> words{""};  // 0: no name
   std::map<std::string, std::uint32_t, std::less<>> numbers{{"", 0}};
 };

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <mutex>
 #include <optional>
 
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 #include "change/work.hpp"
 

@@ -2,10 +2,10 @@
 #include "mauve_rt/data/client.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/base/waiter.hpp"
 

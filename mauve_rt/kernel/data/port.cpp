@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/data/port.hpp"
 
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
 

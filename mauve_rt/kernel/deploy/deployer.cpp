@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <set>
-#include <thread>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
 
 #include "base/prefault.hpp"
 
@@ -18,7 +16,7 @@ constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 
 /// The deployers of the process, for its end.
 struct Living {
-  std::mutex mutex;
+  Mutex mutex;
   std::set<Deployer*> deployers;
   bool has_ended{false};
 };
@@ -30,31 +28,6 @@ Living& living() {
 }
 
 }  // namespace
-
-/// The barrier that component threads and deployer meet at.
-class Deployer::Barrier {
- public:
-  explicit Barrier(std::size_t parties) : missing_(parties) {
-    pthread_barrier_init(&barrier_, nullptr, static_cast<unsigned>(parties));
-  }
-  ~Barrier() { pthread_barrier_destroy(&barrier_); }
-  Barrier(const Barrier&) = delete;
-  Barrier& operator=(const Barrier&) = delete;
-
-  pthread_barrier_t& get() noexcept { return barrier_; }
-  void created_one() noexcept { --missing_; }
-  void arrive() noexcept { pthread_barrier_wait(&barrier_); }
-  /// Lets those go on that have arrived, by standing in for whoever never will.
-  void stand_in() {
-    std::vector<std::thread> stand_ins;
-    for (; missing_ > 0; --missing_) stand_ins.emplace_back([this] { arrive(); });
-    for (std::thread& thread : stand_ins) thread.join();
-  }
-
- private:
-  pthread_barrier_t barrier_{};
-  std::size_t missing_;
-};
 
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
     : Host(architecture), options_(options) {
@@ -102,7 +75,7 @@ void Deployer::deploy() {
   // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it. Each finds its start
   // waiting when the barrier opens, which one wake-up does for all: none runs while the others' are being posted.
   start_all(monotonic_now_ns() + kDeploymentLead);
-  barrier_->arrive();
+  barrier_->arrive_and_wait();
   for (const auto& component : architecture().components()) component->task().wait_started(kForever);
   architecture().commit_gate().open();
   set_deployed(true);
@@ -117,16 +90,17 @@ void Deployer::create_threads() {
                                "wait for its end, then deploy again");
     }
   }
-  barrier_ = std::make_unique<Barrier>(components.size() + 1);
+  auto missing = static_cast<std::uint32_t>(components.size() + 1);
+  barrier_ = std::make_unique<Barrier>(missing);
   watchdog_ = std::make_shared<Watchdog>();
   try {
     for (const auto& component : components) {
-      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace, watchdog_);
+      component->task().create_thread(barrier_.get(), options_.require_realtime, options_.trace, watchdog_);
+      --missing;
       note_hosted(component);
-      barrier_->created_one();
     }
   } catch (...) {
-    barrier_->stand_in();
+    barrier_->arrive(missing);  // lets those go on that have arrived
     for (const auto& component : components) component->task().end_thread(kForever);
     watchdog_.reset();
     throw;

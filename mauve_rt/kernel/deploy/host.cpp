@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
 

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/deploy/trace_collector.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
@@ -37,7 +36,12 @@ TraceDrain TraceCollector::take() {
 
 void TraceCollector::run() {
   std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, std::chrono::nanoseconds(period_ns_), [this] { return ending_; })) collect();
+  while (!ending_) {
+    const time_ns_t next_ns = later_by(monotonic_now_ns(), period_ns_);
+    while (!ending_ && end_.wait_until(lock, next_ns)) {
+    }
+    if (!ending_) collect();
+  }
 }
 
 void TraceCollector::collect() {

@@ -2,8 +2,8 @@
 #include "mauve_rt/parts/event_input.hpp"
 
 #include <algorithm>
-#include <mutex>
 
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/parts/fsm.hpp"
 
 namespace mauve {

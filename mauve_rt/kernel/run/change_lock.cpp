@@ -2,7 +2,6 @@
 #include "mauve_rt/run/change_lock.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
 #include "mauve_rt/base/error.hpp"
@@ -49,7 +48,7 @@ void ChangeLock::lock() {
 void ChangeLock::lock_alone() {
   check_outside();
   std::unique_lock lock(mutex_);
-  given_back_.wait(lock, [this] { return paused_ == 0; });
+  while (paused_ != 0) given_back_.wait(lock);
   lock.release();
   entered.push_back(this);
 }
@@ -78,7 +77,7 @@ std::unique_lock<ChangeLock> ChangeLock::join_alone() {
 
 void ChangeLock::wait_for_others() {
   std::unique_lock lock(mutex_, std::adopt_lock);
-  given_back_.wait_for(lock, std::chrono::milliseconds(1));
+  given_back_.wait_until(lock, monotonic_now_ns() + ms_to_ns(1));
   lock.release();
 }
 

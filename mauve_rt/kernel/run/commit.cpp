@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/task.hpp"
 

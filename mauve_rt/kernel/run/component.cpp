@@ -5,7 +5,7 @@
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/prefault.hpp"

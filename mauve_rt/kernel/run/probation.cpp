@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {

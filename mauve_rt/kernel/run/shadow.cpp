@@ -2,11 +2,10 @@
 // A shadow's life; how it executes its candidate is in shadow_execution.cpp.
 #include "mauve_rt/run/shadow.hpp"
 
-#include <chrono>
-#include <thread>
 #include <typeinfo>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/shadow_thread.hpp"
 
@@ -17,7 +16,7 @@ namespace mauve {
 namespace {
 
 /// How often a requester looks whether the candidate's state has ended.
-constexpr std::chrono::microseconds kShadowLook{500};
+constexpr time_ns_t kShadowLook = us_to_ns(500);
 
 std::string name_of(const CoreBase& core) {
   return core.implementation().empty() ? "(an object)" : core.implementation();
@@ -196,7 +195,7 @@ std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
            .expected = "the end of the state within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
            .remedy = "try again, or end the shadow"});
     }
-    std::this_thread::sleep_for(kShadowLook);
+    sleep_for(kShadowLook);
   }
   if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr)
     return std::move(parts_.core);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // How a shadow executes its candidate: on the shadow's thread, or in a simulation.
-#include <ctime>
-
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/run/shadow.hpp"
 
@@ -10,12 +8,6 @@
 namespace mauve {
 
 namespace {
-
-time_ns_t thread_cpu_ns() noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return s_to_ns(time.tv_sec) + time.tv_nsec;
-}
 
 /// What the candidate marks in the trace goes nowhere: in a simulation the ring at hand is the component's.
 class WithoutRing {
@@ -65,10 +57,10 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   put_inputs();
   clock_->set_now(release.instant_ns);
   const WithoutRing none;
-  const time_ns_t began_ns = thread_cpu_ns();
+  const time_ns_t began_ns = thread_cpu_now_ns();
   const bool has_executed = advance_to(release);
   const bool is_virtual = signal_ == nullptr;
-  const time_ns_t execution_ns = is_virtual ? clock_->spent_ns() : thread_cpu_ns() - began_ns;
+  const time_ns_t execution_ns = is_virtual ? clock_->spent_ns() : thread_cpu_now_ns() - began_ns;
   const std::lock_guard lock(figures_mutex_);
   ++(has_executed ? figures_.compared : figures_.idle);
   if (has_executed) count_execution(execution_ns);

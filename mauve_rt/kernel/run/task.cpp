@@ -3,12 +3,11 @@
 #include "mauve_rt/run/task.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
-#include <thread>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 
 namespace mauve {
 
@@ -17,7 +16,7 @@ namespace {
 /// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
 /// For a lock that a commit may hold for long.
-constexpr std::chrono::microseconds kBetweenTries{500};
+constexpr time_ns_t kBetweenTries = us_to_ns(500);
 /// What lasts for so many periods, and so long, is told as hung where no other figure was set.
 constexpr std::int64_t kHungPeriods = 10;
 constexpr time_ns_t kHungAtLeast = s_to_ns(1);
@@ -69,7 +68,7 @@ Task::~Task() { end_thread(kForever); }
 
 void Task::retract_fallback() noexcept {
   fallback_.exchange(nullptr, std::memory_order_acq_rel);
-  while (is_falling_back_.load(std::memory_order_acquire)) std::this_thread::yield();
+  while (is_falling_back_.load(std::memory_order_acquire)) yield_thread();
 }
 
 void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
@@ -171,7 +170,7 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
   // Tried again and again: ThreadSanitizer does not know the timed lock of the monotonic clock.
   while (!lock.try_lock()) {
     if (monotonic_now_ns() >= until_ns) return false;
-    std::this_thread::sleep_for(kBetweenTries);
+    sleep_for(kBetweenTries);
   }
   if (!has_thread_) return true;
   control_.fetch_or(kStop | kExit, std::memory_order_acq_rel);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A task's part in the probation of its core (probation.hpp): it finds violations, and puts the old core back.
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/probation.hpp"
 #include "mauve_rt/run/task.hpp"
 

@@ -2,10 +2,10 @@
 #include "mauve_rt/run/watchdog.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/run/task.hpp"
 
 #include "base/touch_stack.hpp"

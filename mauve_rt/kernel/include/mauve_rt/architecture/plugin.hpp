@@ -8,13 +8,13 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mauve_rt/architecture/given_resources.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/parts/core.hpp"
@@ -245,7 +245,7 @@ class PluginRegistry {
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
   [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const;
 
-  mutable std::recursive_mutex mutex_;  // a library registers its parts under it
+  mutable RecursiveMutex mutex_;  // a library registers its parts under it
   std::set<std::string> libraries_;
   std::string loading_;  // the library that registers its parts now
   Entries<Shell> shells_;

@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "mauve_rt/base/pi_mutex.hpp"
-#include "mauve_rt/base/process_barrier.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/process_barrier.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
 namespace mauve {

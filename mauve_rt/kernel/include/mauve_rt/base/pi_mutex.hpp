@@ -2,12 +2,11 @@
 // A priority-inheritance mutex that traces contention and knows how many its thread holds.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/inheriting_lock.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -25,7 +24,7 @@ namespace mauve {
 /// | trace_id_ | set_trace_id [setup]  | before start  | no  |
 class PiMutex {
  public:
-  PiMutex();
+  PiMutex() = default;
   ~PiMutex();
   PiMutex(const PiMutex&) = delete;
   PiMutex& operator=(const PiMutex&) = delete;
@@ -55,7 +54,7 @@ class PiMutex {
   void note_holder() MAUVE_RT;
   void forget_held() noexcept;
 
-  pthread_mutex_t mutex_;
+  InheritingLock mutex_;
   std::atomic<std::int32_t> holder_{0};  // thread id, for the trace only
   std::uint32_t trace_id_{0};
   std::uint32_t depth_{0};   // how often its holder has taken it again

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <atomic>
-#include <mutex>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
 namespace mauve {
@@ -84,7 +84,7 @@ class Previews {
     Place* next{nullptr};
   };
 
-  mutable std::mutex mutex_;  // for a moment: no hook, and no thread of a component
+  mutable Mutex mutex_;  // for a moment: no hook, and no thread of a component
   std::atomic<Place*> first_{nullptr};
 };
 

@@ -2,10 +2,10 @@
 // BiasedWrite: the service `write` of a resource, for its only port without a lock.
 #pragma once
 
-#include <mutex>
 #include <string>
 
 #include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/service.hpp"
 

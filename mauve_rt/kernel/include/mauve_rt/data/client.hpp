@@ -5,11 +5,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "mauve_rt/base/function_ref.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"

@@ -4,13 +4,13 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/latest_register.hpp"
@@ -133,7 +133,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   PortLimits limits_;
   LatestRegister<T> register_;
   PiMutex others_mutex_;
-  std::mutex room_mutex_;
+  Mutex room_mutex_;
   std::atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
   std::atomic<std::uint32_t> seats_{0};
 

@@ -4,12 +4,12 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/logged_resource.hpp"

@@ -6,10 +6,10 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -105,7 +105,7 @@ class WriteLog {
   }
 
   Ring* ring_{nullptr};
-  std::mutex mutex_;
+  Mutex mutex_;
   std::unique_ptr<Ring> kept_;
   std::atomic<std::uint64_t> lost_{0};
 };

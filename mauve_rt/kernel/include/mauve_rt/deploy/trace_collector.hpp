@@ -2,11 +2,9 @@
 // Empties the rings of an architecture's trace often, for somebody who takes what came less often.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
-
 #include "mauve_rt/architecture/architecture.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve {
 
@@ -39,8 +37,8 @@ class TraceCollector {
 
   Architecture& architecture_;
   time_ns_t period_ns_;
-  std::mutex mutex_;
-  std::condition_variable end_;
+  Mutex mutex_;
+  ConditionVariable end_;
   bool ending_{false};
   std::vector<TraceRecord> collected_;
   Thread thread_;  // last: it uses all others

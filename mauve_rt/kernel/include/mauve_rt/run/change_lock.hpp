@@ -2,8 +2,7 @@
 // ChangeLock: under it one thread at a time reads and changes what an architecture consists of.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
+#include "mauve_rt/base/seam/condition_variable.hpp"
 
 namespace mauve {
 
@@ -59,8 +58,8 @@ class ChangeLock {
   void check_outside() const;
   bool is_inside() const noexcept;
 
-  std::mutex mutex_;
-  std::condition_variable given_back_;
+  Mutex mutex_;
+  ConditionVariable given_back_;
   int paused_{0};
 };
 

@@ -6,11 +6,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
@@ -446,7 +446,7 @@ class Component final : public Configurable {
   std::atomic<bool> is_renewing_{false};
   std::weak_ptr<Component> self_;
 
-  mutable std::mutex shown_mutex_;
+  mutable Mutex shown_mutex_;
   ShownParts shown_;
   std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
   std::shared_ptr<const StateTimes> shown_times_;

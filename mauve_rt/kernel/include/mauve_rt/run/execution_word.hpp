@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {

@@ -5,12 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/fsm.hpp"
@@ -199,7 +199,7 @@ class Shadow {
   time_ns_t ended_ns_{0};
   ShadowCause cause_{ShadowCause::none};
 
-  std::mutex run_mutex_;
+  Mutex run_mutex_;
   std::vector<std::unique_ptr<PortCell>> cells_;  // by the port's place in the shell; outlive the parts
   ShadowParts parts_;
   std::unique_ptr<StillClock> clock_;
@@ -209,7 +209,7 @@ class Shadow {
   std::int64_t debt_{0};  // releases to be skipped
   bool is_anew_{false};   // as of a release that was skipped
 
-  mutable std::mutex figures_mutex_;
+  mutable Mutex figures_mutex_;
   Figures figures_{};
   std::string fault_{};
   std::vector<std::pair<std::string, PropertyValue>> properties_{};    // to be set

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {

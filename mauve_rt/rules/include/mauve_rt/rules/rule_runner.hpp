@@ -4,16 +4,15 @@
 
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/rules/action.hpp"
 #include "mauve_rt/rules/engine.hpp"
@@ -176,8 +175,8 @@ class RuleRunner {
   std::uint64_t followed_{0};  // the follower's: the revision at which preparation threads were asked
   bool runs_{false};
   mutable PiMutex status_mutex_;
-  mutable std::mutex told_mutex_;
-  std::condition_variable told_changed_;
+  mutable Mutex told_mutex_;
+  ConditionVariable told_changed_;
   std::deque<Told> told_;
   std::uint64_t left_out_{0};
   std::string unobservable_{};  // why something cannot be heard

@@ -8,8 +8,8 @@
 #include <limits>
 #include <string>
 
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve::rules {
