@@ -40,29 +40,29 @@ struct Keeper::State {
   };
   Mutex mutex;
   ConditionVariable changed;
-  std::map<const void*, Lane> lanes;
-  std::uint64_t taken{0};
+  std::map<const void*, Lane> lanes MAUVE_GUARDED_BY(mutex);
+  std::uint64_t taken MAUVE_GUARDED_BY(mutex){0};
 };
 
 Keeper::Keeper() : state_(std::make_shared<State>()) {}
 
 Keeper::~Keeper() {
   wait(0, monotonic_now_ns() + kEnd);
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const auto is_held = [](const auto& each) { return each.second.holds != 0; };
   // Who holds a lane uses what waits there.
   if (std::any_of(state_->lanes.begin(), state_->lanes.end(), is_held)) keep_for_ever(state_);
 }
 
 void Keeper::take(std::string what, std::function<void()> work, const void* lane, Place place) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   State::Lane& its = state_->lanes[lane];
   its.works.insert(place == Place::next ? its.works.begin() : its.works.end(),
                    {.what = std::move(what), .call = std::move(work), .number = ++state_->taken});
   run_if_idle(state_, lane);
 }
 
-void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) {
+void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) MAUVE_REQUIRES(state->mutex) {
   State::Lane& its = state->lanes.at(lane);
   if (its.thread != std::thread::id{} || !its.has_next()) return;
   OrdinaryThread thread(&Keeper::run, state, lane);
@@ -71,12 +71,12 @@ void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) 
 }
 
 void Keeper::hold(const void* lane) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   ++state_->lanes[lane].holds;
 }
 
 void Keeper::release(const void* lane) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   State::Lane& its = state_->lanes.at(lane);
   if (--its.holds > 0 || its.thread != std::thread::id{}) return;
   if (its.works.empty()) {
@@ -87,23 +87,23 @@ void Keeper::release(const void* lane) {
 }
 
 bool Keeper::is_at(const void* lane) const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   return state_->lanes.contains(lane);
 }
 
 bool Keeper::is_held(const void* lane) const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const auto found = state_->lanes.find(lane);
   return found != state_->lanes.end() && found->second.holds != 0;
 }
 
 std::uint64_t Keeper::taken() const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   return state_->taken;
 }
 
 void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
-  std::unique_lock lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const std::uint64_t taken = state_->taken;
   const auto is_awaited = [&](const auto& each) {
     const State::Lane& lane = each.second;
@@ -115,11 +115,11 @@ void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   const auto& lanes = state_->lanes;
   if (std::any_of(lanes.begin(), lanes.end(), is_own)) return;
   while (monotonic_now_ns() < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited))
-    state_->changed.wait_until(lock, monotonic_now_ns() + ms_to_ns(20));
+    state_->changed.wait_until(state_->mutex, monotonic_now_ns() + ms_to_ns(20));
 }
 
 Keeper::Busy Keeper::busy() const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   Busy longest;
   for (const auto& [key, lane] : state_->lanes) {
     if (lane.at == 0 || (longest.since_ns != 0 && longest.since_ns <= lane.busy.since_ns)) continue;
@@ -129,7 +129,7 @@ Keeper::Busy Keeper::busy() const {
 }
 
 void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
-  std::unique_lock lock(state->mutex);
+  UniqueLock lock(state->mutex);
   State::Lane& its = state->lanes.at(lane);
   while (its.has_next()) {
     State::Work work = std::move(its.works.front());

@@ -37,7 +37,7 @@ void BiasedMutex::Seat::await_leave() noexcept {
   }
 }
 
-/// Afterwards the user of the bias is not inside, and enters by the mutex. Under the mutex.
+/// Afterwards the user of the bias is not inside, and enters by the mutex.
 void BiasedMutex::revoke(Seat& granted) noexcept {
   owner_.store(nullptr, std::memory_order_relaxed);
   process_barrier();
@@ -72,7 +72,7 @@ void BiasedMutex::unlock() noexcept {
   mutex_.unlock();
 }
 
-/// Under the mutex; unlock() carries it out.
+/// unlock() carries it out.
 void BiasedMutex::grant() noexcept {
   const bool is_alone = first_ != nullptr && first_->next_ == nullptr;
   const bool is_biased = is_alone && !is_shared_ && has_process_barrier();
@@ -80,7 +80,7 @@ void BiasedMutex::grant() noexcept {
 }
 
 void BiasedMutex::add(Seat& seat) noexcept {
-  const std::lock_guard lock(*this);
+  const LockGuard lock(*this);
   seat.next_ = first_;
   first_ = &seat;
   grant();
@@ -99,7 +99,7 @@ void BiasedMutex::remove(Seat& seat) noexcept {
 }
 
 void BiasedMutex::share() noexcept {
-  const std::lock_guard lock(*this);
+  const LockGuard lock(*this);
   is_shared_ = true;
   grant();
 }

@@ -14,7 +14,7 @@ template <typename Objects>
 void keep_for_ever(Objects objects) {
   static Mutex mutex;
   static auto* const kept = new std::deque<Objects>;
-  const std::lock_guard lock(mutex);
+  const LockGuard lock(mutex);
   kept->push_back(std::move(objects));
 }
 

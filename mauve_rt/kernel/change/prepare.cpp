@@ -78,9 +78,9 @@ void TransactionCommit::Work::prepare_beside_others() {
   } catch (const std::system_error&) {  // there are no threads to be had
     return prepare_interruptibly();
   }
-  std::unique_lock lock(preparation_.mutex);
+  UniqueLock lock(preparation_.mutex);
   while (!preparation_.is_over) {
-    preparation_.changed.wait_until(lock, monotonic_now_ns() + kOverdueLook);
+    preparation_.changed.wait_until(preparation_.mutex, monotonic_now_ns() + kOverdueLook);
     if (preparation_.is_over) break;
     lock.unlock();
     if (is_overdue()) call_off_preparation();
@@ -107,7 +107,7 @@ void TransactionCommit::Work::run_preparation(ArchitecturePresence& presence) {
     }
   }
   {
-    const std::lock_guard lock(preparation_.mutex);
+    const LockGuard lock(preparation_.mutex);
     preparation_.is_over = true;
     preparation_.failure = std::move(failure);
     preparation_.changed.notify_all();
@@ -120,7 +120,7 @@ void TransactionCommit::Work::run_preparation(ArchitecturePresence& presence) {
 void TransactionCommit::Work::end_left_behind(ArchitecturePresence& presence) {
   const std::shared_lock use(presence.mutex);
   if (presence.architecture == nullptr) return;
-  const std::lock_guard change(architecture_.change_lock());
+  const LockGuard change(architecture_.change_lock());
   std::shared_lock<SharedMutex> host_use;
   host_ = architecture_.use_host(host_use);
   deployed_ = host_ != nullptr && host_->is_deployed();

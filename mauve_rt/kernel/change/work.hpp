@@ -212,7 +212,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   struct Preparation {
     Mutex mutex;
     ConditionVariable changed;
-    bool is_over{false};
+    bool is_over MAUVE_GUARDED_BY(mutex){false};
     // It was called off, and the requester has returned: the thread that prepares does what is left to be done.
     bool is_left{false};
     std::exception_ptr failure{};

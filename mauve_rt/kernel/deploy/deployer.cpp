@@ -17,8 +17,8 @@ constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 /// The deployers of the process, for its end.
 struct Living {
   Mutex mutex;
-  std::set<Deployer*> deployers;
-  bool has_ended{false};
+  std::set<Deployer*> deployers MAUVE_GUARDED_BY(mutex);
+  bool has_ended MAUVE_GUARDED_BY(mutex){false};
 };
 
 /// Not destroyed with static objects: a thread may end the process later.
@@ -32,7 +32,7 @@ Living& living() {
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
     : Host(architecture), options_(options) {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   all.deployers.insert(this);
   has_ended_ = all.has_ended;
 }
@@ -40,7 +40,7 @@ Deployer::Deployer(Architecture& architecture, DeployerOptions options)
 Deployer::~Deployer() {
   {
     Living& all = living();
-    const std::lock_guard lock(all.mutex);
+    const LockGuard lock(all.mutex);
     all.deployers.erase(this);
   }
   shutdown();
@@ -57,9 +57,9 @@ void Deployer::prepare_process() {
 
 void Deployer::deploy() {
   architecture().change_lock().lock_alone();
-  const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
+  const LockGuard change(architecture().change_lock(), std::adopt_lock);
   architecture().settle_changes();
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   if (has_ended_) {
     throw Error(ErrorCode::not_configured, "the process ends", {.remedy = "deploy in a new process"});
   }
@@ -109,25 +109,25 @@ void Deployer::create_threads() {
 }
 
 void Deployer::shutdown() noexcept {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   shut_down();
 }
 
 void Deployer::end() noexcept {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   has_ended_ = true;
   shut_down();
 }
 
 bool Deployer::all_ended() noexcept {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   return all.has_ended;
 }
 
 void Deployer::end_all() noexcept {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   all.has_ended = true;
   for (Deployer* deployer : all.deployers) deployer->end();
 }
@@ -155,7 +155,7 @@ void Deployer::begin_task(Task& task) {
 }
 
 void Deployer::run_shadow(const std::shared_ptr<Shadow>& shadow) {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   if (is_deployed()) shadow_threads_.add(shadow);  // else the change finds the host shut down
 }
 

@@ -19,7 +19,7 @@ TraceCollector::TraceCollector(Architecture& architecture, time_ns_t period_ns)
 
 TraceCollector::~TraceCollector() {
   {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     ending_ = true;
   }
   end_.notify_one();
@@ -27,7 +27,7 @@ TraceCollector::~TraceCollector() {
 }
 
 TraceDrain TraceCollector::take() {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   TraceDrain last = architecture_.drain_trace();
   collected_.insert(collected_.end(), last.records.begin(), last.records.end());
   last.records = std::exchange(collected_, {});
@@ -35,10 +35,10 @@ TraceDrain TraceCollector::take() {
 }
 
 void TraceCollector::run() {
-  std::unique_lock lock(mutex_);
+  const LockGuard lock(mutex_);
   while (!ending_) {
     const time_ns_t next_ns = later_by(monotonic_now_ns(), period_ns_);
-    while (!ending_ && end_.wait_until(lock, next_ns)) {
+    while (!ending_ && end_.wait_until(mutex_, next_ns)) {
     }
     if (!ending_) collect();
   }

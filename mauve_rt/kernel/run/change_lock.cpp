@@ -47,9 +47,8 @@ void ChangeLock::lock() {
 
 void ChangeLock::lock_alone() {
   check_outside();
-  std::unique_lock lock(mutex_);
-  while (paused_ != 0) given_back_.wait(lock);
-  lock.release();
+  mutex_.lock();
+  while (paused_ != 0) given_back_.wait(mutex_);
   entered.push_back(this);
 }
 
@@ -75,11 +74,7 @@ std::unique_lock<ChangeLock> ChangeLock::join_alone() {
   return {*this, std::adopt_lock};
 }
 
-void ChangeLock::wait_for_others() {
-  std::unique_lock lock(mutex_, std::adopt_lock);
-  given_back_.wait_until(lock, monotonic_now_ns() + ms_to_ns(1));
-  lock.release();
-}
+void ChangeLock::wait_for_others() { given_back_.wait_until(mutex_, monotonic_now_ns() + ms_to_ns(1)); }
 
 ChangeLock::Pause::Pause(ChangeLock& lock) : lock_(lock) {
   ++lock_.paused_;

@@ -123,7 +123,7 @@ class Component::FallbackRenewal {
     for (;; sleep_for(kClaimedLook)) {
       const std::shared_lock use(presence.mutex);
       if (presence.architecture == nullptr) return false;
-      const std::lock_guard change(presence.architecture->change_lock());
+      const LockGuard change(presence.architecture->change_lock());
       CommitGate& gate = presence.architecture->commit_gate();
       ChangeMark& mark = component_.change_mark_;
       {

@@ -213,7 +213,7 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
   }
   core->set_context(&machine_.context());
   {
-    const std::lock_guard run(run_mutex_);  // it executes nothing without its core
+    const LockGuard run(run_mutex_);  // it executes nothing without its core
     if (is_retired_) return core->cleanup();
     parts_.core = std::move(core);
   }
@@ -221,7 +221,7 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
 }
 
 void Shadow::set_property(const std::string& name, const PropertyValue& value) {
-  const std::lock_guard lock(figures_mutex_);
+  const LockGuard lock(figures_mutex_);
   properties_.emplace_back(name, value);
 }
 
@@ -234,7 +234,7 @@ ShadowRecord Shadow::record() const {
                       .releases = static_cast<std::int64_t>(capture_.captured()),
                       .skipped_late = static_cast<std::int64_t>(capture_.skipped()),
                       .budget_ns = options_.budget_ns};
-  const std::lock_guard lock(figures_mutex_);
+  const LockGuard lock(figures_mutex_);
   if (phase == kEnded) {
     record.verdict = cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
                      : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
@@ -252,7 +252,6 @@ ShadowRecord Shadow::record() const {
   return record;
 }
 
-/// figures_mutex_ held.
 std::string Shadow::reason() const {
   switch (cause_) {
     case ShadowCause::none:

@@ -80,7 +80,7 @@ void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
 void Task::swap_fault(FaultNote& note) noexcept {
-  const std::lock_guard lock(fault_mutex_);
+  const LockGuard lock(fault_mutex_);
   MAUVE_RT_TRUSTED(std::swap(fault_, note));  // moves: nothing is allocated, nothing freed
 }
 
@@ -93,7 +93,7 @@ void Task::clear_fault() noexcept {
 Fault Task::fault() const {
   FaultNote note;
   {
-    const std::lock_guard lock(fault_mutex_);
+    const LockGuard lock(fault_mutex_);
     note = fault_;
   }
   if (note.when_ns == 0) return {};
@@ -123,7 +123,7 @@ StateAge Task::state_age() const {
 }
 
 void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped) {
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   if (ring_ == nullptr) return;
   ring_->drain(into);
   written += ring_->offered();
@@ -131,13 +131,13 @@ void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, st
 }
 
 std::unique_ptr<TraceRing> Task::release_ring() {
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   machine_.set_ring(nullptr);
   return std::move(ring_);
 }
 
 void Task::begin_trace(bool trace) {
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   if (!trace) {
     ring_.reset();
   } else if (ring_ == nullptr) {
@@ -194,7 +194,7 @@ void Task::detach_thread() noexcept {
 }
 
 void Task::start_at(time_ns_t instant_ns) {
-  const std::lock_guard lock(command_mutex_);
+  const LockGuard lock(command_mutex_);
   post_start(instant_ns);
 }
 
@@ -202,7 +202,7 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
   start_at_ns_ = instant_ns;
   started_.store(0, std::memory_order_relaxed);  // relaxed: kStart publishes it
   {
-    const std::lock_guard lock(order_mutex_);
+    const LockGuard lock(order_mutex_);
     // A stop bit that came too late for the last run must not end this one: store, not or.
     control_.store(kStart, std::memory_order_release);
   }
@@ -220,8 +220,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
                  .remedy = remedy});
   };
   if (!command_mutex_.try_lock_until(until))
-    throw_late("a commit or another command of the component lasts; it was not started", "try again");
-  const std::lock_guard lock(command_mutex_, std::adopt_lock);
+    return throw_late("a commit or another command of the component lasts; it was not started", "try again");
+  const LockGuard lock(command_mutex_, std::adopt_lock);
   if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until))
     throw_late("the component has yet to take an earlier change; it was not started", "try again");
   // A change posts a start and goes on: the thread may be taking it up, and reads what the next one would write.
@@ -299,7 +299,7 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
 
 /// The state and the bit go together: a stop that is late must not end the run that follows.
 void Task::order_stop() {
-  const std::lock_guard lock(order_mutex_);
+  const LockGuard lock(order_mutex_);
   auto seen = state_.load(std::memory_order_acquire);
   while (static_cast<ComponentState>(seen) == ComponentState::running) {
     // acq_rel: a fault in between wins
@@ -323,7 +323,7 @@ bool Task::is_called_from_own_state() const noexcept {
 
 /// A start that the thread has not taken up yet; false when there is none.
 bool Task::withdraw_start() noexcept {
-  const std::lock_guard lock(order_mutex_);
+  const LockGuard lock(order_mutex_);
   if (state() != ComponentState::stopped) return false;
   if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return false;
   started_.store(1, std::memory_order_release);  // who waits for it waits in vain

@@ -27,7 +27,7 @@ thread_local const Task* task_simulated_here = nullptr;
 void Task::create_thread(Barrier* barrier, bool require_realtime, bool trace,
                          std::shared_ptr<Watchdog> watchdog) {
   if (!end_thread(0)) throw_state_running("the component's thread has not ended", 0, kLeftBehindRemedy);
-  const std::lock_guard lock(command_mutex_);
+  const LockGuard lock(command_mutex_);
   watchdog_ = std::move(watchdog);
   machine_.set_watchdog(watchdog_.get());
   demoted_ = false;

@@ -328,12 +328,12 @@ class Architecture final : public Configurable {
   void retire_trace(Task& task);
 
  private:
-  /// A new number that the trace knows the name by. list_mutex_ held. Throws Error (out_of_range): all are used up.
-  std::uint16_t give_number(const std::string& name);
-  /// The number of a component of that name that is gone. list_mutex_ held.
-  std::optional<std::uint16_t> find_free_number(const std::string& name) const;
-  /// Keeps records until the next drain; of too many the oldest are lost. trace_mutex_ held.
-  void keep_records(const std::vector<TraceRecord>& records);
+  /// A new number that the trace knows the name by. Throws Error (out_of_range): all are used up.
+  std::uint16_t give_number(const std::string& name) MAUVE_REQUIRES(list_mutex_);
+  /// The number of a component of that name that is gone.
+  std::optional<std::uint16_t> find_free_number(const std::string& name) const MAUVE_REQUIRES(list_mutex_);
+  /// Keeps records until the next drain; of too many the oldest are lost.
+  void keep_records(const std::vector<TraceRecord>& records) MAUVE_REQUIRES(trace_mutex_);
 
   struct Leaving {
     std::shared_ptr<Component> component;
@@ -359,19 +359,19 @@ class Architecture final : public Configurable {
   std::vector<std::shared_ptr<OpenChange>> open_;
   std::atomic<bool> has_open_{false};
   mutable Mutex host_mutex_;
-  Runner* host_{nullptr};
+  Runner* host_ MAUVE_GUARDED_BY(host_mutex_){nullptr};
   ChangeSignal changes_;
   Authors authors_;
   Notifier publications_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable Mutex list_mutex_;
-  std::vector<std::string> names_;  // by number
-  std::map<std::uint16_t, std::weak_ptr<const Component>>
-      numbered_;  // who has a number; absent: no component ever had
+  std::vector<std::string> names_ MAUVE_GUARDED_BY(list_mutex_);  // by number
+  std::map<std::uint16_t, std::weak_ptr<const Component>> numbered_
+      MAUVE_GUARDED_BY(list_mutex_);  // who has a number; absent: no component ever had
   Mutex trace_mutex_;
-  std::deque<TraceRecord> retired_;
-  std::vector<Final> finals_;  // by number
-  std::vector<std::shared_ptr<Resource>> retiring_;
+  std::deque<TraceRecord> retired_ MAUVE_GUARDED_BY(trace_mutex_);
+  std::vector<Final> finals_ MAUVE_GUARDED_BY(trace_mutex_);  // by number
+  std::vector<std::shared_ptr<Resource>> retiring_ MAUVE_GUARDED_BY(list_mutex_);
   std::vector<Leaving> leaving_;
   Lists lists_;
   std::shared_ptr<ArchitecturePresence> presence_;

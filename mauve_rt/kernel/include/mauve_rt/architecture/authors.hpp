@@ -38,7 +38,7 @@ class Authors {
 
  private:
   mutable Mutex mutex_;
-  std::map<std::pair<std::string, std::string>, std::string> by_;
+  std::map<std::pair<std::string, std::string>, std::string> by_ MAUVE_GUARDED_BY(mutex_);
 };
 
 }  // namespace mauve

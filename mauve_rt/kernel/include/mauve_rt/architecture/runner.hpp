@@ -54,7 +54,7 @@ class Runner {
     deployed_.store(deployed, std::memory_order_seq_cst);
   }
   /// Waits for the changes that use the runner; after shutdown(), at its end. [non-rt]
-  void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
+  void wait_unused() noexcept { const LockGuard lock(in_use_); }
 
  private:
   std::atomic<bool> deployed_{false};

@@ -31,7 +31,7 @@ class BiasedWrite final : public WriteService<T> {
   TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
-      const std::lock_guard lock(mutex_, std::adopt_lock);
+      const LockGuard lock(mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !owner_.take(value, time_ns)) return TryWrite::done;
     }
     owner_.written(time_ns);

@@ -59,7 +59,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     return mauve::find_number<T>(path);
   }
   bool read_number(const NumberPlace& place, double& number) noexcept override {
-    const std::lock_guard lock(others_mutex_);
+    const LockGuard lock(others_mutex_);
     std::uint32_t held = 0;
     const T* const newest = register_.look(held);
     if (newest != nullptr) number = place.of(newest);
@@ -76,7 +76,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     std::uint32_t max_ports() const noexcept override { return owner_.limits_.readers; }
     DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
       if (reader.seat != nullptr) return owner_.register_.read(value, time_ns, reader);
-      const std::lock_guard lock(owner_.others_mutex_);
+      const LockGuard lock(owner_.others_mutex_);
       const DataStatus status = owner_.register_.read(value, time_ns, reader);
       owner_.register_.let_go(reader.held);
       return status;
@@ -116,7 +116,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
 
   /// A reader whose component was removed while a state of it hung keeps its place until that ends: it is none of the ports.
   void make_room(std::uint32_t ports) {
-    const std::lock_guard lock(room_mutex_);
+    const LockGuard lock(room_mutex_);
     const std::uint32_t seats = seats_.load(std::memory_order_relaxed);
     const std::uint32_t left_behind = seats > read.ports() ? seats - read.ports() : 0;
     register_.reserve(ports + left_behind + kOthers);

@@ -222,7 +222,7 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   std::uint64_t handed_out_{0};  // as `seen`, of next_published()
   EventListeners listeners_;
   mutable Mutex use_mutex_;
-  std::weak_ptr<const void> use_;
+  std::weak_ptr<const void> use_ MAUVE_GUARDED_BY(use_mutex_);
 };
 
 /// A resource that holds one newest value: its serialized face is one look at it.

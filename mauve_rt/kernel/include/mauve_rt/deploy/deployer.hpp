@@ -63,7 +63,7 @@ class Deployer final : public Host {
   DeployerOptions options_;
   RealtimeProcess process_;
   Mutex life_mutex_;
-  bool has_ended_{false};
+  bool has_ended_ MAUVE_GUARDED_BY(life_mutex_){false};
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
   ShadowThreads shadow_threads_;

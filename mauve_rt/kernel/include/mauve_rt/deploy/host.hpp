@@ -138,7 +138,7 @@ class Host : public Runner {
 
   Architecture& architecture_;
   mutable Mutex hosted_mutex_;
-  std::vector<std::weak_ptr<Component>> hosted_;
+  std::vector<std::weak_ptr<Component>> hosted_ MAUVE_GUARDED_BY(hosted_mutex_);
 };
 
 }  // namespace mauve

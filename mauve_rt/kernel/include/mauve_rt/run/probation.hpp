@@ -252,8 +252,8 @@ class Probation : public std::enable_shared_from_this<Probation> {
   std::atomic<bool> is_requested_{false};
   std::atomic<bool> is_comeback_claimed_{false};
   mutable Mutex request_mutex_;
-  std::string request_{};
-  std::string left_out_{};  // why the old core does not go on
+  std::string request_ MAUVE_GUARDED_BY(request_mutex_){};
+  std::string left_out_ MAUVE_GUARDED_BY(request_mutex_){};  // why the old core does not go on
   time_ns_t hung_for_ns_{0};
 };
 

@@ -448,7 +448,7 @@ class Task final : public Waiter {
   bool simulated_{false};
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
-  FaultNote fault_;
+  FaultNote fault_ MAUVE_GUARDED_BY(fault_mutex_);
   FaultNote time_out_note_;  // of an execution that timed out, then the fault before it; empty while none has
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
   const std::atomic<int>* locks_held_{nullptr};

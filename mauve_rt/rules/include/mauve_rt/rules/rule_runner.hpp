@@ -144,7 +144,7 @@ class RuleRunner {
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
   void ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
-  void show_status() MAUVE_RT;
+  void show_status() MAUVE_RT MAUVE_LOCKS_UNSEEN;  // where its mutex is free
   bool is_unsettled(std::size_t index) const MAUVE_RT;
   bool commit(std::size_t index) noexcept;
   bool reserve(std::size_t index) noexcept;
@@ -177,10 +177,10 @@ class RuleRunner {
   mutable PiMutex status_mutex_;
   mutable Mutex told_mutex_;
   ConditionVariable told_changed_;
-  std::deque<Told> told_;
-  std::uint64_t left_out_{0};
-  std::string unobservable_{};  // why something cannot be heard
-  bool woken_{false};
+  std::deque<Told> told_ MAUVE_GUARDED_BY(told_mutex_);
+  std::uint64_t left_out_ MAUVE_GUARDED_BY(told_mutex_){0};
+  std::string unobservable_ MAUVE_GUARDED_BY(told_mutex_){};  // why something cannot be heard
+  bool woken_ MAUVE_GUARDED_BY(told_mutex_){false};
   std::uint16_t trace_number_;
 };
 
